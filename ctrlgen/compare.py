@@ -1,0 +1,249 @@
+"""The generated C against the model: build it strictly, run it, say where it first differs.
+
+Every compiler present builds every arithmetic. Three references: the controller evaluated by CasADi
+(`ctrlgen.controller`), IPOPT's solution of the scenario, and the model simulated forward with the
+drives that the C computed.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ctrlgen.controller import Controller
+from ctrlgen.cprint import Real
+from ctrlgen.errors import ToolError
+from ctrlgen.generate import CFolder, write_harness
+from ctrlgen.model import Model
+from ctrlgen.simulate import simulate, trace
+from ctrlgen.solve import Solution
+from ctrlgen.units import from_si
+
+FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O2")
+COMPILERS = ("gcc", "clang")
+RANDOM_TARGETS = 1000
+
+# What a difference may be, and why.
+LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometre; a tenth, below any sensor here
+ANGLE = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}  # rad: 1e-8 rad moves the platform's rim by 0.02 nm
+RELATIVE = 1e-12  # double C against CasADi: 4500 roundings
+ROUNDINGS = 16  # float C against CasADi: roundings of the largest value that the chain may pile up
+
+
+@dataclass(frozen=True)
+class Row:
+    """One comparison of one signal. `worst`, `rms`, `limit` in `unit`; `first` the first sample beyond the limit, or None."""
+
+    build: str
+    what: str
+    signal: str
+    unit: str
+    worst: float
+    rms: float
+    limit: float
+    samples: int
+    first: int | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether every sample is within the limit (not a number is not)."""
+        return self.first is None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All rows, and the tools: compiler -> version line; `missing` compilers were not run."""
+
+    rows: tuple[Row, ...]
+    compilers: dict[str, str]
+    missing: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything that ran is within tolerance; something did run."""
+        return bool(self.rows) and all(row.passed for row in self.rows)
+
+
+def find_compilers() -> dict[str, str]:
+    """Present C compilers with their version line. Raises ToolError when there is none."""
+    found = {}
+    for name in COMPILERS:
+        if shutil.which(name):
+            version = subprocess.run([name, "--version"], capture_output=True, text=True, check=False).stdout
+            found[name] = (version.splitlines() or [name])[0]
+    if not found:
+        raise ToolError(
+            f"no C compiler found (looked for {', '.join(COMPILERS)}); install one, on Debian: apt-get install gcc. "
+            "`ctrlgen generate` writes the C without it"
+        )
+    return found
+
+
+def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None] = lambda _: None) -> Comparison:
+    """Builds and runs `folder` with every compiler present. Raises ToolError when a build or a run fails."""
+    compilers = find_compilers()
+    builds = [(compiler, real) for compiler in compilers for real in Real]
+    reference = _Reference(solution)
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
+        for real in Real:
+            write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
+
+        def one(build: tuple[str, Real]) -> list[Row]:
+            compiler, real = build
+            program = _build(compiler, real, folder, Path(scratch))
+            rows = _rows(f"{compiler} {real.value}", real, program, reference)
+            progress(f"{compiler} {real.value}")
+            return rows
+
+        with ThreadPoolExecutor(max_workers=2) as pool:
+            rows = [row for part in pool.map(one, builds) for row in part]
+    return Comparison(tuple(rows), compilers, tuple(c for c in COMPILERS if c not in compilers))
+
+
+def _build(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
+    program = scratch / f"{compiler}_{real.suffix}"
+    sources = [folder.path / f"{names[real]}.c" for names in (folder.online, folder.player) if names]
+    command = [compiler, *FLAGS, "-I", str(folder.path), str(scratch / f"harness_{real.suffix}.c"), *map(str, sources), "-lm", "-o", str(program)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise ToolError(f"{compiler} refuses the {real.value} C:\n{done.stderr.strip()[:2000]}")
+    return program
+
+
+def _run(program: Path, mode: str, records: np.ndarray, width: int) -> np.ndarray:
+    """Output records (n, 1 + width) of doubles; the first column is the status."""
+    done = subprocess.run([str(program), mode], input=np.ascontiguousarray(records, dtype=float).tobytes(), capture_output=True, check=False)
+    answer = np.frombuffer(done.stdout, dtype=float)
+    if done.returncode != 0 or answer.size != len(records) * (1 + width):
+        raise ToolError(f"{program.name} stopped in mode '{mode}' with status {done.returncode} after {answer.size // (1 + width)} of {len(records)} records")
+    return answer.reshape(len(records), 1 + width)
+
+
+class _Reference:
+    """What the C must reproduce, computed once for all builds."""
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
+        self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
+        self.random = self._random_targets()
+        self.settled = self._answers(self.random, follow=False)
+        self.command = solution.command
+        if self.scenario.sample_time:  # one more sample: back to the first, or the last one held
+            self.command = np.vstack([self.command, self.command[:1] if self.scenario.closed else self.command[-1:]])
+        self.followed = self._answers(self.command, follow=self.scenario.sample_time is not None)
+
+    def _random_targets(self) -> np.ndarray:
+        """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""
+        m, rng = self.model, np.random.default_rng(20)
+        low, high = m.z_bounds
+        z = rng.uniform(low, high, size=(RANDOM_TARGETS // 2, len(m.axes)))
+        ratio = self.controller.composite_ratio.map(len(z))(z.T).full().ravel()
+        z = z / np.maximum(ratio, 1.0)[:, None]
+        x, u = np.tile(m.rest, (len(z), 1)), np.zeros_like(z)
+        signal = self.scenario.file.follow
+        reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
+        anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
+        return np.vstack([reachable, anywhere])
+
+    def _answers(self, targets: np.ndarray, *, follow: bool) -> np.ndarray:
+        """(n, 1 + 3 axes): status, drive, displacement, actuator state."""
+        rows, state = [], self.controller.rest()
+        for k, target in enumerate(targets):
+            step = self.controller.step(state, target, settle=not follow or k == 0)
+            state = step.state
+            rows.append(np.concatenate([[step.status], step.drive, step.displacement, step.actuator_state]))
+        return np.array(rows)
+
+
+def _rows(build: str, real: Real, program: Path, ref: _Reference) -> list[Row]:
+    """All comparisons of one build."""
+    n, m = len(ref.model.axes), ref.model
+    signals = (("drive", slice(1, 1 + n)), ("displacement", slice(1 + n, 1 + 2 * n)), ("state", slice(1 + 2 * n, 1 + 3 * n)))
+    rows = []
+
+    def add(what: str, role: str, difference: np.ndarray, limit: float, channels: slice = slice(None)) -> None:
+        signal = m.signals[role]
+        unit = signal.units[channels][0]
+        unit = {"um": "nm", "degC": "K"}.get(unit, unit)
+        rows.append(_row(build, what, signal.label, unit, np.asarray(difference)[:, channels], limit))
+
+    def against_casadi(what: str, answer: np.ndarray, reference: np.ndarray) -> None:
+        rows.append(_row(build, what, "status", "1", answer[:, :1] - reference[:, :1], 0.0))
+        for role, columns in signals:
+            size = np.abs(reference[:, columns]).max() or m.signals[role].scale[0]
+            limit = RELATIVE * size if real is Real.DOUBLE else _float_limit(m, role, size, ref)
+            add(what, role, answer[:, columns] - reference[:, columns], limit)
+
+    mode = "follow" if ref.scenario.sample_time else "settle"
+    followed = _run(program, mode, ref.command, 3 * n)
+    against_casadi("scenario, online C - CasADi", followed, ref.followed)
+    settled = _run(program, "settle", ref.random, 3 * n)
+    against_casadi("random targets, online C - CasADi", settled, ref.settled)
+
+    # The drive that acts from sample k to k + 1 is the answer to target k + 1.
+    solved = ref.solution.drive
+    online = followed[1:, 1 : 1 + n] if ref.scenario.sample_time else followed[:, 1 : 1 + n]
+    limit = 1e-8 * m.u_scale.max() if real is Real.DOUBLE else _float_limit(m, "drive", np.abs(solved).max(), ref)
+    add("scenario, online C - IPOPT", "drive", online - solved, limit)
+
+    pose = m.signals[ref.scenario.file.follow]
+    for what, drives in _drive_sets(program, ref, online):
+        if ref.scenario.sample_time:
+            reached = simulate(m, drives, ref.scenario.sample_time, ref.solution.trace.x[0]).signals[ref.scenario.file.follow]
+            difference = reached - ref.command
+        else:
+            z, state = followed[:, 1 + n : 1 + 2 * n], followed[:, 1 + 2 * n :]
+            x = np.hstack([state, ref.solution.trace.x[:, n:]])
+            difference = trace(m, np.zeros(len(z)), x, z, drives).signals[ref.scenario.file.follow] - ref.command
+        for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
+            channels = [i for i, u in enumerate(pose.units) if u == unit]
+            if channels:
+                add(f"{what} -> model - command", ref.scenario.file.follow, difference, limit, slice(channels[0], channels[-1] + 1))
+    if ref.scenario.sample_time:
+        table = _run(program, "sample", np.arange(len(solved)), n)
+        single = solved if real is Real.DOUBLE else solved.astype(np.float32).astype(float)
+        add("player C - IPOPT", "drive", table[:, 1:] - single, 0.0)
+        times = (np.arange(len(solved)) + 0.5) * ref.scenario.sample_time
+        between = _run(program, "at", times[:-1], n)
+        add("player C at mid-sample - IPOPT", "drive", between[:, 1:] - solved[:-1], 1e-9 if real is Real.DOUBLE else 1e-4 * np.abs(solved).max())
+    return rows
+
+
+def _drive_sets(program: Path, ref: _Reference, online: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """Drives to send through the model: those of the online C, and the player's."""
+    sets = [("online C", online)]
+    if ref.scenario.sample_time:
+        sets.append(("player C", _run(program, "sample", np.arange(len(ref.solution.drive)), online.shape[1])[:, 1:]))
+    return sets
+
+
+def _float_limit(model: Model, role: str, size: float, ref: _Reference) -> float:
+    """What `ROUNDINGS` float roundings of the largest value amount to; for the drive, of the actuator state behind it."""
+    eps = float(np.finfo(np.float32).eps)
+    if role != "drive":
+        return ROUNDINGS * eps * size
+    n = len(model.axes)
+    kernels = ref.controller.moving or ref.controller.static
+    worst = 0.0
+    for before, row in zip(ref.followed[:-1:37], ref.followed[1::37], strict=False):
+        x = np.concatenate([before[1 + 2 * n :], model.rest[n:]])
+        z, wanted, state = before[1 + n : 1 + 2 * n], row[1 + n : 1 + 2 * n], row[1 + 2 * n :]
+        off = kernels.drive(x, z, wanted, state * (1 + ROUNDINGS / 2 * eps)) - kernels.drive(x, z, wanted, state)
+        worst = max(worst, float(np.max(np.abs(off.full()))))
+    return max(worst, ROUNDINGS * eps * size)
+
+
+def _row(build: str, what: str, label: str, unit: str, difference: np.ndarray, limit: float) -> Row:
+    """Worst and rms of a difference (n, channels) in SI; expressed in `unit`."""
+    size = np.abs(difference).max(axis=1)
+    beyond = np.flatnonzero(~(size <= limit))
+    scale = from_si(1.0, unit) if unit not in ("K",) else 1.0
+    worst, rms = float(size.max()) * scale, float(np.sqrt(np.mean(difference**2))) * scale
+    return Row(build, what, label, unit, worst, rms, limit * scale, len(difference), int(beyond[0]) if beyond.size else None)

@@ -1,0 +1,132 @@
+"""The online controller: wanted signal -> drives, with every limit kept, in a fixed number of operations.
+
+This is the reference of the generated C: the C template does the same steps in the same order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+from functools import cached_property
+from itertools import product
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.invert import Inverse, invert
+from ctrlgen.model import Limit, Model
+
+RELATIVE_SLACK = 1e-5  # of a signal's typical size (0.1 nm, 1 mK): what a limit may be missed by before it is reported
+
+
+class Status(IntFlag):
+    """What the controller had to do. 0: everything as commanded."""
+
+    DISPLACEMENT = 1  # the target needs a displacement outside its range; the range's end was taken
+    COMPOSITE = 2  # a limit on stress or rotation: the displacement was shrunk toward home
+    STATE = 4  # the actuator state (temperature) was held at its limit
+    DRIVE = 8  # the drive was held at its limit: the target comes later than commanded
+    INPUT = 16  # not a number or absurdly large: drives at their lower limit, target ignored
+
+
+@dataclass(frozen=True)
+class Controller:
+    """One device, one followed signal, one sample time (None: equilibria only)."""
+
+    model: Model
+    follow: str
+    sample_time: float | None
+
+    @cached_property
+    def static(self) -> Inverse:
+        """Kernels for equilibria."""
+        return invert(self.model, self.follow, None)
+
+    @cached_property
+    def moving(self) -> Inverse | None:
+        """Kernels for the next sample; None where there is no sample time."""
+        return None if self.sample_time is None else invert(self.model, self.follow, self.sample_time)
+
+    def _worst_in_range(self, ratio: ca.SX) -> float:
+        """The largest value of a convex `ratio` over the displacement range: that of its worst corner."""
+        z = self.model.z
+        corners = np.array(list(product(*zip(*self.model.z_bounds, strict=True)))).T
+        return float(ca.mmax(ca.Function("f", [z], [ratio]).map(corners.shape[1])(corners)))
+
+    @cached_property
+    def guarded_limits(self) -> tuple[Limit, ...]:
+        """Composite limits that the range of the displacement alone does not keep."""
+        limits = [limit for limit in self.model.composite_limits() if limit.upper is not None]
+        return tuple(limit for limit in limits if self._worst_in_range(ca.mmax(limit.expr / limit.upper)) > 1)
+
+    @cached_property
+    def composite_ratio(self) -> ca.Function:
+        """z -> the largest of the guarded limits' expr/upper; above 1 a limit is broken."""
+        z = self.model.z
+        ratios = [limit.expr / limit.upper for limit in self.guarded_limits]
+        worst = ca.mmax(ca.vertcat(*ratios)) if ratios else ca.SX(0)
+        return ca.Function("composite_ratio", [z], [worst], ["z"], ["ratio"], {"cse": True})
+
+    @cached_property
+    def safe_displacement(self) -> float:
+        """The edge [m] of a box [0, edge]^n in which no guarded limit can be broken.
+
+        The limits are convex and zero at home, so the box shrunk by the worst corner's ratio is safe.
+        """
+        _, high = self.model.z_bounds
+        return float(np.max(high)) / max(self._worst_in_range(self.composite_ratio(self.model.z)), 1.0)
+
+    @cached_property
+    def input_limits(self) -> np.ndarray:
+        """Largest |target| per channel that is taken for a command at all: 1e5 typical sizes, far outside any range."""
+        return 1e5 * np.array(self.model.signals[self.follow].scale)
+
+    def rest(self) -> tuple[np.ndarray, np.ndarray]:
+        """State of a cold device: (x, z)."""
+        return self.model.rest.copy(), np.zeros(len(self.model.axes))
+
+    def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> Step:
+        """Drives that bring the followed signal to `target` at the next sample, from `state` (x, z).
+
+        With `settle` the equilibrium at `target` instead, and its state.
+        """
+        m = self.model
+        kernels = self.static if settle or self.moving is None else self.moving
+        (z_low, z_high), (x_low, x_high), (u_low, u_high) = m.z_bounds, m.x_bounds, m.u_bounds
+        n = len(m.axes)
+        x, z = state
+        if not np.all(np.abs(target) <= self.input_limits):  # false for NaN too
+            u = u_low
+            return Step(Status.INPUT, z, x[:n], u, (kernels.advance(x, z, u).full().ravel(), z))
+        status = Status(0)
+        wanted, hit = _clamp(kernels.displacement(x, z, target), z_low, z_high, m.z_scale)
+        status |= Status.DISPLACEMENT if hit else Status(0)
+        if np.max(wanted) > self.safe_displacement:
+            ratio = float(self.composite_ratio(wanted))
+            if ratio > 1:
+                wanted = wanted / ratio
+            if ratio > 1 + RELATIVE_SLACK:
+                status |= Status.COMPOSITE
+        acting, hit = _clamp(kernels.state(x, z, wanted), x_low[:n], x_high[:n], m.x_scale[:n])
+        status |= Status.STATE if hit else Status(0)
+        u, hit = _clamp(kernels.drive(x, z, wanted, acting), u_low, u_high, m.u_scale)
+        status |= Status.DRIVE if hit else Status(0)
+        return Step(status, wanted, acting, u, (kernels.advance(x, wanted if settle else z, u).full().ravel(), wanted))
+
+
+@dataclass(frozen=True)
+class Step:
+    """One answer of the controller, SI: what it did, and the state it expects at the next sample."""
+
+    status: Status
+    displacement: np.ndarray
+    actuator_state: np.ndarray
+    drive: np.ndarray
+    state: tuple[np.ndarray, np.ndarray]
+
+
+def _clamp(value: ca.DM, low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, bool]:
+    """`value` limited to low ... high, and whether that moved it by more than the slack."""
+    wanted = value.full().ravel()
+    limited = np.clip(wanted, low, high)
+    return limited, bool(np.any(np.abs(limited - wanted) > RELATIVE_SLACK * scale))

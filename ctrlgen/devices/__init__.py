@@ -1,0 +1,28 @@
+"""Device descriptions: one kind, one file. `load_device` reads a device.toml."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file is read
+from ctrlgen.devices.base import Device, Limit, Links, Signal
+from ctrlgen.errors import Fault, InputError
+from ctrlgen.files import read_toml, validate
+
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")
+
+
+def load_device(path: Path | str) -> Device:
+    """The device described by a TOML file. Raises InputError listing every fault."""
+    table = read_toml(path)
+    kind = table.get("kind")
+    if kind not in Device.library:
+        known = ", ".join(f'"{name}"' for name in sorted(Device.library))
+        raise InputError(path, [Fault("kind", f"{kind!r} is not a kind of device I know; write kind = one of {known}")])
+    return validate(Device.library[kind], table, path)
+
+
+__all__ = ["Device", "Limit", "Links", "Signal", "load_device"]

@@ -1,0 +1,149 @@
+"""What every device description has: validated sections, quantities with sources, values in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal
+
+import casadi as ca
+from pydantic import BaseModel, ConfigDict, Field
+
+from ctrlgen.effect import Effect
+from ctrlgen.units import Quantity
+
+
+class Section(BaseModel):
+    """A table of a device file. Unknown keys are faults; nothing changes after loading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A named vector of the model, in SI inside.
+
+    `channels` are its components' names, `units` the units a reader sees, `column` the
+    prefix of its columns in a CSV, `expr` (n,) the symbolic value, `scale` a typical size in SI per channel.
+    """
+
+    name: str
+    label: str
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    column: str
+    expr: ca.SX
+    scale: tuple[float, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """CSV column names with units, such as 'd_1X [um]'."""
+        return tuple(f"{self.column}{c} [{u}]" for c, u in zip(self.channels, self.units, strict=True))
+
+
+@dataclass(frozen=True)
+class Limit:
+    """lower <= expr <= upper, channel by channel; SI. None where a side is free.
+
+    A limit on anything but a model variable itself must be convex in the displacement and zero
+    at home: the online controller restores it by shrinking the displacement toward home.
+    """
+
+    name: str
+    label: str
+    channels: tuple[str, ...]
+    unit: str
+    expr: ca.SX
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True)
+class Links:
+    """The physics of one device as a chain of symbolic maps; `ctrlgen.model` joins them.
+
+    drive u -> (`power`) -> state x by `rates` -> `actuator_force` on the axis == `stage_force` of the
+    displacement d -> `pose`. Each map takes and gives SX column vectors in SI.
+    """
+
+    axes: tuple[str, ...]
+    components: tuple[str, ...]
+    pose_units: tuple[str, ...]
+    pose_scale: tuple[float, ...]
+    drive: Signal
+    state: Signal
+    rest: tuple[float, ...]
+    displacement_scale: float
+    force_scale: float
+    power_scale: float
+    power: Callable[[ca.SX], ca.SX]
+    rates: Callable[[ca.SX, ca.SX], ca.SX]
+    actuator_force: Callable[[ca.SX], ca.SX]
+    stage_force: Callable[[ca.SX], ca.SX]
+    stage_force_parts: Callable[[ca.SX], dict[str, ca.SX]]
+    pose: Callable[[ca.SX], ca.SX]
+    limits: Callable[[SimpleNamespace], Sequence[Limit]]
+
+
+class Device(Section):
+    """Base of every device: one subclass, one file, named by `kind` in the device file."""
+
+    library: ClassVar[dict[str, type[Device]]] = {}
+
+    kind: str
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    title: str
+    source: str
+    effect: tuple[Effect, ...] = ()
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        kind = cls.model_fields["kind"].annotation
+        Device.library[getattr(kind, "__args__", ("",))[0]] = cls
+
+    def links(self, p: SimpleNamespace) -> Links:
+        """The device's physics with the values `p` (numbers, or symbols where they are free)."""
+        raise NotImplementedError
+
+    def quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """Every number of the device with its dotted path, such as 'struts.wire_length'."""
+        yield from _leaves(self, "")
+
+    def values(self, free: dict[str, ca.SX] | None = None) -> SimpleNamespace:
+        """SI numbers as nested namespaces; `free` replaces chosen paths by symbols."""
+        return _namespace(self, "", free or {})
+
+
+def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Quantity]]:
+    if isinstance(node, Quantity):
+        yield prefix, node
+    elif isinstance(node, Section):
+        for key in type(node).model_fields:
+            yield from _leaves(getattr(node, key), f"{prefix}.{key}" if prefix else key)
+    elif isinstance(node, Effect):
+        for key, value in node.values.items():
+            yield f"{prefix}.{key}", value
+    elif isinstance(node, tuple):
+        for index, member in enumerate(node):
+            yield from _leaves(member, f"{prefix}[{index}]")
+
+
+def _namespace(node: Any, prefix: str, free: dict[str, ca.SX]) -> Any:
+    if isinstance(node, Quantity):
+        return free.get(prefix, node.si)
+    if isinstance(node, Section):
+        return SimpleNamespace(
+            **{
+                key: _namespace(getattr(node, key), f"{prefix}.{key}" if prefix else key, free)
+                for key in type(node).model_fields
+            }
+        )
+    if isinstance(node, Effect):
+        return SimpleNamespace(**{k: free.get(f"{prefix}.{k}", q.si) for k, q in node.values.items()})
+    if isinstance(node, tuple):
+        return tuple(_namespace(member, f"{prefix}[{i}]", free) for i, member in enumerate(node))
+    return node
+
+
+__all__ = ["Device", "Limit", "Links", "Literal", "Section", "Signal"]

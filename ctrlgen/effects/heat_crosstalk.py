@@ -1,0 +1,19 @@
+"""Heaters on one chip warm each other."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class HeatCrosstalk(Effect):
+    """Delta u_i = kappa sum_{j != i} u_j: a share of the other heaters' power arrives here.
+
+    Holds in steady state and for changes slower than the chip's own thermal time constant.
+    """
+
+    place = Place.DRIVE
+    source = "definition"
+    params = (Param("share", "1", (0.0, 0.1), "power arriving per power of another heater", off=0.0),)
+
+    def term(self, s, p):
+        return p.share * (ca.sum1(s.all) - s.value)

@@ -1,0 +1,15 @@
+"""A sensor that does not read zero at home."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class HomeOffset(Effect):
+    """Delta y = b, constant."""
+
+    place = Place.SENSOR
+    source = "definition"
+    channel_unit = "um"
+    params = (Param("offset", "um", (-1e3, 1e3), "reading at home", off=0.0),)
+
+    def term(self, s, p):
+        return p.offset

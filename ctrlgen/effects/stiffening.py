@@ -1,0 +1,17 @@
+"""A clamped flexure stretches as it bends."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Stiffening(Effect):
+    """E = k_3 d^4/4, hence Delta F = -k_3 d^3 on the bar. Holds for d below the flexure's thickness.
+
+    A negative k_3 is softening.
+    """
+
+    place = Place.FORCE
+    source = "S. Timoshenko, Strength of Materials II (1956), large deflection of clamped beams"
+    params = (Param("k3", "N/um^3", (-1e-6, 1e-6), "cubic stiffness", off=0.0),)
+
+    def term(self, s, p):
+        return -p.k3 * s.displacement**3

@@ -1,0 +1,63 @@
+"""Everything ctrlgen raises on purpose. Each message says what, where, and what to do.
+
+CtrlgenError
+├── InputError        a file or an argument is wrong; lists every fault found
+├── Unreachable       the device cannot follow the trajectory; carries the nearest one
+├── SolverError       IPOPT stopped without a solution
+├── ToolError         a compiler is missing or refuses the generated C
+└── ToleranceError    a comparison is out of tolerance
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ctrlgen.solve import Shortfall
+
+
+class CtrlgenError(Exception):
+    """Base of every error a user can meet; the command line prints it and exits with status 1."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with an input: `where` (a dotted key, a line), `what`, and what to do."""
+
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}"
+
+
+class InputError(CtrlgenError):
+    """An input that cannot be used, with every fault at once."""
+
+    def __init__(self, source: object, faults: Sequence[Fault]) -> None:
+        self.source = str(source)
+        self.faults = tuple(faults)
+        count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
+        super().__init__("\n".join([f"{self.source}: {count}", *(f"  - {fault}" for fault in self.faults)]))
+
+
+class Unreachable(CtrlgenError):
+    """No admissible drive produces the commanded trajectory."""
+
+    def __init__(self, message: str, shortfall: Shortfall) -> None:
+        self.shortfall = shortfall
+        super().__init__(message)
+
+
+class SolverError(CtrlgenError):
+    """IPOPT ended without a solution, for a reason that is not unreachability."""
+
+
+class ToolError(CtrlgenError):
+    """A program outside ctrlgen (a C compiler) is missing or failed."""
+
+
+class ToleranceError(CtrlgenError):
+    """Two computations of the same quantity differ by more than the stated tolerance."""

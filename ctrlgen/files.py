@@ -1,0 +1,127 @@
+"""Files in and out: TOML with all faults at once, and writing that is whole or not at all."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import shutil
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from ctrlgen.errors import Fault, InputError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_text(path: Path | str) -> str:
+    """The text of a file, UTF-8. Raises InputError when it cannot be read."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(path, [Fault("file", "does not exist; check the path")]) from None
+    except IsADirectoryError:
+        raise InputError(path, [Fault("file", "is a folder; name the file inside it")]) from None
+    except UnicodeDecodeError as error:
+        raise InputError(path, [Fault("file", f"is not UTF-8 text (byte {error.start}); save it as UTF-8")]) from None
+    except OSError as error:
+        raise InputError(path, [Fault("file", f"cannot be read: {error.strerror}")]) from None
+
+
+def read_toml(path: Path | str) -> dict[str, Any]:
+    """The tables of a TOML file. Raises InputError with the line of a syntax error."""
+    try:
+        return tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(path, [Fault("syntax", f"{error}; see https://toml.io for the notation")]) from None
+
+
+def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Model:
+    """`table` as a `model`. Raises InputError listing every fault with its dotted key and a remedy."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        raise InputError(path, [_fault(model, details) for details in error.errors()]) from None
+
+
+def _fault(model: type[BaseModel], details: Any) -> Fault:
+    location = [part for part in details["loc"] if part != "function-before"]
+    where = ""
+    for part in location:
+        where += f"[{part}]" if isinstance(part, int) else (f".{part}" if where else str(part))
+    message = str(details["msg"]).removeprefix("Value error, ")
+    if details["type"] == "missing":
+        message = "is missing; add it"
+    elif details["type"] == "extra_forbidden":
+        siblings = _keys(model, location[:-1])
+        near = difflib.get_close_matches(str(location[-1]), siblings, n=1)
+        message = "is not a key I know; " + (f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(siblings)}")
+    elif details["type"] == "literal_error":
+        message = f"{details['input']!r} must be {details['ctx']['expected']}"
+    return Fault(where or "file", message)
+
+
+def _keys(model: type[BaseModel], location: list[Any]) -> list[str]:
+    current: Any = model
+    for part in location:
+        fields = getattr(current, "model_fields", {})
+        if part not in fields:
+            continue
+        current = fields[part].annotation
+    return list(getattr(current, "model_fields", {}))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` whole or not at all: a temporary file beside `path`, then a rename."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def whole_folder(out: Path) -> Iterator[Path]:
+    """A folder that appears at `out` only when the block ends without an error.
+
+    Yields a temporary folder beside `out`; on success it replaces `out`, which must be absent, empty,
+    or an earlier result (it holds `.ctrlgen`). On an error or Ctrl-C `out` is left as it was.
+    Raises InputError when `out` cannot be written or holds somebody else's files.
+    """
+    out = Path(os.path.abspath(out))
+    if out.exists() and not out.is_dir():
+        raise InputError(out, [Fault("--out", "is a file; name a folder")])
+    if out.is_dir() and any(out.iterdir()) and not (out / MARKER).exists():
+        raise InputError(out, [Fault("--out", "holds files that ctrlgen did not make; name an empty or new folder")])
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    except OSError as error:
+        raise InputError(out, [Fault("--out", f"cannot be written ({error.strerror}); name a folder you may write")]) from None
+    try:
+        yield draft
+        (draft / MARKER).write_text("a result of ctrlgen; the next run with the same --out replaces this folder\n")
+        draft.chmod(0o755)
+        if out.exists():
+            retired = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+            os.replace(out, retired / "old")
+            os.replace(draft, out)
+            shutil.rmtree(retired)
+        else:
+            os.replace(draft, out)
+    except BaseException:
+        shutil.rmtree(draft, ignore_errors=True)
+        raise
+
+
+MARKER = ".ctrlgen"

@@ -1,0 +1,167 @@
+"""Model and solution -> a folder of C99: the only writer of C.
+
+`online` controllers (any reachable target -> drives) and `player`s (the solved trajectory as a table), each in
+double and in float, with a CMake file and a test of reference vectors. Same input, same bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from ctrlgen import __version__
+from ctrlgen.controller import RELATIVE_SLACK, Controller, Status
+from ctrlgen.cprint import Kernel, Real, print_function
+from ctrlgen.files import write_text
+from ctrlgen.model import Model
+from ctrlgen.scenario import Scenario
+from ctrlgen.solve import Solution
+from ctrlgen.units import show
+
+VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
+
+
+def codegen_folder() -> Path:
+    """Templates and harness: `codegen/` of the repository, or its copy in an installed package."""
+    beside = Path(__file__).resolve().parent.parent / "codegen"
+    return beside if beside.is_dir() else Path(__file__).resolve().parent / "_codegen"
+
+
+@dataclass(frozen=True)
+class CFolder:
+    """What was generated: `path`, and the names of the pieces in each arithmetic."""
+
+    path: Path
+    online: dict[Real, str]
+    player: dict[Real, str]
+    operations: int
+    worst_operations: int
+
+
+def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | None = None) -> CFolder:
+    """Writes the C of `scenario` to `out`; with a `solution` also its player. Raises CtrlgenError."""
+    controller = Controller(model, scenario.file.follow, scenario.sample_time)
+    online = {real: f"{scenario.name}_online_{real.suffix}" for real in Real}
+    player = {real: f"{scenario.name}_player_{real.suffix}" for real in Real} if solution and scenario.sample_time else {}
+    cost = (0, 0)
+    for real in Real:
+        context = _online_context(scenario, controller, real, online[real])
+        cost = (context["cost"]["step"], context["cost"]["step"] + context["cost"]["ratio"])
+        _render("online.h", context, out / f"{online[real]}.h")
+        _render("online.c", context, out / f"{online[real]}.c")
+        command = scenario.command(model) if solution is None else solution.command
+        _render("test.c", context | {"online": online[real]} | _vectors(controller, command, real), out / f"test_{scenario.name}_{real.suffix}.c")
+        if solution and player:
+            _render("player.h", context | _player_context(solution, player[real]), out / f"{player[real]}.h")
+            _render("player.c", context | _player_context(solution, player[real]), out / f"{player[real]}.c")
+    sources = " ".join(f"{scenario.name}_{piece}_${{real}}.c" for piece in ("online", "player") if piece == "online" or player)
+    _render("CMakeLists.txt", {"name": scenario.name, "sources": sources}, out / "CMakeLists.txt")
+    return CFolder(out, online, player, *cost)
+
+
+def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
+    """The program that `ctrlgen.compare` builds around one pair of controllers."""
+    context = _online_context(scenario, Controller(model, scenario.file.follow, scenario.sample_time), real, folder.online[real])
+    _render("harness.c", context | {"online": folder.online[real], "player": folder.player.get(real)}, path)
+
+
+def _render(template: str, context: dict[str, Any], path: Path) -> None:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    write_text(path, environment.get_template(f"{template}.j2").render(context))
+
+
+def _online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
+    """Everything the templates of one online controller need."""
+    model = controller.model
+    n = len(model.axes)
+    kernels: list[Kernel] = []
+
+    def printed(function: Any, name: str) -> Kernel:
+        kernels.append(print_function(function, name, real))
+        return kernels[-1]
+
+    modes = []
+    for name, inverse, z in (("settle", controller.static, "out->displacement"), ("step", controller.moving, "state->z")):
+        if inverse is not None:
+            parts = {part: printed(getattr(inverse, part), f"{name}_{part}") for part in ("displacement", "state", "drive", "advance")}
+            modes.append({"name": name, "z": z, **parts})
+    ratio = None
+    if controller.guarded_limits:
+        ratio = printed(controller.composite_ratio, "composite_ratio")
+    (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
+    drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
+    last = modes[-1]
+    step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", "advance"))
+    return {
+        "prefix": prefix, "real": real, "version": __version__, "title": model.device.title, "source": model.device.source,
+        "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
+        "drive_unit": drive.units[0], "state": model.signals["state"], "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
+        "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
+        "composite": ", ".join(limit.label for limit in model.composite_limits()) or "composite limits",
+        "x_names": model.x_names, "kernels": kernels, "modes": modes, "ratio": ratio,
+        "safe": controller.safe_displacement if ratio else 0.0,
+        "relative_slack": RELATIVE_SLACK, "cost": {"step": step_cost, "ratio": ratio.operations if ratio else 0},
+        "input_limits": controller.input_limits, "rest": model.rest,
+        "z_low": z_low, "z_high": z_high, "z_slack": RELATIVE_SLACK * model.z_scale,
+        "s_low": x_low[:n], "s_high": x_high[:n], "s_slack": RELATIVE_SLACK * model.x_scale[:n],
+        "u_low": u_low, "u_high": u_high, "u_slack": RELATIVE_SLACK * model.u_scale,
+    }  # fmt: skip
+
+
+def _player_context(solution: Solution, prefix: str) -> dict[str, Any]:
+    return {
+        "prefix": prefix,
+        "title": solution.scenario.file.title,
+        "samples": len(solution.drive),
+        "closed": solution.scenario.closed,
+        "table": solution.drive,
+        "rate": 1 / (solution.scenario.sample_time or 1.0),
+    }
+
+
+def _vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
+    """Targets and the drives and status the reference answers, and what rounding may change.
+
+    The tolerance is the change of drive that four roundings of the actuator state cause.
+    """
+    rng = np.random.default_rng(0)
+    scale = np.array(controller.model.signals[controller.follow].scale)
+    beyond = rng.normal(size=(16, command.shape[1])) * 40 * scale
+    targets = [*command[:VECTORS], *beyond, np.full(command.shape[1], 1e9)]
+    vectors, tolerance, state = [], 0.0, controller.rest()
+    rounding = 4 * (np.finfo(np.float32).eps if real is Real.FLOAT else np.finfo(np.float64).eps)
+    for k, target in enumerate(targets):
+        target = np.array(target, dtype=np.float32).astype(float) if real is Real.FLOAT else target
+        settle = k == 0 or controller.moving is None
+        before, step = state, controller.step(state, target, settle=settle)
+        state = step.state
+        vectors.append({"target": target, "drive": step.drive, "status": int(step.status)})
+        if not step.status & Status.INPUT:
+            kernel = (controller.static if settle or controller.moving is None else controller.moving).drive
+            off = kernel(*before, step.displacement, step.actuator_state * (1 + rounding)) - kernel(*before, step.displacement, step.actuator_state)
+            tolerance = max(tolerance, float(np.max(np.abs(off.full()))))
+    return {"vectors": vectors, "tolerance": tolerance}
+
+
+def _number(value: float) -> float | int:
+    return round(value) if abs(value - round(value)) < 1e-9 * abs(value) else value
+
+
+def _si_text(signal: Any) -> str:
+    """'theta_x [rad], ... delta_z [m]' with the SI unit of each channel."""
+    units = {"um": "m", "degC": "K"}
+    return ", ".join(f"{c} [{units.get(u, u)}]" for c, u in zip(signal.channels, signal.units, strict=True))
+
+
+def _limit_text(limit: Any) -> str:
+    low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
+    high = "" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"
+    return f"{low}{limit.label}{high}"
+

@@ -1,0 +1,148 @@
+"""The model backwards, symbolically: wanted signal -> displacement -> state -> drive.
+
+Nothing here knows a device. The equations of `ctrlgen.model` at the end of a sample,
+
+    followed(x+, z+, u) = target,  g(x+, z+, u) = 0,  x+ = step(x, z, u)  (static: rates = 0),
+
+are sorted into blocks by block triangular form (I. S. Duff, J. K. Reid, ACM TOMS 4 (1978) 137), and
+each block is solved in the cheapest exact way: linear in closed form, one quadratic equation by
+its root, anything else by a fixed number of Newton steps. The operation count is therefore fixed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.errors import Fault, InputError
+from ctrlgen.model import Model
+
+NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves rounding only
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Four kernels, SX functions in SI, that a controller calls in this order.
+
+    `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted;
+    `drive` (x, z, z_wanted, s_wanted) -> u; `advance` (x, z, u) -> x at the next sample. x, z are those of
+    the present sample. A static inverse does not read x and z.
+    """
+
+    displacement: ca.Function
+    state: ca.Function
+    drive: ca.Function
+    advance: ca.Function
+
+
+def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
+    """The inverse of `model` for the signal `follow`; static where `sample_time` is None.
+
+    Free parameters stand at their nominal values. Raises InputError where the equations do not
+    separate into displacement, state and drive.
+    """
+    x, z, u, n = model.x, model.z, model.u, len(model.axes)
+    x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
+    target = ca.SX.sym("target", model.signals[follow].expr.numel())
+    now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, ca.DM(model.p_nominal))
+    # For each unknown: the value to expand about, and a value inside the range of operation.
+    known = _Values(
+        ca.vertcat(x, z, target, x_1, z_1, u_1),
+        np.concatenate([model.rest, 0 * model.z_scale, np.zeros(target.numel()), model.rest, 0 * model.z_scale, 0 * model.u_scale]),
+        np.concatenate([model.x_scale, model.z_scale, np.zeros(target.numel()), model.x_scale, model.z_scale, model.u_scale]),
+    )
+    followed, balance, rates = (ca.substitute(e, now, end) for e in (model.signals[follow].expr, model.balance, model.rates))
+    if sample_time is None:
+        motion = rates
+        advance = _solve(known, rates, x_1)
+    else:
+        advance = ca.substitute(model.step(sample_time), ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
+        motion = x_1 - advance
+
+    wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion), ca.vertcat(z_1, x_1, u_1))[:n]
+    # The later kernels take the earlier results as given, because the controller has limited them meanwhile.
+    later = _solve(known, ca.vertcat(balance, motion), ca.vertcat(x_1, u_1))
+    wanted_state, memory = later[:n], later[n : x.numel()]
+    wanted_u = _solve(known, ca.substitute(motion[:n], x_1[n:], memory), u_1)
+    return Inverse(
+        _kernel(model, "displacement", [x, z, target], ["x", "z", "target"], wanted_z),
+        _kernel(model, "state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
+        _kernel(model, "drive", [x, z, z_1, x_1[:n]], ["x", "z", "wanted", "state"], wanted_u),
+        _kernel(model, "advance", [x, z, u_1], ["x", "z", "drive"], advance),
+    )
+
+
+def _kernel(model: Model, name: str, arguments: list[ca.SX], names: list[str], result: ca.SX) -> ca.Function:
+    if set(map(str, ca.symvar(result))) - set(map(str, ca.symvar(ca.vertcat(*arguments)))):
+        raise InputError(model.name, [Fault("model", f"the {name} cannot be solved for before the later quantities are known")])
+    return ca.Function(name, arguments, [result], names, ["result"], {"cse": True})
+
+
+@dataclass(frozen=True)
+class _Values:
+    """Symbols with the value to expand about (`base`) and a typical distance from it (`scale`)."""
+
+    symbols: ca.SX
+    base: np.ndarray
+    scale: np.ndarray
+
+    def at(self, expression: ca.SX, fraction: float) -> np.ndarray:
+        """`expression` at base + fraction * scale."""
+        return ca.Function("f", [self.symbols], [expression])(self.base + fraction * self.scale).full()
+
+    def base_of(self, unknowns: ca.SX) -> ca.DM:
+        return ca.Function("f", [self.symbols], [unknowns])(self.base)
+
+    def inside(self, unknowns: ca.SX) -> ca.DM:
+        return ca.Function("f", [self.symbols], [unknowns])(self.base + self.scale)
+
+
+def _solve(known: _Values, equations: ca.SX, unknowns: ca.SX) -> ca.SX:
+    """`unknowns` (n,) as expressions in the other symbols, such that equations (n,) = 0, block by block."""
+    count, rows, columns, row_starts, column_starts, *_ = ca.jacobian(equations, unknowns).sparsity().btf()
+    solution = [ca.SX(0)] * unknowns.numel()
+    done = ca.SX(0, 1)
+    values = ca.SX(0, 1)
+    for block in range(count):
+        own = columns[column_starts[block] : column_starts[block + 1]]
+        which = rows[row_starts[block] : row_starts[block + 1]]
+        v = unknowns[own]
+        root = _solve_block(known, ca.substitute(equations[which], done, values), v)
+        for k, i in enumerate(own):
+            solution[i] = root[k]
+        done, values = ca.vertcat(done, v), ca.vertcat(values, root)
+    return ca.vertcat(*solution)
+
+
+def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
+    """One block, r(v) = 0: linear, quadratic in one unknown, or `NEWTON_STEPS` Newton steps."""
+    base = known.base_of(v)
+    slope = ca.jacobian(r, v)
+    if not ca.symvar(slope):  # numbers only: invert them here, once
+        return base - ca.mtimes(ca.inv(ca.evalf(slope)), ca.substitute(r, v, base))
+    if not ca.depends_on(slope, v):
+        return base - ca.solve(slope, ca.substitute(r, v, base))
+    curvature = ca.jacobian(slope, v)
+    if v.numel() == 1 and not ca.depends_on(curvature, v):
+        return base + _rising_root(known, r, v, base, slope, curvature)
+    root = ca.SX(known.inside(v))
+    for _ in range(NEWTON_STEPS):
+        J, residual = (ca.substitute(e, v, root) for e in (slope, r))
+        root = root - ca.solve(J, residual)
+    return root
+
+
+def _rising_root(known: _Values, r: ca.SX, v: ca.SX, base: ca.DM, slope: ca.SX, curvature: ca.SX) -> ca.SX:
+    """The root of a quadratic on the side of `base` on which operation takes place, free of cancellation.
+
+    With r(base + w) = C + B w + A w^2 and the sign chosen so that r rises: w = -2 C / (B + sqrt(B^2 - 4 A C)).
+    Where B is zero, w = sqrt(-C/A) with the sign of -C/A, so that a wish on the far side stays visible.
+    """
+    sign = float(np.sign(known.at(slope, 1.0)[0, 0]))
+    A, B, C = sign * curvature / 2, sign * ca.substitute(slope, v, base), sign * ca.substitute(r, v, base)
+    if ca.simplify(B).is_zero():
+        ratio = -C / A
+        return ca.sign(ratio) * ca.sqrt(ca.fabs(ratio))
+    return -2 * C / (B + ca.sqrt(ca.fmax(B**2 - 4 * A * C, 0)))

@@ -1,0 +1,266 @@
+"""Device -> Model: one symbolic statement of the physics that everything else reads.
+
+    u --(drive terms)--> drive --rates--> x --force(terms)--> balance with the stage --> z
+      --(displacement terms)--> pose(terms) --> reading(terms)
+
+x are the states (temperatures, then the effects' memories), z the stage displacements, held by
+the algebraic force balance 0 = g(x, z), u the drives. All SX, SI inside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.devices import Device, Limit, Links, Signal
+from ctrlgen.effect import Effect, Place
+from ctrlgen.errors import Fault, InputError
+from ctrlgen.units import same_dimension
+
+
+@dataclass(frozen=True)
+class Model:
+    """The physics of one device, symbolic.
+
+    `x` (n_x,), `z` (n_axes,), `u` (n_axes,), `p` (n_free,): symbols. `rates` dx/dt (n_x,) and `balance`
+    0 = g(x, z) (n_axes,) in N. `signals` by their role, in the order of the chain: drive, power,
+    state, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
+    """
+
+    name: str
+    device: Device
+    x: ca.SX
+    z: ca.SX
+    u: ca.SX
+    p: ca.SX
+    p_nominal: np.ndarray
+    x_names: tuple[str, ...]
+    rates: ca.SX
+    balance: ca.SX
+    signals: dict[str, Signal]
+    force_parts: dict[str, ca.SX]
+    limits: tuple[Limit, ...]
+    rest: np.ndarray
+    x_scale: np.ndarray
+    z_scale: np.ndarray
+    u_scale: np.ndarray
+    force_scale: float
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the actuated axes."""
+        return self.signals["displacement"].channels
+
+    @cached_property
+    def evaluate(self) -> ca.Function:
+        """(x, z, u, p) -> every signal in the order of `signals`."""
+        return ca.Function(
+            f"{self.name}_signals",
+            [self.x, self.z, self.u, self.p],
+            [signal.expr for signal in self.signals.values()],
+            ["x", "z", "u", "p"],
+            list(self.signals),
+        )
+
+    @cached_property
+    def evaluate_limits(self) -> ca.Function:
+        """(x, z, u, p) -> every limited quantity in the order of `limits`."""
+        return ca.Function(
+            f"{self.name}_limits",
+            [self.x, self.z, self.u, self.p],
+            [limit.expr for limit in self.limits],
+            ["x", "z", "u", "p"],
+            [limit.name for limit in self.limits],
+        )
+
+    @cached_property
+    def dynamics(self) -> ca.Function:
+        """(x, z, u, p) -> (rates, balance)."""
+        return ca.Function(
+            f"{self.name}_dynamics", [self.x, self.z, self.u, self.p], [self.rates, self.balance],
+            ["x", "z", "u", "p"], ["rates", "balance"],
+        )  # fmt: skip
+
+    def step(self, sample_time: float) -> ca.SX:
+        """x after one `sample_time` [s] with u and z held: x + h phi_1(h A) f, A = df/dx, phi_1(M) = M^-1 (e^M - 1).
+
+        Exact for first-order lags. Where states act on one another phi_1 is summed to order 12,
+        enough for |h A| <= 1. Raises InputError beyond that, asking for a shorter sample time.
+        """
+        A = ca.jacobian(self.rates, self.x)
+        h = sample_time
+        if A.sparsity().is_diag():
+            rate = ca.diag(A)
+            gain = ca.vertcat(*(_phi_1(rate[i], h) for i in range(self.x.numel())))
+            return self.x + gain * self.rates
+        norm = float(ca.norm_inf(ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal)))
+        if h * norm > 1:
+            raise InputError(
+                self.name,
+                [Fault("sample time", f"{h:g} s is too long for the fastest coupled state; use {1 / norm:.2g} s or less")],
+            )
+        term = total = h * self.rates
+        for order in range(2, 13):
+            term = h / order * ca.mtimes(A, term)
+            total += term
+        return self.x + total
+
+    @cached_property
+    def x_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bound of each state: the limits that are that state itself."""
+        return self._bounds(self.x)
+
+    @cached_property
+    def z_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bound of each displacement."""
+        return self._bounds(self.z)
+
+    @cached_property
+    def u_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bound of each drive."""
+        return self._bounds(self.u)
+
+    def _bounds(self, symbol: ca.SX) -> tuple[np.ndarray, np.ndarray]:
+        low, high = np.full(symbol.numel(), -np.inf), np.full(symbol.numel(), np.inf)
+        for limit in self.limits:
+            for _, i in _positions(limit, symbol):
+                if limit.lower is not None:
+                    low[i] = max(low[i], limit.lower)
+                if limit.upper is not None:
+                    high[i] = min(high[i], limit.upper)
+        return low, high
+
+    def composite_limits(self) -> list[Limit]:
+        """Limits on expressions rather than on one variable."""
+        return [
+            limit for limit in self.limits
+            if not any(_positions(limit, symbol) for symbol in (self.x, self.z, self.u))
+        ]  # fmt: skip
+
+
+def _phi_1(rate: ca.SX, h: float) -> ca.SX:
+    """(e^(rate h) - 1)/rate, or h where the rate is identically zero."""
+    return h if rate.is_zero() else (ca.exp(rate * h) - 1) / rate
+
+
+def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:
+    """Pairs (k, i) where component k of the limit is component i of `symbol` itself."""
+    place = {symbol[i].element_hash(): i for i in range(symbol.numel())}
+    pairs = ((k, limit.expr[k].element_hash()) for k in range(limit.expr.numel()) if limit.expr[k].is_symbolic())
+    return [(k, place[key]) for k, key in pairs if key in place]
+
+
+def build_model(device: Device, free: Sequence[str] = ()) -> Model:
+    """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
+
+    `free` are dotted paths as in `device.quantities()`. Raises InputError for a path or an effect's
+    channel that the device does not have.
+    """
+    nominal = dict(device.quantities())
+    unknown = [path for path in free if path not in nominal]
+    if unknown:
+        raise InputError(device.name, [Fault(path, "is not a parameter of this device") for path in unknown])
+    symbols = {path: ca.SX.sym(path) for path in free}
+    p = device.values(symbols)
+    links = device.links(p)
+    chain = _Chain(device, links, p)
+    return chain.model(ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1), np.array([nominal[path].si for path in free]))
+
+
+class _Chain:
+    """Joins a device's links and its effects' terms, place by place."""
+
+    def __init__(self, device: Device, links: Links, p: SimpleNamespace) -> None:
+        self.device, self.links = device, links
+        self.z = ca.SX.sym("d", len(links.axes))
+        self.effects = [(effect, p.effect[k], k) for k, effect in enumerate(device.effect)]
+        self.members: list[tuple[Effect, SimpleNamespace, int, dict[str, ca.SX]]] = []
+        names, scales = [], []
+        faults = []
+        for effect, values, k in self.effects:
+            channels, units = self._channels(effect.place)
+            chosen = range(len(channels)) if effect.at == "all" else [i for i, c in enumerate(channels) if c == effect.at]
+            if not chosen:
+                faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(channels)}, all"))
+            for i in chosen:
+                if effect.channel_unit and not same_dimension(effect.channel_unit, units[i]):
+                    faults.append(Fault(f"effect[{k}].at", f"{effect.kind} acts in {effect.channel_unit}, but {channels[i]} is in {units[i]}"))
+                states = {state.name: ca.SX.sym(f"{effect.kind}_{k}_{state.name}_{channels[i]}") for state in effect.states}
+                self.members.append((effect, values, i, states))
+                names += [symbol.name() for symbol in states.values()]
+                scales += [state.scale for state in effect.states]
+        if faults:
+            raise InputError(device.name, faults)
+        self.memory = ca.vertcat(*(symbol for *_, states in self.members for symbol in states.values()))
+        self.memory_names, self.memory_scales = tuple(names), scales
+        self.memory_rates: dict[int, ca.SX] = {}
+
+    def _channels(self, place: Place) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        if place in (Place.POSE, Place.SENSOR):
+            return self.links.components, self.links.pose_units
+        unit = {Place.DRIVE: self.links.drive.units[0], Place.FORCE: "N", Place.DISPLACEMENT: "um"}[place]
+        return self.links.axes, (unit,) * len(self.links.axes)
+
+    def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
+        """`before` plus every term of the effects at `place`; their rates are noted on the way."""
+        total = ca.SX(before)
+        for index, (effect, values, i, states) in enumerate(self.members):
+            if effect.place is not place:
+                continue
+            s = SimpleNamespace(value=before[i], all=before, index=i, **states)
+            if place not in (Place.POSE, Place.SENSOR):
+                s.displacement, s.temperature = self.z[i], self.links.state.expr[i]
+            total[i] += effect.term(s, values)
+            rates = effect.rates(s, values)
+            self.memory_rates[index] = ca.vertcat(*(rates[name] for name in states))
+        return total
+
+    def model(self, p: ca.SX, p_nominal: np.ndarray) -> Model:
+        links = self.links
+        u, T, z = links.drive.expr, links.state.expr, self.z
+        drive = self._with_terms(Place.DRIVE, u)
+        power = links.power(drive)
+        rates = links.rates(T, power)
+        actuator_force = links.actuator_force(T)
+        force = self._with_terms(Place.FORCE, actuator_force)
+        displacement = self._with_terms(Place.DISPLACEMENT, z)
+        pose = self._with_terms(Place.POSE, links.pose(displacement))
+        reading = self._with_terms(Place.SENSOR, pose)
+        memory_rates = ca.vertcat(*(self.memory_rates[i] for i in sorted(self.memory_rates)))
+        axes, n = links.axes, len(links.axes)
+        displacement_scale, force_scale = (links.displacement_scale,) * n, (links.force_scale,) * n
+        signals = [
+            links.drive,
+            Signal("power", "heater power", axes, ("W",) * n, "P_", power, (links.power_scale,) * n),
+            links.state,
+            Signal("force", "actuator force", axes, ("N",) * n, "F_", actuator_force, force_scale),
+            Signal("displacement", "stage displacement", axes, ("um",) * n, "d_", displacement, displacement_scale),
+            Signal("pose", "platform pose", links.components, links.pose_units, "", pose, links.pose_scale),
+            Signal("reading", "sensor reading", links.components, links.pose_units, "reading_", reading, links.pose_scale),
+        ]
+        named = SimpleNamespace(drive=u, state=T, force=actuator_force, displacement=z)
+        return Model(
+            name=self.device.name,
+            device=self.device,
+            x=ca.vertcat(T, self.memory),
+            z=z,
+            u=u,
+            p=p,
+            p_nominal=p_nominal,
+            x_names=tuple(f"{links.state.name}_{axis}" for axis in axes) + self.memory_names,
+            rates=ca.vertcat(rates, memory_rates),
+            balance=force - links.stage_force(z),
+            signals=dict(zip(("drive", "power", "state", "force", "displacement", "pose", "reading"), signals, strict=True)),
+            force_parts=links.stage_force_parts(z),
+            limits=tuple(links.limits(named)),
+            rest=np.concatenate([np.array([float(v) for v in links.rest]), np.zeros(len(self.memory_scales))]),
+            x_scale=np.array([*links.state.scale, *self.memory_scales]),
+            z_scale=np.full(n, links.displacement_scale),
+            u_scale=np.array(links.drive.scale),
+            force_scale=links.force_scale,
+        )

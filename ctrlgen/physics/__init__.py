@@ -1,0 +1,7 @@
+"""The equations of the papers, one file per component, symbolic. Nothing here knows a device file.
+
+Order of reading: `screw` and `flexure` (the algebra and the elements), then the parts of the
+NIST MEMS hexapod from the heater to the platform: `thermal_actuator`, `xy_stage`, `hexapod`.
+Arguments named `a`, `s`, `h` are namespaces of SI numbers or CasADi symbols with the names of
+the device file's sections.
+"""

@@ -1,0 +1,199 @@
+"""The hexapod on three X-Y stages: geometry, strut stiffness, Jacobian, wire stress.
+
+Source: S1 section 5. The global frame stands at the centre of the platform's top face at home.
+Actuator order: d = (1X, 1Y, 2X, 2Y, 3X, 3Y) [m]; pose order: the twist (theta, delta).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from ctrlgen.physics.flexure import wire_compliance
+from ctrlgen.physics.screw import (
+    Matrix,
+    inverse,
+    inverse_adjoint,
+    move,
+    parallel,
+    rotation_to,
+    rotation_z,
+    series,
+)
+
+STAGE_OF_STRUT = (0, 1, 1, 2, 2, 0)  # struts 1 and 6 stand on stage 1, 2 and 3 on stage 2, 4 and 5 on stage 3
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Strut ends and stage frames, lengths in m.
+
+    `platform` A_i and `base` B_i: six points each; `centre`: the three stage centres, midway
+    between the two B_i on a stage; `turn`: the three rotations from stage to global frame.
+    """
+
+    platform: list[Matrix]
+    base: list[Matrix]
+    centre: list[Matrix]
+    turn: list[Matrix]
+
+
+def geometry(h: Any) -> Geometry:
+    """A_i = Z(alpha_i) (r_a, 0, -t), B_i = Z(beta_i) (r_b, 0, -(H + t)). Source: S1 eq. (13), Table 2.
+
+    Printed B_z = -H would make the struts 5.077 mm long; H as the strut's vertical run gives the printed
+    5.4 mm.
+    """
+    A = [ca.mtimes(rotation_z(angle), ca.vertcat(h.platform_radius, 0, -h.platform_thickness)) for angle in h.platform_angles]
+    depth = -(h.height + h.platform_thickness)
+    B = [ca.mtimes(rotation_z(angle), ca.vertcat(h.base_radius, 0, depth)) for angle in h.base_angles]
+    centre = []
+    for j in range(3):
+        first, second = (B[i] for i in range(6) if STAGE_OF_STRUT[i] == j)
+        centre.append((first + second) / 2)
+    return Geometry(A, B, centre, [rotation_z(angle) for angle in h.stage_angles])
+
+
+def strut_length(h: Any) -> Any:
+    """L = |A_1 - B_1| [m]; printed 5.4 mm. Source: S1 Table 2."""
+    g = geometry(h)
+    return ca.norm_2(g.platform[0] - g.base[0])
+
+
+def _strut_frame(g: Geometry, i: int) -> tuple[Matrix, Any]:
+    """Rotation with x from B_i to A_i, and the distance between them."""
+    span = g.platform[i] - g.base[i]
+    length = ca.norm_2(span)
+    return rotation_to(span / length), length
+
+
+def strut_stiffness(length: Any, h: Any) -> Matrix:
+    """[K^s]: wire, rod, wire in series about the platform end, x along the strut, shape (6, 6).
+
+    Source: S1 section 5.2, with [C^w] of eq. (24). Both wires are part of `length` [m].
+    """
+    wire = wire_compliance(h.wire_length, h.wire_diameter, h.young, h.poisson)
+    rod = wire_compliance(length - 2 * h.wire_length, h.rod_diameter, h.young, h.poisson)
+    lower = move(wire, None, (h.wire_length - length, 0, 0))
+    return inverse(series((lower, move(rod, None, (-h.wire_length, 0, 0)), wire)))
+
+
+def _global_struts(g: Geometry, h: Any) -> list[Matrix]:
+    """The six strut stiffnesses in the global frame."""
+    members = []
+    for i in range(6):
+        R, length = _strut_frame(g, i)
+        members.append(move(strut_stiffness(length, h), R, g.platform[i]))
+    return members
+
+
+def _pairs(struts: list[Matrix]) -> list[Matrix]:
+    """Stiffness of the two struts of each stage in parallel."""
+    return [parallel(struts[i] for i in range(6) if STAGE_OF_STRUT[i] == j) for j in range(3)]
+
+
+def _travel(g: Geometry, j: int) -> Matrix:
+    """[M_j]: twist of stage j, at the global origin, per unit (d_jX, d_jY), shape (6, 2). Source: S1 eq. (15)."""
+    return ca.vertcat(ca.DM.zeros(3, 2), g.turn[j][:, :2])
+
+
+def _global_stages(g: Geometry, C_XY: Matrix) -> list[Matrix]:
+    """The three stage compliances [C_j^XY] in the global frame."""
+    return [move(C_XY, g.turn[j], g.centre[j]) for j in range(3)]
+
+
+def kinematic_jacobian(h: Any) -> Matrix:
+    """J of rigid struts and ideal ball joints, twist per stage displacement, shape (6, 6) [rad/m, 1].
+
+    n_i . (delta + theta x A_i) = n_i . b_i for each strut; the limit of `jacobian` for short, soft wires
+    on stiff stages.
+    """
+    g = geometry(h)
+    rows_p, rows_d = [], []
+    for i in range(6):
+        n = _strut_frame(g, i)[0][:, 0]
+        rows_p.append(ca.horzcat(ca.cross(g.platform[i], n).T, n.T))
+        j = STAGE_OF_STRUT[i]
+        stage = ca.mtimes(n.T, g.turn[j][:, :2])
+        rows_d.append(ca.horzcat(*(stage if k == j else ca.DM.zeros(1, 2) for k in range(3))))
+    return ca.solve(ca.vertcat(*rows_p), ca.vertcat(*rows_d))
+
+
+def jacobian(h: Any, C_XY: Matrix) -> Matrix:
+    """J = [C_j^T (C_j^Hex + C_j^XY)^-1 M_j], j = 1..3: twist of the platform per stage displacement, shape (6, 6).
+
+    C_j^T is the platform's compliance on the other two blocks (strut pair in series with its
+    stage), C_j^Hex = C_j^T + C_j^pair the same seen from stage j. All in the global frame, so
+    that the adjoints of eq. (17) are already applied. Source: S1 eq. (14)-(18).
+    """
+    g = geometry(h)
+    pair = [inverse(K) for K in _pairs(_global_struts(g, h))]
+    stage = _global_stages(g, C_XY)
+    block = [inverse(series((pair[j], stage[j]))) for j in range(3)]
+    columns = []
+    for j in range(3):
+        C_T = inverse(parallel(block[k] for k in range(3) if k != j))
+        wrench = ca.solve(series((C_T, pair[j], stage[j])), _travel(g, j))  # eq. (16)
+        columns.append(ca.mtimes(C_T, wrench))  # eq. (17)
+    return ca.horzcat(*columns)
+
+
+@dataclass(frozen=True)
+class WireLoads:
+    """Section loads of the wires per unit of stage displacement.
+
+    `tension` (6, 6) [N/m] and `torque` (6, 6) [N m/m] are constant along a strut, one row a strut.
+    `bending_y`, `bending_z` (24, 6) [N m/m] at both ends of all twelve wires; row order: strut 1
+    base wire (lower end, upper end), strut 1 platform wire (lower, upper), strut 2 ...
+    """
+
+    tension: Matrix
+    torque: Matrix
+    bending_y: Matrix
+    bending_z: Matrix
+
+
+def wire_loads(h: Any, C_XY: Matrix, J: Matrix) -> WireLoads:
+    """Loads of the wires in the linear model of `jacobian`.
+
+    Stage j carries W_j = (C_j^XY + C_j^pair)^-1 (M_j d_j - T^p), moves by T_j = M_j d_j - C_j^XY W_j, and
+    strut i on it carries K_i^s (T_j - T^p). Source: S1 eq. (14)-(16), solved for the wrench.
+    """
+    g = geometry(h)
+    struts = _global_struts(g, h)
+    pair = [inverse(K) for K in _pairs(struts)]
+    stage = _global_stages(g, C_XY)
+    relative = []
+    for j in range(3):
+        travel = ca.horzcat(*(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)))
+        W = ca.solve(series((pair[j], stage[j])), travel - J)
+        relative.append(travel - ca.mtimes(stage[j], W) - J)
+    sections: list[list[Matrix]] = []
+    for i in range(6):
+        R, length = _strut_frame(g, i)
+        W = ca.mtimes(struts[i], relative[STAGE_OF_STRUT[i]])
+        ends = (0, h.wire_length, length - h.wire_length, length)
+        sections.append([ca.mtimes(inverse_adjoint(R, g.base[i] + R[:, 0] * along), W) for along in ends])
+    return WireLoads(
+        tension=ca.vertcat(*(strut[0][0, :] for strut in sections)),
+        torque=ca.vertcat(*(strut[0][3, :] for strut in sections)),
+        bending_y=ca.vertcat(*(section[4, :] for strut in sections for section in strut)),
+        bending_z=ca.vertcat(*(section[5, :] for strut in sections for section in strut)),
+    )
+
+
+def wire_stress(d: Matrix, loads: WireLoads, h: Any) -> Matrix:
+    """Von Mises stress sqrt((32 M/(pi d^3) + |N|/A)^2 + 3 (16 T/(pi d^3))^2) at 24 wire sections [Pa].
+
+    M = |(M_y, M_z)|, N the tension, T the torque; `d`: (6,) [m]. M^2 and N^2 carry a floor that
+    amounts to 1e-6 of the allowed stress, so that the derivative exists at home; it errs on the safe side.
+    """
+    section = ca.pi * h.wire_diameter**3 / 32
+    floor = (1e-6 * h.stress_limit) ** 2
+    bending = ca.sqrt(ca.mtimes(loads.bending_y / section, d) ** 2 + ca.mtimes(loads.bending_z / section, d) ** 2 + floor)
+    axial = ca.sqrt(ca.mtimes(loads.tension / (ca.pi * h.wire_diameter**2 / 4), d) ** 2 + floor)
+    shear_2 = 3 * ca.mtimes(loads.torque / (2 * section), d) ** 2
+    strut = [i // 4 for i in range(24)]
+    return ca.sqrt((bending + axial[strut]) ** 2 + shear_2[strut])

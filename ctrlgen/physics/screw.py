@@ -1,0 +1,82 @@
+"""Screw algebra of flexure chains: twists, wrenches, adjoints, series and parallel connection.
+
+Order (S1 section 2.2): twist ``T = (theta_x, theta_y, theta_z, delta_x, delta_y, delta_z)``
+[rad, m], wrench ``W = (F_x, F_y, F_z, M_x, M_y, M_z)`` [N, N m], ``W = K T``, ``T = C W``.
+Because force stands before moment, the same adjoint carries twists and wrenches.
+
+Every function takes CasADi SX, DM or plain numbers, so the same line serves symbols and values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import casadi as ca
+
+Matrix = ca.SX | ca.DM
+Scalar = float | ca.SX
+
+
+def rotation_x(angle: Scalar) -> Matrix:
+    """[X(angle)], rotation about x, shape (3, 3). Source: S1 section 2.2."""
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(1, 0, 0), ca.horzcat(0, c, -s), ca.horzcat(0, s, c))
+
+
+def rotation_z(angle: Scalar) -> Matrix:
+    """[Z(angle)], rotation about z, shape (3, 3). Source: S1 section 2.2."""
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
+
+
+def rotation_to(axis: Matrix) -> Matrix:
+    """A rotation whose first column is the unit vector `axis`, shape (3, 3).
+
+    The other two columns are any right-handed completion; a body of revolution does not
+    care which. `axis` must not be parallel to x.
+    """
+    y = ca.cross(axis, ca.DM([1, 0, 0]))
+    y = y / ca.norm_2(y)
+    return ca.horzcat(axis, y, ca.cross(axis, y))
+
+
+def adjoint(rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:
+    """[Ad] = [[R, 0], [D R, R]], D the cross-product matrix of `position`, shape (6, 6).
+
+    Carries a twist or wrench from the local frame to the reference frame in which
+    `rotation` and `position` [m] are given. Source: S1 eq. (2).
+    """
+    R = ca.DM.eye(3) if rotation is None else rotation
+    d = position if isinstance(position, (ca.SX, ca.DM)) else ca.vertcat(*position)
+    return ca.vertcat(ca.horzcat(R, ca.DM.zeros(3, 3)), ca.horzcat(ca.mtimes(ca.skew(d), R), R))
+
+
+def inverse_adjoint(rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:
+    """[Ad]^-1 in closed form: [[R', 0], [-R' D, R']], shape (6, 6)."""
+    R = ca.DM.eye(3) if rotation is None else rotation
+    d = position if isinstance(position, (ca.SX, ca.DM)) else ca.vertcat(*position)
+    return ca.vertcat(
+        ca.horzcat(R.T, ca.DM.zeros(3, 3)), ca.horzcat(-ca.mtimes(R.T, ca.skew(d)), R.T)
+    )
+
+
+def move(matrix: Matrix, rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:
+    """[Ad] [C] [Ad]^-1: a compliance or stiffness seen from another frame. Source: S1 eq. (1), (3)."""
+    return ca.mtimes([adjoint(rotation, position), matrix, inverse_adjoint(rotation, position)])
+
+
+def inverse(matrix: Matrix) -> Matrix:
+    """Compliance from stiffness or back, shape (6, 6)."""
+    return ca.solve(matrix, ca.DM.eye(matrix.shape[0]))
+
+
+def series(compliances: Iterable[Matrix]) -> Matrix:
+    """Compliance of a serial chain, all members in one frame. Source: S1 eq. (1)."""
+    members = list(compliances)
+    return sum(members[1:], members[0])
+
+
+def parallel(stiffnesses: Iterable[Matrix]) -> Matrix:
+    """Stiffness of parallel members, all in one frame. Source: S1 eq. (3)."""
+    members = list(stiffnesses)
+    return sum(members[1:], members[0])

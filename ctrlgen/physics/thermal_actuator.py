@@ -1,0 +1,58 @@
+"""The bent-beam thermal actuator: temperature, force and stiffness. Source: S1 section 3.1."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from ctrlgen.physics.flexure import blade_compliance
+from ctrlgen.physics.screw import Matrix, Scalar, inverse, move, parallel, rotation_z
+
+ZERO_CELSIUS = 273.15  # K; S1 Table 1 gives alpha as a function of degrees Celsius
+
+
+def expansion(T: Scalar, a: Any) -> Scalar:
+    """alpha(T) = alpha_0 + alpha_1 (T - 0 degC) [1/K], `T` [K]. Source: S1 Table 1."""
+    return a.expansion + a.expansion_slope * (T - ZERO_CELSIUS)
+
+
+def force(T: Scalar, a: Any) -> Scalar:
+    """F = 2 n alpha(T) (T - T_amb) E w_1 h sin(theta) [N] on the actuator bar, `T` [K].
+
+    Source: S1 eq. (4), where T-bar is the average temperature above ambient.
+    """
+    strain = expansion(T, a) * (T - a.ambient)
+    return 2 * a.beams * strain * a.young * a.beam_width * a.thickness * ca.sin(a.beam_angle)
+
+
+def temperature_rate(T: Scalar, P: Scalar, a: Any) -> Scalar:
+    """dT/dt = (R_th P - (T - T_amb)) / tau [K/s]: heated by P >= 0 [W], cooled passively.
+
+    The papers give no dynamics; a first-order lag is the reconstruction.
+    """
+    return (a.thermal_resistance * P - (T - a.ambient)) / a.time_constant
+
+
+def beam_stiffness(a: Any) -> Matrix:
+    """[K^tb] of one beam, wrench per twist, shape (6, 6). Source: S1 eq. (5).
+
+    Entry (6, 5) is printed -0.22; it must equal (2, 3) = -0.0216.
+    """
+    return inverse(blade_compliance(a.beam_length, a.beam_width, a.thickness, a.young, a.poisson))
+
+
+def stiffness(a: Any) -> Matrix:
+    """[K^t] of all 2 n beams about the bar's end, shape (6, 6). Source: S1 eq. (6).
+
+    Entries (1, 4), (2, 5) and (3, 6) reproduce the print; the moment entries do not follow
+    from the printed beam spacing.
+    """
+    K = beam_stiffness(a)
+    pitch = a.beam_gap + a.bar_width / 2
+    sides = ((ca.pi / 2 + a.beam_angle, -1), (3 * ca.pi / 2 - a.beam_angle, 1))
+    return parallel(
+        move(K, rotation_z(angle), (-pitch * i, sign * a.bar_half_height, 0))
+        for i in range(1, round(float(a.beams)) + 1)
+        for angle, sign in sides
+    )

@@ -1,0 +1,112 @@
+"""A scenario: a device, what it should follow, how fast, and what must come out."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ctrlgen.devices import Device, load_device
+from ctrlgen.devices.base import Section
+from ctrlgen.errors import Fault, InputError
+from ctrlgen.files import read_text, read_toml, validate
+from ctrlgen.model import Model
+from ctrlgen.paths import Frame, PathKind, Poses
+from ctrlgen.units import quantity
+
+FILE = "scenario.toml"
+
+
+class Expectation(Section):
+    """One value that must come out: `value` names it (see `ctrlgen.report.measures`), `range` in its unit."""
+
+    value: str
+    range: tuple[str, str]
+    source: str = ""
+
+
+class ScenarioFile(Section):
+    """scenario.toml as written."""
+
+    title: str
+    device: str
+    follow: Literal["pose", "displacement"] = "pose"
+    sample_rate: quantity("Hz", positive=True) | None = None
+    duration: quantity("s", positive=True) | None = None
+    points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
+    path: PathKind
+    outcome: Literal["solved", "unreachable"] = "solved"
+    expect: tuple[Expectation, ...] = ()
+
+    @model_validator(mode="after")
+    def _timing(self) -> ScenarioFile:
+        if self.sample_rate is None:
+            if self.duration is not None:
+                raise ValueError("duration without sample_rate; add sample_rate, or leave both out for a static scenario")
+            if self.points is None and not isinstance(self.path, Poses):
+                raise ValueError('a static scenario needs points = N; for motion in time give sample_rate = "1 kHz" and duration')
+        elif isinstance(self.path, Poses):
+            if self.duration is not None or self.points is not None:
+                raise ValueError("a list of poses fixes the number of samples; leave out duration and points")
+        elif self.duration is None or self.points is not None:
+            raise ValueError('with sample_rate give duration = "1 s" (and no points)')
+        return self
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario ready to solve. `file` is what was written; `name` the folder's name; `digest` of file and device."""
+
+    name: str
+    folder: Path
+    file: ScenarioFile
+    device: Device
+    digest: dict[str, str]
+
+    @property
+    def sample_time(self) -> float | None:
+        """Seconds between samples; None for a static scenario, whose samples are separate equilibria."""
+        return None if self.file.sample_rate is None else 1 / self.file.sample_rate.si
+
+    @property
+    def closed(self) -> bool:
+        """Whether the first sample follows the last one."""
+        return self.sample_time is not None and type(self.file.path).closed
+
+    def command(self, model: Model) -> np.ndarray:
+        """The commanded samples (n, channels) of the followed signal, SI. Raises InputError."""
+        signal = model.signals[self.file.follow]
+        frame = Frame(signal.channels, signal.units)
+        path = self.file.path
+        if isinstance(path, Poses):
+            path = path.model_copy(update={"folder": self.folder})
+        n = self.file.points or 0
+        if self.file.sample_rate and self.file.duration:
+            n = round(self.file.sample_rate.si * self.file.duration.si)
+            if not 2 <= n <= 1_000_000:
+                raise InputError(self.folder / FILE, [Fault("duration", f"gives {n} samples; 2 to 1000000 are possible")])
+        try:
+            return path.samples(frame, n)
+        except InputError as error:
+            if error.source != "path":
+                raise
+            raise InputError(self.folder / FILE, [Fault(f"path.{f.where}", f.what) for f in error.faults]) from None
+
+
+def load_scenario(path: Path | str) -> Scenario:
+    """The scenario in a folder (its scenario.toml) or in a TOML file, with its device. Raises InputError."""
+    path = Path(path)
+    file_path = path / FILE if path.is_dir() else path
+    file = validate(ScenarioFile, read_toml(file_path), file_path)
+    device_path = file_path.parent / file.device
+    device = load_device(device_path)
+    texts = {"scenario": read_text(file_path), "device": read_text(device_path)}
+    if isinstance(file.path, Poses) and file.path.file:
+        texts["poses"] = read_text(file_path.parent / file.path.file)
+    digest = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
+    name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
+    return Scenario(name, file_path.parent, file, device, digest)

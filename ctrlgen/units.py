@@ -1,0 +1,138 @@
+"""Text with units at the border, SI numbers inside. Nothing else in ctrlgen converts a unit.
+
+A `Quantity` keeps what was written, so that a file can be written back and a report can
+show the reader's own unit. Conversion is pint's.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any
+
+import pint
+from pydantic import BeforeValidator, PlainSerializer
+
+_NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf)\s*(.*?)\s*$", re.IGNORECASE)
+
+
+@cache
+def _registry() -> pint.UnitRegistry:
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=None)
+
+
+@cache
+def _unit(text: str) -> pint.Unit:
+    """The pint unit of `text`; '1' and '' are dimensionless. Raises ValueError if unknown."""
+    try:
+        return _registry().Unit("" if text == "1" else f"1{text}" if text.startswith("/") else text)
+    except Exception as error:  # pint raises a dozen different types for bad unit text
+        raise ValueError(f"'{text}' is not a unit I know") from error
+
+
+@cache
+def _affine(unit: str) -> tuple[float, float]:
+    """(scale, offset) with SI = scale * value + offset, pint's own conversion at two points."""
+    base = _unit(unit)
+    zero, one = (float(_registry().Quantity(value, base).to_base_units().magnitude) for value in (0.0, 1.0))
+    return one - zero, zero
+
+
+def to_si(value: float, unit: str) -> float:
+    """`value` in `unit` as an SI number; temperatures in degC become kelvin."""
+    scale, offset = _affine(unit)
+    return value * scale + offset
+
+
+def from_si(value: Any, unit: str) -> Any:
+    """An SI number or array expressed in `unit`."""
+    scale, offset = _affine(unit)
+    return (value - offset) / scale
+
+
+def same_dimension(unit: str, other: str) -> bool:
+    """Whether two unit texts measure the same kind of quantity."""
+    return bool(_unit(unit).dimensionality == _unit(other).dimensionality)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number with its unit: `si` in SI, `text` as written, `source` where it comes from.
+
+    `sd` is the standard deviation in SI, None where nobody stated one.
+    """
+
+    si: float
+    text: str
+    source: str | None = None
+    sd: float | None = None
+
+
+def parse(text: object, unit: str) -> float:
+    """'130 GPa' with unit 'Pa' gives 1.3e11. Raises ValueError saying what to write instead."""
+    if isinstance(text, bool) or not isinstance(text, (str, int, float)):
+        raise ValueError(f'write a number with its unit, such as "1 {unit}", not {text!r}')
+    if isinstance(text, str):
+        match = _NUMBER.match(text)
+        if not match:
+            raise ValueError(f'{text!r} does not start with a number; write for example "1 {unit}"')
+        value, written = float(match[1]), match[2]
+    else:
+        value, written = float(text), ""
+    if not math.isfinite(value):
+        raise ValueError(f"{text!r} is not a finite number")
+    _unit(written)
+    if not same_dimension(written, unit):
+        if written == "":
+            raise ValueError(f'{text!r} has no unit; write for example "{value:g} {unit}"')
+        hint = f'"{value:g} {unit}"' if unit != "1" else f'"{value:g}" without a unit'
+        raise ValueError(f"{text!r} has the wrong unit: {unit if unit != '1' else 'a plain number'} is needed, for example {hint}")
+    return to_si(value, written)
+
+
+def _reader(unit: str, low: float | None, high: float | None, low_open: bool) -> Callable[[Any], Quantity]:
+    def bounds_text() -> str:
+        side = ">" if low_open else ">="
+        parts = [] if low is None else [f"{side} {from_si(low, unit):g} {unit}"]
+        return " and ".join(parts + ([] if high is None else [f"<= {from_si(high, unit):g} {unit}"]))
+
+    def read(given: Any) -> Quantity:
+        if isinstance(given, Quantity):
+            return given
+        table = given if isinstance(given, dict) else {"value": given}
+        unknown = sorted(set(table) - {"value", "source", "sd"})
+        if unknown:
+            raise ValueError(f"unknown key {unknown[0]!r}; a quantity has value, source and sd")
+        if "value" not in table:
+            raise ValueError(f'no value; write {{ value = "1 {unit}", source = "..." }}')
+        si = parse(table["value"], unit)
+        if (low is not None and (si < low or (low_open and si == low))) or (high is not None and si > high):
+            raise ValueError(f"{table['value']!r} is impossible here; it must be {bounds_text()}")
+        sd = None
+        if "sd" in table:
+            sd = parse(table["sd"], unit if unit != "degC" else "delta_degC")
+            if sd < 0:
+                raise ValueError(f"sd = {table['sd']!r} is negative")
+        source = table.get("source")
+        if source is not None and not isinstance(source, str):
+            raise ValueError(f"source = {source!r} must be text")
+        return Quantity(si, str(table["value"]), source, sd)
+
+    return read
+
+
+def quantity(unit: str, *, low: float | None = None, high: float | None = None, positive: bool = False) -> Any:
+    """The pydantic type of a number in `unit`, with bounds given in SI.
+
+    `positive` means strictly above zero.
+    """
+    read = _reader(unit, 0.0 if positive else low, high, positive)
+    return Annotated[Quantity, BeforeValidator(read), PlainSerializer(lambda q: q.text)]
+
+
+def show(si: float, unit: str, digits: int = 4) -> str:
+    """An SI number in the reader's unit, such as '31.53 um'."""
+    return f"{from_si(si, unit):.{digits}g} {unit if unit != '1' else ''}".strip()
