@@ -13,7 +13,7 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from ctrlgen import __version__
+from ctrlgen._version import __version__
 from ctrlgen.controller import RELATIVE_SLACK, Controller, Status
 from ctrlgen.cprint import Kernel, Real, print_function
 from ctrlgen.files import write_text

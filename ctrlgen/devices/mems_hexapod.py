@@ -139,7 +139,7 @@ class MemsHexapod(Device):
             (drive_limit,) * 6,
         )
         state = Signal(
-            "temperature", "average actuator temperature", self.axes, ("degC",) * 6, "T_", ca.SX.sym("T", 6), (100.0,) * 6
+            "temperature", "actuator temperature", self.axes, ("degC",) * 6, "T_", ca.SX.sym("T", 6), (100.0,) * 6
         )
         rotation_scale = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
 

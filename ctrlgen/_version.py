@@ -1,0 +1,3 @@
+"""The version of ctrlgen; part of every generated header."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,124 @@
+"""Pictures of a solution, as SVG: path, forces, temperatures, drives, margins, stage force law, Bode."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from ctrlgen.measures import force_parts
+from ctrlgen.solve import Solution
+from ctrlgen.units import from_si
+
+COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")  # colour-blind safe, a pair per stage
+STYLE = {
+    "font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+    "grid.color": "#e6e6e6", "axes.edgecolor": "#666666", "svg.fonttype": "none", "svg.hashsalt": "ctrlgen", "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+}  # fmt: skip
+
+
+def svg(figure: Figure) -> str:
+    """The figure as SVG text without a date, the same for the same input."""
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "ctrlgen"})
+    plt.close(figure)
+    text = buffer.getvalue()
+    return re.sub(r"<\?xml.*?<svg", "<svg", text, count=1, flags=re.DOTALL)
+
+
+def draw_all(solution: Solution) -> dict[str, str]:
+    """Every figure that this solution has something to show in: name -> SVG text."""
+    drawings: dict[str, Callable[[Solution], Figure]] = {"margins": draw_margins}
+    signals = {"forces": "force", "temperatures": "state", "drives": "drive"}
+    with plt.rc_context(STYLE):
+        figures = {}
+        if solution.scenario.file.follow == "pose" and solution.scenario.sample_time:
+            figures["path"] = svg(draw_path(solution))
+        if solution.scenario.file.follow == "displacement":
+            figures["stage_force"] = svg(draw_stage_force(solution))
+        for name, role in signals.items():
+            figures[name] = svg(draw_signal(solution, role))
+        for name, draw in drawings.items():
+            figures[name] = svg(draw(solution))
+    return figures
+
+
+def draw_path(solution: Solution) -> Figure:
+    """The two channels that move most: commanded path, modelled samples, and the error against time."""
+    signal = solution.model.signals["pose"]
+    reached, command = solution.trace.signals["pose"], solution.command
+    lengths = [i for i, unit in enumerate(signal.units) if unit == "um"]
+    first, second = sorted(sorted(lengths, key=lambda i: -np.ptp(command[:, i]))[:2])
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.9), width_ratios=(1, 1.15))
+    x, y = (from_si(command[:, i], "um") for i in (first, second))
+    left.plot(np.append(x, x[0]) if solution.scenario.closed else x, np.append(y, y[0]) if solution.scenario.closed else y, color="#999999", lw=3, label="commanded")
+    step = max(1, len(command) // 40)
+    left.plot(from_si(reached[::step, first], "um"), from_si(reached[::step, second], "um"), ".", ms=5, color=COLOURS[2], label="modelled")
+    left.set_aspect("equal", adjustable="datalim")
+    left.set_xlabel(f"{signal.channels[first]} [um]")
+    left.set_ylabel(f"{signal.channels[second]} [um]")
+    left.legend(loc="center", fontsize=8)
+    time = solution.trace.time
+    for i, colour in zip(lengths, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
+        right.plot(time, from_si(reached[:, i] - command[:, i], "um") * 1e3, color=colour, lw=1, label=signal.channels[i])
+    right.set_xlabel("time [s]")
+    right.set_ylabel("modelled - commanded [nm]")
+    right.legend(fontsize=8, ncols=3, loc="upper right")
+    return figure
+
+
+def draw_signal(solution: Solution, role: str) -> Figure:
+    """The six channels of one signal over time, or over the samples of a static scenario (S1 Fig. 14(b) for the forces)."""
+    signal = solution.model.signals[role]
+    values = solution.trace.signals[role]
+    static = solution.scenario.sample_time is None
+    figure, axes = plt.subplots(figsize=(8.2, 3.2))
+    horizontal = np.arange(len(values)) if static else solution.trace.time
+    for i, channel in enumerate(signal.channels):
+        axes.plot(horizontal, from_si(values[:, i], signal.units[i]), "o-" if static else "-", ms=4, lw=1.3, color=COLOURS[i % 6], label=channel)
+    axes.set_xlabel("sample" if static else "time [s]")
+    if static:
+        axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_ylabel(f"{signal.label} [{signal.units[0]}]")
+    axes.legend(ncols=6, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, 1.14))
+    return figure
+
+
+def draw_margins(solution: Solution) -> Figure:
+    """How much of each limit's range is left at the closest approach."""
+    shown = [m for m in solution.margins if m.share is not None]
+    figure, axes = plt.subplots(figsize=(8.2, 0.5 + 0.42 * len(shown)))
+    for row, margin in enumerate(shown):
+        share = 100 * max(margin.share or 0.0, 0.0)
+        axes.barh(row, share, color=COLOURS[2] if margin is solution.tightest else COLOURS[0], height=0.6)
+        unit = margin.limit.unit
+        value, bound = from_si(margin.value, unit), from_si(margin.bound, unit)
+        axes.text(share + 1, row, f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}", va="center", fontsize=8)
+    axes.set_yticks(range(len(shown)), [m.limit.label for m in shown])
+    axes.invert_yaxis()
+    axes.set_xlim(0, 150)
+    axes.set_xticks(range(0, 101, 20))
+    axes.set_xlabel("range left at the closest approach [%]")
+    return figure
+
+
+def draw_stage_force(solution: Solution) -> Figure:
+    """Linear and total force against displacement of the axis that moves most (S1 Fig. 13)."""
+    values = from_si(solution.trace.signals["displacement"], "um")
+    axis = int(np.argmax(np.ptp(values, axis=0)))
+    parts = force_parts(solution)
+    figure, axes = plt.subplots(figsize=(6.2, 3.6))
+    axes.plot(values[:, axis], parts["linear"][:, axis], "s--", ms=4, color=COLOURS[0], label="linear force, S1 eq. (9)")
+    axes.plot(values[:, axis], solution.trace.signals["force"][:, axis], "o-", ms=4, color=COLOURS[2], label="linear + nonlinear, S1 eq. (12)")
+    axes.set_xlabel(f"displacement {solution.model.axes[axis]} [um]")
+    axes.set_ylabel("force on the actuator bar [N]")
+    axes.legend()
+    return figure
