@@ -16,8 +16,11 @@ from ctrlgen.model import Model
 from ctrlgen.units import from_si
 
 
+LINES = ("-", "--")  # X and Y drives of a stage often coincide
+
+
 def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
-    """Gain of every pose component to every drive, one panel a component, and the phase of the last row's lag.
+    """Gain of every pose component to every drive, one panel a component, and the phase of each drive's strongest one.
 
     Raises InputError when `pose` (6,) is not an admissible equilibrium.
     """
@@ -27,22 +30,23 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
     omega = np.logspace(np.log10(slowest) - 2, np.log10(slowest) + 2, 200)
     response = control.frequency_response(system, omega)
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(3, 3, figsize=(10, 7.5), sharex=True)
+        figure, grid = plt.subplot_mosaic([["a", "b", "c"], ["d", "e", "f"], ["phase"] * 3], figsize=(10, 8))
+        hertz = omega / (2 * np.pi)
         for i, channel in enumerate(signal.channels):
-            panel = axes[i // 3, i % 3]
+            panel = grid["abcdef"[i]]
             for j, axis in enumerate(drive.channels):
                 gain = from_si(response.magnitude[i, j], signal.units[i])
-                panel.loglog(omega / (2 * np.pi), gain, color=COLOURS[j % 6], lw=1.2, label=axis)
+                panel.loglog(hertz, gain, LINES[j % 2], color=COLOURS[j % 6], lw=1.3, label=axis)
             panel.set_ylim(bottom=from_si(response.magnitude[i].max(), signal.units[i]) * 1e-4)
             panel.set_title(f"{channel} [{signal.units[i]}/{drive.units[0]}]", fontsize=9)
         for j, axis in enumerate(drive.channels):
-            row, column = 2, j % 3
-            strongest = int(np.argmax(response.magnitude[:, j, 0] / np.array(signal.scale)))
-            phase = np.degrees(np.unwrap(np.angle(response.complex[strongest, j])))
-            axes[row, column].semilogx(omega / (2 * np.pi), phase - 360 * np.round(phase[0] / 360), color=COLOURS[j % 6], lw=1.2)
-            axes[row, column].set_title(f"phase {drive.channels[column]}, {drive.channels[column + 3]} -> strongest [deg]", fontsize=9)
-            axes[row, column].set_xlabel("frequency [Hz]")
-        axes[0, 0].legend(ncols=3, fontsize=7)
+            i = int(np.argmax(response.magnitude[:, j, 0] / np.array(signal.scale)))
+            phase = np.degrees(np.unwrap(np.angle(response.complex[i, j] / system.dcgain()[i, j])))
+            grid["phase"].semilogx(hertz, phase, LINES[j % 2], color=COLOURS[j % 6], lw=1.3, label=f"{axis} -> {signal.channels[i]}")
+        grid["phase"].set_title("phase against the static response, strongest component of each drive [deg]", fontsize=9)
+        grid["phase"].set_xlabel("frequency [Hz]")
+        grid["phase"].legend(ncols=3, fontsize=8)
+        grid["a"].legend(ncols=3, fontsize=7)
         buffer = io.BytesIO()
         figure.savefig(buffer, format=path.suffix[1:], dpi=150)
         plt.close(figure)

@@ -14,13 +14,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ctrlgen.measures import force_parts
-from ctrlgen.solve import Solution
+from ctrlgen.solve import REACHED, Solution
 from ctrlgen.units import from_si
 
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")  # colour-blind safe, a pair per stage
 STYLE = {
     "font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
-    "grid.color": "#e6e6e6", "axes.edgecolor": "#666666", "svg.fonttype": "none", "svg.hashsalt": "ctrlgen", "legend.frameon": False,
+    "grid.color": "#e6e6e6", "axes.edgecolor": "#666666", "axes.axisbelow": True, "svg.fonttype": "none", "svg.hashsalt": "ctrlgen", "legend.frameon": False,
     "figure.constrained_layout.use": True,
 }  # fmt: skip
 
@@ -66,11 +66,15 @@ def draw_path(solution: Solution) -> Figure:
     left.set_xlabel(f"{signal.channels[first]} [um]")
     left.set_ylabel(f"{signal.channels[second]} [um]")
     left.legend(loc="center", fontsize=8)
-    time = solution.trace.time
+    time, tolerance = solution.trace.time, from_si(REACHED * signal.scale[lengths[0]], "nm")
     for i, colour in zip(lengths, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
         right.plot(time, from_si(reached[:, i] - command[:, i], "um") * 1e3, color=colour, lw=1, label=signal.channels[i])
+    right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0)
+    span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
+    right.set_ylim(-span, span)
     right.set_xlabel("time [s]")
     right.set_ylabel("modelled - commanded [nm]")
+    right.set_title(f"grey: tolerance of {tolerance:g} nm", fontsize=8)
     right.legend(fontsize=8, ncols=3, loc="upper right")
     return figure
 

@@ -28,7 +28,7 @@ class Inverse:
 
     `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted;
     `drive` (x, z, z_wanted, s_wanted) -> u; `advance` (x, z, u) -> x at the next sample. x, z are those of
-    the present sample. A static inverse does not read x and z.
+    the present sample. A static inverse reads neither, except that its `advance` takes the new z.
     """
 
     displacement: ca.Function
@@ -56,7 +56,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     followed, balance, rates = (ca.substitute(e, now, end) for e in (model.signals[follow].expr, model.balance, model.rates))
     if sample_time is None:
         motion = rates
-        advance = _solve(known, rates, x_1)
+        advance = ca.substitute(_solve(known, rates, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
     else:
         advance = ca.substitute(model.step(sample_time), ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
         motion = x_1 - advance

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import pytest
+
+from ctrlgen.units import from_si, parse, same_dimension, show, to_si
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "si"),
+    [
+        ("130 GPa", "Pa", 130e9),
+        ("20 um", "m", 20e-6),
+        ("0.178 rad/(N*um)", "rad/(N*m)", 0.178e6),
+        ("22 degC", "degC", 295.15),
+        ("295.15 K", "degC", 295.15),
+        ("3e-9 1/K^2", "1/K^2", 3e-9),
+        ("3e-9 /K**2", "1/K^2", 3e-9),
+        ("5 deg", "rad", 0.0872664625997165),
+        ("0.051577 N/um", "N/m", 51577.0),
+        (".5", "1", 0.5),
+        (15, "1", 15.0),
+        ("-1.5e-3 mm", "um", -1.5e-6),
+    ],
+)
+def test_text_with_a_unit_becomes_an_si_number(text, unit, si):
+    assert parse(text, unit) == pytest.approx(si, rel=1e-14)  # a few roundings of the conversion factor
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "says"),
+    [
+        ("3 N", "m", "wrong unit"),
+        ("3", "m", "no unit"),
+        ("three um", "m", "does not start with a number"),
+        ("3 furlongz", "m", "not a unit"),
+        ("nan m", "m", "not a finite number"),
+        ("inf m", "m", "not a finite number"),
+        (True, "1", "write a number"),
+        (["1 m"], "m", "write a number"),
+        ("1 N/mm", "N*m", "wrong unit"),
+        ("", "m", "does not start with a number"),
+    ],
+)
+def test_what_is_not_a_quantity_is_refused_with_the_remedy(text, unit, says):
+    with pytest.raises(ValueError, match=says):
+        parse(text, unit)
+
+
+@pytest.mark.parametrize("unit", ["um", "degC", "mrad", "N/um", "ms", "ohm", "1"])
+def test_conversion_round_trips(unit):
+    assert from_si(to_si(12.5, unit), unit) == pytest.approx(12.5, rel=1e-13)  # roundings only
+
+
+def test_temperature_differences_have_no_offset():
+    assert to_si(1.0, "delta_degC") == 1.0
+    assert same_dimension("um", "mm") and not same_dimension("um", "rad")
+
+
+def test_numbers_are_shown_in_the_readers_unit():
+    assert show(31.53e-6, "um") == "31.53 um"
+    assert show(823.15, "degC") == "550 degC"
+    assert show(0.5, "1") == "0.5"
