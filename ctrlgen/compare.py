@@ -34,6 +34,7 @@ RANDOM_TARGETS = 1000
 LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometre; a tenth, below any sensor here
 ANGLE = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}  # rad: 1e-8 rad moves the platform's rim by 0.02 nm
 RELATIVE = 1e-12  # double C against CasADi: 4500 roundings
+EXCESS = {Real.DOUBLE: 1e-9, Real.FLOAT: 1e-5}  # of a limit's bound: roundings; the slack below which a limit is not reported
 ROUNDINGS = 16  # float C against CasADi: roundings of the largest value that the chain may pile up
 
 
@@ -134,6 +135,8 @@ class _Reference:
         self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
         self.random = self._random_targets()
         self.settled = self._answers(self.random, follow=False)
+        self.hostile = self._hostile_targets()
+        self.chased = self._answers(self.hostile, follow=True) if self.scenario.sample_time else self.settled[:0]
         self.command = solution.command
         if self.scenario.sample_time:  # one more sample: back to the first, or the last one held
             self.command = np.vstack([self.command, self.command[:1] if self.scenario.closed else self.command[-1:]])
@@ -151,6 +154,14 @@ class _Reference:
         reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
         anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
         return np.vstack([reachable, anywhere])
+
+    def _hostile_targets(self) -> np.ndarray:
+        """A sequence of jumps between reachable and absurd targets, with some that are not numbers."""
+        rng = np.random.default_rng(21)
+        targets = rng.permutation(self.random)[: RANDOM_TARGETS // 4].repeat(2, axis=0)
+        targets[::7] *= 10 ** rng.uniform(0, 3, (len(targets[::7]), 1))
+        targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
+        return targets
 
     def _answers(self, targets: np.ndarray, *, follow: bool) -> np.ndarray:
         """(n, 1 + 3 axes): status, drive, displacement, actuator state."""
@@ -187,6 +198,13 @@ def _rows(build: str, real: Real, program: Path, ref: _Reference) -> list[Row]:
     settled = _run(program, "settle", ref.random, 3 * n)
     against_casadi("random targets, online C - CasADi", settled, ref.settled)
 
+    if ref.scenario.sample_time:
+        chased = _run(program, "follow", ref.hostile, 3 * n)
+        if real is Real.DOUBLE:  # in float a bisection may turn the other way, which is as good an answer
+            against_casadi("hostile sequence, online C - CasADi", chased, ref.chased)
+        excess = _excess(m, chased[1:, 1 : 1 + n], ref.scenario.sample_time, chased[0, 1 + 2 * n :])
+        rows.append(_row(build, "hostile sequence -> model: excess over a limit", "share of its bound", "1", excess, EXCESS[real]))
+
     # The drive that acts from sample k to k + 1 is the answer to target k + 1.
     solved = ref.solution.drive
     online = followed[1:, 1 : 1 + n] if ref.scenario.sample_time else followed[:, 1 : 1 + n]
@@ -222,6 +240,20 @@ def _drive_sets(program: Path, ref: _Reference, online: np.ndarray) -> list[tupl
     if ref.scenario.sample_time:
         sets.append(("player C", _run(program, "sample", np.arange(len(ref.solution.drive)), online.shape[1])[:, 1:]))
     return sets
+
+
+def _excess(model: Model, drives: np.ndarray, sample_time: float, state_0: np.ndarray) -> np.ndarray:
+    """(n, limits): how far the model driven so goes beyond each limit, over the bound's size; 0 where it is kept."""
+    reached = simulate(model, drives, sample_time, np.concatenate([state_0, model.rest[len(state_0) :]]))
+    u = np.vstack([drives[:1], drives])
+    values = model.evaluate_limits.map(len(u))(reached.x.T, reached.z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(u))))
+    columns = []
+    for limit, value in zip(model.limits, values, strict=True):
+        v, size = value.full().T, max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(value.full()).max()
+        over = np.zeros(len(u)) if limit.upper is None else v.max(axis=1) - limit.upper
+        under = np.zeros(len(u)) if limit.lower is None else limit.lower - v.min(axis=1)
+        columns.append(np.maximum(np.maximum(over, under), 0.0) / size)
+    return np.column_stack(columns)
 
 
 def _float_limit(model: Model, role: str, size: float, ref: _Reference) -> float:

@@ -18,6 +18,8 @@ from ctrlgen.model import Limit, Model
 
 RELATIVE_SLACK = 1e-5  # of a signal's typical size (0.1 nm, 1 mK): what a limit may be missed by before it is reported
 
+BISECTIONS = 12  # of the way to a target that the drives cannot reach in one sample: 1/4096 of it
+
 
 class Status(IntFlag):
     """What the controller had to do. 0: everything as commanded."""
@@ -88,30 +90,53 @@ class Controller:
     def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> Step:
         """Drives that bring the followed signal to `target` at the next sample, from `state` (x, z).
 
-        With `settle` the equilibrium at `target` instead, and its state.
+        With `settle` the equilibrium at `target` instead, and its state. A target that the drives
+        cannot reach in time is approached on the straight line of displacements, which the convex limits allow.
         """
         m = self.model
-        kernels = self.static if settle or self.moving is None else self.moving
+        k = self.static if settle or self.moving is None else self.moving
         (z_low, z_high), (x_low, x_high), (u_low, u_high) = m.z_bounds, m.x_bounds, m.u_bounds
         n = len(m.axes)
         x, z = state
         if not np.all(np.abs(target) <= self.input_limits):  # false for NaN too
-            u = u_low
-            return Step(Status.INPUT, z, x[:n], u, (kernels.advance(x, z, u).full().ravel(), z))
+            x_next = _row(k.advance(x, z, u_low))
+            return Step(Status.INPUT, z, x[:n], u_low, (x_next, _row(k.settle(x_next, z, u_low))))
+
+        def acting(wanted: np.ndarray) -> tuple[np.ndarray, bool]:
+            return _clamp(_row(k.state(x, z, wanted)), x_low[:n], x_high[:n], m.x_scale[:n])
+
+        def drive(wanted: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, bool]:
+            return _clamp(_row(k.drive(x, z, wanted, held)), u_low, u_high, m.u_scale)
+
         status = Status(0)
-        wanted, hit = _clamp(kernels.displacement(x, z, target), z_low, z_high, m.z_scale)
+        wanted, hit = _clamp(_row(k.displacement(x, z, target)), z_low, z_high, m.z_scale)
         status |= Status.DISPLACEMENT if hit else Status(0)
+        held, hit = acting(wanted)
+        if hit:
+            status |= Status.STATE
+            wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, u_low))
         if np.max(wanted) > self.safe_displacement:
             ratio = float(self.composite_ratio(wanted))
             if ratio > 1:
                 wanted = wanted / ratio
-            if ratio > 1 + RELATIVE_SLACK:
-                status |= Status.COMPOSITE
-        acting, hit = _clamp(kernels.state(x, z, wanted), x_low[:n], x_high[:n], m.x_scale[:n])
-        status |= Status.STATE if hit else Status(0)
-        u, hit = _clamp(kernels.drive(x, z, wanted, acting), u_low, u_high, m.u_scale)
-        status |= Status.DRIVE if hit else Status(0)
-        return Step(status, wanted, acting, u, (kernels.advance(x, wanted if settle else z, u).full().ravel(), wanted))
+                held, _ = acting(wanted)
+            status |= Status.COMPOSITE if ratio > 1 + RELATIVE_SLACK else Status(0)
+        u, beyond = drive(wanted, held)
+        if beyond:
+            status |= Status.DRIVE
+            origin = np.zeros(n) if settle or self.moving is None else z
+            share, step = 0.0, 1.0
+            for _ in range(BISECTIONS):
+                step /= 2
+                part = origin + (share + step) * (wanted - origin)
+                if not drive(part, acting(part)[0])[1]:
+                    share += step
+            wanted = origin + share * (wanted - origin)
+            held, _ = acting(wanted)
+            u, beyond = drive(wanted, held)
+        x_next = _row(k.advance(x, wanted if settle or self.moving is None else z, u))
+        z_next = _row(k.settle(x_next, wanted, u)) if beyond else wanted
+        return Step(status, z_next, held, u, (x_next, z_next))
 
 
 @dataclass(frozen=True)
@@ -125,8 +150,11 @@ class Step:
     state: tuple[np.ndarray, np.ndarray]
 
 
-def _clamp(value: ca.DM, low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, bool]:
-    """`value` limited to low ... high, and whether that moved it by more than the slack."""
-    wanted = value.full().ravel()
+def _row(value: ca.DM) -> np.ndarray:
+    return value.full().ravel()
+
+
+def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, bool]:
+    """`wanted` limited to low ... high, and whether that moved it by more than the slack."""
     limited = np.clip(wanted, low, high)
     return limited, bool(np.any(np.abs(limited - wanted) > RELATIVE_SLACK * scale))

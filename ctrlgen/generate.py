@@ -14,7 +14,7 @@ import jinja2
 import numpy as np
 
 from ctrlgen._version import __version__
-from ctrlgen.controller import RELATIVE_SLACK, Controller, Status
+from ctrlgen.controller import BISECTIONS, RELATIVE_SLACK, Controller, Status
 from ctrlgen.cprint import Kernel, Real, print_function
 from ctrlgen.files import write_text
 from ctrlgen.model import Model
@@ -50,7 +50,7 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
     cost = (0, 0)
     for real in Real:
         context = _online_context(scenario, controller, real, online[real])
-        cost = (context["cost"]["step"], context["cost"]["step"] + context["cost"]["ratio"])
+        cost = (context["cost"]["step"], context["cost"]["worst"])
         _render("online.h", context, out / f"{online[real]}.h")
         _render("online.c", context, out / f"{online[real]}.c")
         command = scenario.command(model) if solution is None else solution.command
@@ -91,7 +91,9 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     for name, inverse, z in (("settle", controller.static, "out->displacement"), ("step", controller.moving, "state->z")):
         if inverse is not None:
             parts = {part: printed(getattr(inverse, part), f"{name}_{part}") for part in ("displacement", "state", "drive", "advance")}
-            modes.append({"name": name, "z": z, **parts})
+            uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive"))
+            modes.append({"name": name, "z": z, "uses_state": uses_state, **parts})
+    balance = printed(controller.static.settle, "balance_displacement")
     ratio = None
     if controller.guarded_limits:
         ratio = printed(controller.composite_ratio, "composite_ratio")
@@ -99,6 +101,8 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
     last = modes[-1]
     step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", "advance"))
+    once_more = last["state"].operations + last["drive"].operations
+    worst_cost = step_cost + 2 * balance.operations + (ratio.operations if ratio else 0) + once_more * (BISECTIONS + 2)
     return {
         "prefix": prefix, "real": real, "version": __version__, "title": model.device.title, "source": model.device.source,
         "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
@@ -106,8 +110,8 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in model.composite_limits()) or "composite limits",
         "x_names": model.x_names, "kernels": kernels, "modes": modes, "ratio": ratio,
-        "safe": controller.safe_displacement if ratio else 0.0,
-        "relative_slack": RELATIVE_SLACK, "cost": {"step": step_cost, "ratio": ratio.operations if ratio else 0},
+        "balance": balance, "bisections": BISECTIONS, "safe": controller.safe_displacement if ratio else 0.0,
+        "relative_slack": RELATIVE_SLACK, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": RELATIVE_SLACK * model.z_scale,
         "s_low": x_low[:n], "s_high": x_high[:n], "s_slack": RELATIVE_SLACK * model.x_scale[:n],

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ctrlgen.errors import Fault, InputError
 from ctrlgen.model import Model
 
 NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves rounding only
@@ -24,24 +23,25 @@ NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves 
 
 @dataclass(frozen=True)
 class Inverse:
-    """Four kernels, SX functions in SI, that a controller calls in this order.
+    """Kernels, SX functions in SI, that a controller calls in this order.
 
     `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted;
     `drive` (x, z, z_wanted, s_wanted) -> u; `advance` (x, z, u) -> x at the next sample. x, z are those of
     the present sample. A static inverse reads neither, except that its `advance` takes the new z.
+    `settle` (x, z, u) -> the displacement that balances the actuators' forces, by Newton from z.
     """
 
     displacement: ca.Function
     state: ca.Function
     drive: ca.Function
     advance: ca.Function
+    settle: ca.Function
 
 
 def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     """The inverse of `model` for the signal `follow`; static where `sample_time` is None.
 
-    Free parameters stand at their nominal values. Raises InputError where the equations do not
-    separate into displacement, state and drive.
+    Free parameters stand at their nominal values.
     """
     x, z, u, n = model.x, model.z, model.u, len(model.axes)
     x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
@@ -67,16 +67,15 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     wanted_state, memory = later[:n], later[n : x.numel()]
     wanted_u = _solve(known, ca.substitute(motion[:n], x_1[n:], memory), u_1)
     return Inverse(
-        _kernel(model, "displacement", [x, z, target], ["x", "z", "target"], wanted_z),
-        _kernel(model, "state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
-        _kernel(model, "drive", [x, z, z_1, x_1[:n]], ["x", "z", "wanted", "state"], wanted_u),
-        _kernel(model, "advance", [x, z, u_1], ["x", "z", "drive"], advance),
+        _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
+        _kernel("state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
+        _kernel("drive", [x, z, z_1, x_1[:n]], ["x", "z", "wanted", "state"], wanted_u),
+        _kernel("advance", [x, z, u_1], ["x", "z", "drive"], advance),
+        _kernel("settle", [x, z, u], ["x", "z", "drive"], _newton(ca.substitute(model.balance, model.p, ca.DM(model.p_nominal)), z, z)),
     )
 
 
-def _kernel(model: Model, name: str, arguments: list[ca.SX], names: list[str], result: ca.SX) -> ca.Function:
-    if set(map(str, ca.symvar(result))) - set(map(str, ca.symvar(ca.vertcat(*arguments)))):
-        raise InputError(model.name, [Fault("model", f"the {name} cannot be solved for before the later quantities are known")])
+def _kernel(name: str, arguments: list[ca.SX], names: list[str], result: ca.SX) -> ca.Function:
     return ca.Function(name, arguments, [result], names, ["result"], {"cse": True})
 
 
@@ -127,10 +126,16 @@ def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
     curvature = ca.jacobian(slope, v)
     if v.numel() == 1 and not ca.depends_on(curvature, v):
         return base + _rising_root(known, r, v, base, slope, curvature)
-    root = ca.SX(known.inside(v))
+    return _newton(r, v, ca.SX(known.inside(v)))
+
+
+def _newton(r: ca.SX, v: ca.SX, start: ca.SX) -> ca.SX:
+    """`NEWTON_STEPS` steps on r(v) = 0 from `start`."""
+    slope, root = ca.jacobian(r, v), start
+    diagonal = slope.sparsity().is_diag()
     for _ in range(NEWTON_STEPS):
         J, residual = (ca.substitute(e, v, root) for e in (slope, r))
-        root = root - ca.solve(J, residual)
+        root = root - (residual / ca.diag(J) if diagonal else ca.solve(J, residual))
     return root
 
 

@@ -21,6 +21,7 @@ from ctrlgen.physics.screw import (
     rotation_to,
     rotation_z,
     series,
+    solve,
 )
 
 STAGE_OF_STRUT = (0, 1, 1, 2, 2, 0)  # struts 1 and 6 stand on stage 1, 2 and 3 on stage 2, 4 and 5 on stage 3
@@ -135,7 +136,7 @@ def jacobian(h: Any, C_XY: Matrix) -> Matrix:
     columns = []
     for j in range(3):
         C_T = inverse(parallel(block[k] for k in range(3) if k != j))
-        wrench = ca.solve(series((C_T, pair[j], stage[j])), _travel(g, j))  # eq. (16)
+        wrench = solve(series((C_T, pair[j], stage[j])), _travel(g, j))  # eq. (16)
         columns.append(ca.mtimes(C_T, wrench))  # eq. (17)
     return ca.horzcat(*columns)
 
@@ -168,12 +169,12 @@ def wire_loads(h: Any, C_XY: Matrix, J: Matrix) -> WireLoads:
     relative = []
     for j in range(3):
         travel = ca.horzcat(*(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)))
-        W = ca.solve(series((pair[j], stage[j])), travel - J)
-        relative.append(travel - ca.mtimes(stage[j], W) - J)
+        W = solve(series((pair[j], stage[j])), travel - J)
+        relative.append(ca.mtimes(pair[j], W))  # T_j - T^p; the difference itself cancels six digits
     sections: list[list[Matrix]] = []
     for i in range(6):
         R, length = _strut_frame(g, i)
-        W = ca.mtimes(struts[i], relative[STAGE_OF_STRUT[i]])
+        W = -ca.mtimes(struts[i], relative[STAGE_OF_STRUT[i]])
         ends = (0, h.wire_length, length - h.wire_length, length)
         sections.append([ca.mtimes(inverse_adjoint(R, g.base[i] + R[:, 0] * along), W) for along in ends])
     return WireLoads(
@@ -187,13 +188,13 @@ def wire_loads(h: Any, C_XY: Matrix, J: Matrix) -> WireLoads:
 def wire_stress(d: Matrix, loads: WireLoads, h: Any) -> Matrix:
     """Von Mises stress sqrt((32 M/(pi d^3) + |N|/A)^2 + 3 (16 T/(pi d^3))^2) at 24 wire sections [Pa].
 
-    M = |(M_y, M_z)|, N the tension, T the torque; `d`: (6,) [m]. M^2 and N^2 carry a floor that
-    amounts to 1e-6 of the allowed stress, so that the derivative exists at home; it errs on the safe side.
+    M = |(M_y, M_z)|, N the tension, T the torque; `d`: (6,) [m]. M^2 carries a floor of (1e-9 of the
+    allowed stress)^2, so that the derivative exists at home; it errs on the safe side.
     """
     section = ca.pi * h.wire_diameter**3 / 32
-    floor = (1e-6 * h.stress_limit) ** 2
+    floor = (1e-9 * h.stress_limit) ** 2
     bending = ca.sqrt(ca.mtimes(loads.bending_y / section, d) ** 2 + ca.mtimes(loads.bending_z / section, d) ** 2 + floor)
-    axial = ca.sqrt(ca.mtimes(loads.tension / (ca.pi * h.wire_diameter**2 / 4), d) ** 2 + floor)
+    axial = ca.fabs(ca.mtimes(loads.tension / (ca.pi * h.wire_diameter**2 / 4), d))
     shear_2 = 3 * ca.mtimes(loads.torque / (2 * section), d) ** 2
     strut = [i // 4 for i in range(24)]
     return ca.sqrt((bending + axial[strut]) ** 2 + shear_2[strut])

@@ -65,9 +65,22 @@ def move(matrix: Matrix, rotation: Matrix | None = None, position: Sequence[Scal
     return ca.mtimes([adjoint(rotation, position), matrix, inverse_adjoint(rotation, position)])
 
 
+_LENGTH = ca.diag(ca.DM([1, 1, 1, 1e3, 1e3, 1e3]))  # displacements and moments in units of 1 mm
+_PER_LENGTH = ca.diag(ca.DM([1, 1, 1, 1e-3, 1e-3, 1e-3]))
+
+
+def solve(matrix: Matrix, right: Matrix) -> Matrix:
+    """x with `matrix` x = `right`, for a compliance or stiffness, shape (6, n).
+
+    Lengths in mm make forces and moments alike in size; in m, float64 keeps only half of its digits.
+    """
+    scaled = ca.mtimes([_LENGTH, matrix, _PER_LENGTH])
+    return ca.mtimes(_PER_LENGTH, ca.solve(scaled, ca.mtimes(_LENGTH, right)))
+
+
 def inverse(matrix: Matrix) -> Matrix:
     """Compliance from stiffness or back, shape (6, 6)."""
-    return ca.solve(matrix, ca.DM.eye(matrix.shape[0]))
+    return solve(matrix, ca.DM.eye(6))
 
 
 def series(compliances: Iterable[Matrix]) -> Matrix:

@@ -86,10 +86,11 @@ def _lever_compliance(s: Any, a: Any) -> Matrix:
     """
     C = blade_compliance(s.lever_long - 2 * s.notch_radius, a.thickness, s.lever_width, a.young, a.poisson)
     C = move(C, _QUARTER_TURN_X)  # the blade's thin side is z here
-    C[3, 0] = 2 / s.half_stage_stiffness - 2 * s.notch.delta_x_per_F_x
-    return C
+    axial = 2 / s.half_stage_stiffness - 2 * s.notch.delta_x_per_F_x
+    return C + (axial - C[3, 0]) * _AXIAL
 
 
+_AXIAL = ca.DM(ca.Sparsity.triplet(6, 6, [3], [0]), [1])
 _QUARTER_TURN_X = ca.DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
@@ -118,14 +119,15 @@ def axis_stiffness(s: Any, a: Any) -> Matrix:
     end notch. Blocks 3, 4: notch, guide beam, notch. Source: S1 section 3.4, steps 1-3.
     """
     about_centre = move(notch_compliance(s), None, (s.notch_radius, 0, 0))
-    # In the arm's frame (x along the arm) the bar pushes along y.
-    half_actuator = move(2 * inverse(thermal_actuator.stiffness(a)), rotation_z(-ca.pi / 2))
-    drive = series((half_actuator, move(about_centre, rotation_z(-ca.pi / 2))))
-    driven_root = inverse(
-        parallel((inverse(about_centre), move(inverse(drive), None, (s.lever_short, 0, 0))))
-    )
+    half_actuator = 2 * inverse(thermal_actuator.stiffness(a))
+    drive = series((half_actuator, about_centre))
     blocks = []
     for side in (1, -1):  # the arm runs from (x, side (b + e_4)) to (x, side b)
+        # In the arm's frame (x along the arm) the bar pushes along side y: the two blocks are mirror images.
+        push = rotation_z(side * ca.pi / 2)
+        driven_root = inverse(
+            parallel((inverse(about_centre), move(inverse(drive), push, (s.lever_short, 0, 0))))
+        )
         toward_plate = rotation_z(-side * ca.pi / 2)
         for x, root in ((-s.plate_half_length, driven_root), (s.plate_half_length, about_centre)):
             blocks.append(move(_arm_stiffness(root, s, a), toward_plate, (x, side * s.plate_half_width, 0)))

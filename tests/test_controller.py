@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from conftest import DEVICE
+from ctrlgen import Controller, Status, build_model, simulate
+from ctrlgen.devices import Device
+from ctrlgen.files import validate
+from ctrlgen.invert import _solve, _Values
+
+NM, H = 1e-9, 1e-3
+
+
+@pytest.fixture(scope="module")
+def controller(model):
+    return Controller(model, "pose", H)
+
+
+def limits_kept(model, x, z, u) -> bool:
+    """Every limit, with the slack of a few roundings of its bound."""
+    for limit, value in zip(model.limits, model.evaluate_limits(x, z, u, model.p_nominal), strict=True):
+        v = value.full().ravel()
+        if limit.upper is not None and np.any(v > limit.upper * (1 + 1e-9)):
+            return False
+        if limit.lower is not None and np.any(v < limit.lower - 1e-9 * max(abs(limit.lower), 1e-3)):
+            return False
+    return True
+
+
+def solve_one(equations, unknowns, **at) -> ca.DM:
+    """Roots of `equations` by the block solver, all symbols but the unknowns at given values."""
+    others = ca.vertcat(*at.values()) if at else ca.SX(0, 1)
+    n = unknowns.numel()
+    known = _Values(ca.vertcat(others, unknowns), np.concatenate([np.zeros(others.numel()), np.zeros(n)]), np.ones(others.numel() + n))
+    return ca.Function("f", [others], [_solve(known, equations, unknowns)])
+
+
+def test_a_linear_block_is_solved_exactly():
+    v, c = ca.SX.sym("v", 2), ca.SX.sym("c", 2)
+    f = solve_one(ca.vertcat(2 * v[0] + c[0] * v[1] - 1, v[0] - v[1] - c[1]), v, c=c)
+    a, b = f([3.0, 0.5]).full().ravel()
+    assert 2 * a + 3 * b == pytest.approx(1, abs=1e-14) and a - b == pytest.approx(0.5, abs=1e-14)
+
+
+def test_a_quadratic_takes_the_root_on_the_side_of_operation_without_cancellation():
+    v, q = ca.SX.sym("v"), ca.SX.sym("q")
+    f = solve_one(v + v**2 - q, v, q=q)
+    assert float(f(6.0)) == pytest.approx(2.0, rel=1e-15)
+    assert float(f(1e-18)) == pytest.approx(1e-18, rel=1e-15)  # the textbook formula gives 0 here
+    g = solve_one(q - v**2, v, q=q)
+    assert float(g(9.0)) == 3.0 and float(g(-9.0)) == -3.0 and float(g(0.0)) == 0.0
+
+
+def test_what_is_neither_is_solved_by_newton_steps():
+    v, q = ca.SX.sym("v"), ca.SX.sym("q")
+    f = solve_one(v + ca.tanh(v) - q, v, q=q)
+    root = float(f(1.5))
+    assert root + np.tanh(root) == pytest.approx(1.5, abs=1e-14)
+
+
+def test_blocks_are_solved_in_the_order_that_they_need():
+    v = ca.SX.sym("v", 3)
+    f = solve_one(ca.vertcat(v[2] - v[1] ** 2 - v[1], v[0] - 2, v[1] - v[0]), v)
+    assert f([]).full().ravel() == pytest.approx([2, 2, 6])
+
+
+def test_random_reachable_poses_come_back_through_the_model(model, controller, rng):
+    """Settle, then simulate the model for 60 time constants with the drive."""
+    for z in rng.uniform(1e-6, controller.safe_displacement, size=(20, 6)):
+        pose = model.evaluate(model.rest, z, 0, [])[list(model.signals).index("pose")].full().ravel()
+        step = controller.step(controller.rest(), pose, settle=True)
+        assert step.status == 0
+        reached = simulate(model, np.tile(step.drive, (300, 1)), H).signals["pose"][-1]
+        assert np.abs(reached - pose)[3:].max() < 0.01 * NM and np.abs(reached - pose)[:3].max() < 1e-12
+
+
+def test_no_target_makes_it_leave_a_limit(model, controller, rng):
+    """Hostile sequences: far, huge, not a number; the model driven by the answers keeps every limit."""
+    scale = np.array(model.signals["pose"].scale)
+    targets = list(rng.normal(size=(150, 6)) * scale * 10 ** rng.uniform(0, 3, (150, 1)))
+    targets[10], targets[20], targets[30] = np.full(6, np.nan), np.full(6, np.inf), np.full(6, -1e300)
+    state, drives, seen = controller.rest(), [], Status(0)
+    for k, target in enumerate(targets):
+        step = controller.step(state, target)
+        state, seen = step.state, seen | step.status
+        drives.append(step.drive)
+        assert limits_kept(model, np.append(step.actuator_state, []), step.displacement, step.drive)
+        assert bool(step.status & Status.INPUT) == (k in (10, 20, 30))
+    trace = simulate(model, np.array(drives), H)
+    for k in range(len(trace.time)):
+        assert limits_kept(model, trace.x[k], trace.z[k], drives[min(k, len(drives) - 1)])
+    assert seen & Status.DISPLACEMENT and seen & Status.COMPOSITE and seen & Status.DRIVE and seen & Status.INPUT
+
+
+def test_the_temperature_limit_is_kept_where_the_stroke_would_allow_more():
+    table = tomllib.loads(DEVICE.read_text())
+    table["actuator"]["temperature_limit"]["value"] = "120 degC"
+    model = build_model(validate(Device.library["mems_hexapod"], table, "cooler"))
+    controller = Controller(model, "displacement", H)
+    step = controller.step(controller.rest(), np.full(6, 30e-6), settle=True)
+    assert step.status == Status.STATE
+    assert step.actuator_state == pytest.approx(np.full(6, 393.15), abs=1e-9)
+    settled = simulate(model, np.tile(step.drive, (300, 1)), H)
+    assert settled.signals["state"].max() <= 393.15 + 1e-9
+
+
+def test_not_a_number_switches_the_heaters_off_and_the_state_cools(controller):
+    warm = controller.step(controller.rest(), np.array([0, 0, 0, 0, 0, 2e-5]), settle=True)
+    step = controller.step(warm.state, np.full(6, np.nan))
+    assert step.status == Status.INPUT and np.all(step.drive == 0)
+    assert np.all(step.state[0] < warm.state[0])
+
+
+def test_the_safe_box_is_safe_and_not_much_smaller_than_it_could_be(model, controller, rng):
+    edge = controller.safe_displacement
+    inside = rng.uniform(0, edge, size=(2000, 6))
+    assert controller.composite_ratio.map(2000)(inside.T).full().max() <= 1
+    corners = np.array(np.meshgrid(*[[0, 1.001 * edge]] * 6)).reshape(6, -1)
+    assert controller.composite_ratio.map(64)(corners).full().max() > 1
+
+
+def test_limits_that_the_stroke_implies_are_not_computed_online(controller):
+    assert [limit.name for limit in controller.guarded_limits] == ["wire_stress"]
+
+
+def test_a_saturated_sample_is_made_up_for_as_soon_as_the_limits_allow(model, controller):
+    """A jump asks for more power than there is; the state the controller keeps is the device's, so it arrives."""
+    start, goal = np.array([0, 0, 0, 0, 0, 5e-6]), np.array([0, 0, 0, 0, 0, 3e-5])
+    step = controller.step(controller.rest(), start, settle=True)
+    x_0, state, drives, statuses = step.state[0], step.state, [], []
+    for _ in range(10):
+        step = controller.step(state, goal)
+        state = step.state
+        drives.append(step.drive)
+        statuses.append(step.status)
+    assert statuses[0] & Status.DRIVE and statuses[-1] == 0
+    reached = simulate(model, np.array(drives), H, x_0).signals["pose"][-1]
+    assert np.abs(reached - goal)[3:].max() < 0.01 * NM
+
+
+def test_the_inverse_is_wrong_when_the_model_behind_it_is(model):
+    """The round trip can fail: invert a model that is 1 % stiffer than the plant."""
+    table = tomllib.loads(DEVICE.read_text())
+    table["stage"]["half_stage_stiffness"]["value"] = "0.05209277 N/um"
+    other = Controller(build_model(validate(Device.library["mems_hexapod"], table, "stiffer")), "pose", H)
+    pose = np.array([0, 0, 0, 0, 0, 2e-5])
+    drive = other.step(other.rest(), pose, settle=True).drive
+    reached = simulate(model, np.tile(drive, (200, 1)), H).signals["pose"][-1]
+    assert abs(reached[5] - pose[5]) > 5 * NM
+
+
+def test_equations_that_hang_together_are_solved_together(model):
+    """A drive that also pushes directly, quadratically: temperature and drive need Newton on one block."""
+    direct = replace(model, balance=model.balance + 1e-3 * model.u**2)
+    controller = Controller(direct, "pose", H)
+    pose = np.array([0, 0, 0, 2e-6, 1e-6, 2e-5])
+    step = controller.step(controller.rest(), pose, settle=True)
+    reached = simulate(direct, np.tile(step.drive, (300, 1)), H).signals["pose"][-1]
+    assert np.abs(reached - pose)[3:].max() < 0.01 * NM

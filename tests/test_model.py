@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from conftest import effect_device
+from ctrlgen import InputError, build_model, simulate
+from ctrlgen.devices.mems_hexapod import matrices
+from ctrlgen.linearise import equilibrium, linearise
+from ctrlgen.physics import thermal_actuator, xy_stage
+
+POSE = np.array([0, 0, 0, 5e-6, -3e-6, 20e-6])
+NM = 1e-9
+
+
+def test_the_steady_state_is_the_static_model_written_out_by_hand(device, model):
+    """The flat twin: S1 eq. (4), (9)-(12), (18) as textbook lines with the printed numbers."""
+    P = np.array([0.15, 0.15, 0.05, 0.22, 0.05, 0.09])
+    T = 22 + 550 * P  # degC
+    F = 2 * 15 * (3e-6 + 3e-9 * T) * (T - 22) * 130e9 * 22.3e-6 * 30e-6 * np.sin(0.068)
+    K_t = 0.0133373835e6  # N/m, S1 eq. (6)
+    d = np.full(6, 1e-5)
+    for _ in range(60):  # fixed slope iteration on the force law, referred to the bar
+        root = np.sqrt(1e-6 - d**2)
+        law = (K_t / 10 + 10 * 10 / (0.178e6 * 1e-6)) * d + 20 * 51577.0 * (d / 1e-3) * (root / 1e-3) * (1e-3 - root)
+        d = d + (F - law) / 3500
+    pose = matrices(device)["J"] @ d
+    settled = simulate(model, np.tile(P, (200, 1)), 1e-3)  # 40 time constants
+    assert np.abs(settled.signals["state"][-1] - 273.15 - T).max() < 1e-9  # K
+    assert np.abs(settled.signals["force"][-1] - F).max() < 1e-12  # N, of 0.1 N
+    assert np.abs(settled.signals["displacement"][-1] - d).max() < 0.01 * NM  # 9 digits of K_t above
+    assert np.abs(settled.signals["pose"][-1] - pose)[3:].max() < 0.01 * NM
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-3, 2e-2])
+def test_a_step_is_exact_for_the_first_order_lag(model, h):
+    step = ca.Function("step", [model.x, model.z, model.u], [model.step(h)])
+    T_0, P = np.linspace(300, 500, 6), np.linspace(0, 1, 6)
+    T_end = 295.15 + 550 * P
+    exact = T_end + (T_0 - T_end) * np.exp(-h / 5e-3)
+    assert step(T_0, 0, P).full().ravel() == pytest.approx(exact, rel=1e-14)  # rounding
+
+
+def test_a_step_of_coupled_states_equals_the_matrix_exponential(model):
+    """States that act on one another: a second lag fed by the first, put together by hand."""
+    from dataclasses import replace
+
+    A = np.diag(np.full(6, -200.0)) + np.diag(np.full(5, 80.0), 1)
+    coupled = replace(model, rates=ca.mtimes(ca.DM(A), model.x) + 1000 * model.u)
+    x, u, h = np.linspace(1, 2, 6), np.linspace(0, 1, 6), 2e-3
+    exact = expm(h * A) @ x + np.linalg.solve(A, (expm(h * A) - np.eye(6)) @ (1000 * u))
+    value = ca.Function("step", [coupled.x, coupled.u], [coupled.step(h)])(x, u).full().ravel()
+    assert value == pytest.approx(exact, rel=1e-9)  # truncation of the series at order 12 for |hA| < 0.6
+    with pytest.raises(InputError, match="too long"):
+        coupled.step(0.1)
+
+
+def test_the_state_space_has_the_closed_form_gain_and_pole(device, model):
+    """pose/P = J (dF/dT / dF/dd) R_th / (1 + tau s) at the equilibrium."""
+    x, z, _ = equilibrium(model, POSE)
+    system = linearise(model, POSE)
+    p = device.values()
+    T, d = ca.SX.sym("T"), ca.SX.sym("d")
+    F_T = ca.Function("F_T", [T], [ca.jacobian(thermal_actuator.force(T, p.actuator), T)])
+    F_d = ca.Function("F_d", [d], [ca.jacobian(xy_stage.force(d, p.stage, p.actuator), d)])
+    gain = np.array([float(F_T(t)) / float(F_d(q)) * 550 for t, q in zip(x, z, strict=True)])
+    assert system.dcgain() == pytest.approx(matrices(device)["J"] * gain, rel=1e-10, abs=1e-15)
+    assert system.poles() == pytest.approx(np.full(6, -200.0), rel=1e-12)
+    assert list(system.input_labels) == [f"P_{a}" for a in model.axes] and "delta_z" in system.output_labels
+
+
+def test_the_state_space_predicts_a_small_step_of_power(model):
+    x, _, u = equilibrium(model, POSE)
+    du = np.array([0, 0, 1e-6, 0, 0, 0])
+    moved = simulate(model, np.tile(u + du, (5, 1)), 1e-3, x).signals["pose"][-1] - POSE
+    linear = linearise(model, POSE).dcgain() @ du * (1 - np.exp(-1.0))
+    assert moved == pytest.approx(linear, rel=1e-4, abs=1e-18)  # second order: 1e-6 W of 0.1 W
+
+
+def test_linearising_at_an_unreachable_pose_is_refused(model):
+    with pytest.raises(InputError, match="displacement"):
+        linearise(model, np.array([0, 0, 0, 1e-5, 0, 0]))
+
+
+def test_free_parameters_give_the_derivative_that_differences_give(device):
+    """Fitting and simulation read the same expression: d pose / d parameter through J's inverses."""
+    paths = ["hexapod.wire_length", "hexapod.height", "stage.half_stage_stiffness", "actuator.young"]
+    model = build_model(device, free=paths)
+    pose, balance = model.signals["pose"].expr, model.balance
+    slope = ca.Function("s", [model.x, model.z, model.p], [ca.jacobian(ca.vertcat(pose, balance), model.p)])
+    value = ca.Function("v", [model.x, model.z, model.p], [ca.vertcat(pose, balance)])
+    x, z = np.full(6, 400.0), np.linspace(1e-5, 4e-5, 6)
+    exact = slope(x, z, model.p_nominal).full()
+    for k, nominal in enumerate(model.p_nominal):
+        h = np.zeros(len(paths))
+        h[k] = 1e-4 * nominal
+        difference = (value(x, z, model.p_nominal + h) - value(x, z, model.p_nominal - h)).full().ravel() / (2 * h[k])
+        assert exact[:, k] == pytest.approx(difference, rel=1e-5, abs=1e-6 * np.abs(difference).max())  # h^2, and 1e-11/h
+
+
+def test_a_free_parameter_at_its_nominal_value_changes_nothing(device, model):
+    freed = build_model(device, free=["hexapod.height"])
+    x, z, u = np.full(6, 350.0), np.full(6, 2e-5), np.full(6, 0.1)
+    here, there = freed.evaluate(x, z, u, freed.p_nominal), model.evaluate(x, z, u, [])
+    for a, b in zip(here, there, strict=True):
+        assert a.full() == pytest.approx(b.full(), rel=1e-12)  # the Jacobian's inverses in another order of rounding
+
+
+def test_a_voltage_drive_heats_with_its_square(device):
+    import tomllib
+
+    from conftest import DEVICE
+    from ctrlgen.devices import Device
+    from ctrlgen.files import validate
+
+    table = tomllib.loads(DEVICE.read_text())
+    table["actuator"]["drive"] = "voltage"
+    model = build_model(validate(Device.library["mems_hexapod"], table, "in volts"))
+    settled = simulate(model, np.full((200, 6), 6.0), 1e-3)
+    assert settled.signals["power"][-1] == pytest.approx(36 / 150)
+    assert settled.signals["state"][-1] == pytest.approx(295.15 + 550 * 36 / 150, rel=1e-12)
+    assert model.u_bounds[1] == pytest.approx(np.sqrt(150.0))
+    assert model.signals["drive"].units == ("V",) * 6
+
+
+def test_two_effects_of_one_kind_keep_their_own_states():
+    creep = {"kind": "creep", "gain": "0.1", "tau": "1 s"}
+    model = build_model(effect_device({**creep, "at": "1X"}, {**creep, "at": "all"}))
+    assert len(model.x_names) == 6 + 1 + 6 and len(set(model.x_names)) == 13
