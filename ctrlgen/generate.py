@@ -81,16 +81,16 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     """Everything the templates of one online controller need."""
     model = controller.model
     n = len(model.axes)
-    kernels: list[Kernel] = []
+    kernels: dict[str, Kernel] = {}  # by body: what settling and stepping share is printed once
 
     def printed(function: Any, name: str) -> Kernel:
-        kernels.append(print_function(function, name, real))
-        return kernels[-1]
+        kernel = print_function(function, name, real)
+        return kernels.setdefault(kernel.text.partition("(")[2], kernel)
 
     modes = []
     for name, inverse, z in (("settle", controller.static, "out->displacement"), ("step", controller.moving, "state->z")):
         if inverse is not None:
-            parts = {part: printed(getattr(inverse, part), f"{name}_{part}") for part in ("displacement", "state", "drive", "advance")}
+            parts = {part: printed(getattr(inverse, part), f"{name}_{part}" if part in ("drive", "advance") else f"wanted_{part}") for part in ("displacement", "state", "drive", "advance")}
             uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive"))
             modes.append({"name": name, "z": z, "uses_state": uses_state, **parts})
     balance = printed(controller.static.settle, "balance_displacement")
@@ -109,7 +109,7 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
         "drive_unit": drive.units[0], "state": model.signals["state"], "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in model.composite_limits()) or "composite limits",
-        "x_names": model.x_names, "kernels": kernels, "modes": modes, "ratio": ratio,
+        "x_names": model.x_names, "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
         "balance": balance, "bisections": BISECTIONS, "safe": controller.safe_displacement if ratio else 0.0,
         "relative_slack": RELATIVE_SLACK, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,

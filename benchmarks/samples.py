@@ -1,0 +1,172 @@
+"""The circle, other targets, and the problem of one sample that every peer solves.
+
+One sample: given the wanted pose, the stage displacements z and temperatures T with pose(z) = target and
+balance(z, T) = 0; the drives u that lead from the temperatures before to T follow in closed form, because the
+step is linear in u. Unknowns y = (z, T) and equations are divided by their typical sizes, as in `ctrlgen.solve`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.controller import Controller, Status
+from ctrlgen.model import Model, build_model
+from ctrlgen.scenario import Scenario, load_scenario
+from ctrlgen.simulate import simulate
+from ctrlgen.solve import Solution, solve
+
+SCENARIO = Path(__file__).resolve().parent.parent / "scenarios" / "circle20"
+NEAR = 1e-11  # m: 0.01 nm, what two answers may differ by
+NEAR_FLOAT = 1e-10  # m, in single precision
+COUNT = 1000  # targets of the random sets
+
+
+class Disagreement(Exception):
+    """A contender's answer is wrong; its time would mean nothing."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What a contender answered, SI: displacements, temperatures and drives (n, 6) each, status (n,)."""
+
+    z: np.ndarray
+    T: np.ndarray
+    u: np.ndarray
+    status: np.ndarray
+
+
+class Samples:
+    """Scenario, model, solution, and checks of answers against them."""
+
+    def __init__(self) -> None:
+        self.scenario: Scenario = load_scenario(SCENARIO)
+        self.model: Model = build_model(self.scenario.device)
+        self.solution: Solution = solve(self.scenario, self.model)
+        self.command = self.solution.command
+        self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
+        self.axes = len(self.model.axes)
+        if self.model.x.numel() != self.axes or not self.scenario.closed:
+            raise Disagreement("the peers are written for a closed path and one state per actuator")
+
+    @cached_property
+    def symbols(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """y = (z, T), T before (both scaled), target (SI)."""
+        n = self.axes
+        return ca.SX.sym("y", 2 * n), ca.SX.sym("before", n), ca.SX.sym("target", self.command.shape[1])
+
+    @cached_property
+    def pose_error(self) -> ca.SX:
+        """(pose(z) - target) / typical size, as an expression of the symbols."""
+        signal = self.model.signals[self.scenario.file.follow]
+        return (self._at(signal.expr, ca.SX.zeros(self.axes)) - self.symbols[2]) / signal.scale
+
+    @cached_property
+    def balance(self) -> ca.SX:
+        """balance(z, T) / typical force."""
+        return self._at(self.model.balance, ca.SX.zeros(self.axes)) / self.model.force_scale
+
+    @cached_property
+    def drive(self) -> ca.Function:
+        """(y, before) -> the drives that lead from `before` to the T in y, in W."""
+        m, (y, before, _) = self.model, self.symbols
+        u = ca.SX.sym("u", self.axes)
+        step = self._at(m.step(self.scenario.sample_time or 1.0), u, before * m.x_scale + m.rest)
+        motion = step - y[self.axes :] * m.x_scale - m.rest
+        slope = ca.jacobian(motion, u)
+        return ca.Function("drive", [y, before], [-ca.solve(slope, ca.substitute(motion, u, 0))])
+
+    def _at(self, expression: ca.SX, u: ca.SX, T: ca.SX | None = None) -> ca.SX:
+        """`expression` of the model at the symbols' displacements and, unless `T` is given, temperatures."""
+        m, y = self.model, self.symbols[0]
+        T = y[self.axes :] * m.x_scale + m.rest if T is None else T
+        values = ca.vertcat(T, y[: self.axes] * m.z_scale, u, ca.DM(m.p_nominal))
+        return ca.substitute(expression, ca.vertcat(m.x, m.z, m.u, m.p), values)
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of y."""
+        m = self.model
+        z, T = m.z_bounds, m.x_bounds
+        low, high = (np.concatenate([z[i] / m.z_scale, (T[i] - m.rest) / m.x_scale]) for i in range(2))
+        return low, high
+
+    def answers(self, y: np.ndarray, u: np.ndarray) -> Answers:
+        """Scaled unknowns (n, 12) and drives as Answers."""
+        m, n = self.model, self.axes
+        return Answers(y[:, :n] * m.z_scale, y[:, n:] * m.x_scale + m.rest, u, np.zeros(len(y), dtype=int))
+
+    def reachable(self) -> np.ndarray:
+        """Targets all over the range: random displacements, shrunk where a composite limit would break."""
+        m = self.model
+        low, high = m.z_bounds
+        z = np.random.default_rng(1).uniform(low, high, size=(COUNT, self.axes))
+        state, none, p = np.tile(m.rest[:, None], (1, COUNT)), np.zeros((self.axes, COUNT)), m.p_nominal[:, None]
+        values = dict(zip((limit.name for limit in m.limits), m.evaluate_limits.map(COUNT)(state, z.T, none, p), strict=True))
+        ratios = [np.max(values[c.name].full() / c.upper, axis=0) for c in m.composite_limits() if c.upper is not None]
+        return self._pose(z / np.maximum(np.max(ratios, axis=0), 1.0)[:, None] * (1 - 1e-6))
+
+    def beyond(self) -> np.ndarray:
+        """Targets for which the controller must clamp or shrink the displacement: each breaks a composite limit."""
+        low, high = self.model.z_bounds
+        z = np.random.default_rng(2).uniform(low - 0.2 * high, 1.3 * high, size=(3 * COUNT, self.axes))
+        targets = np.array(self._pose(z), dtype=np.float32).astype(float)
+        rest = self.controller.rest()
+        hit = [t for t in targets if Status.COMPOSITE in self.controller.step(rest, t).status][:COUNT]
+        if len(hit) < COUNT:
+            raise Disagreement(f"only {len(hit)} of {len(targets)} random targets break a composite limit")
+        return np.array(hit)
+
+    def _pose(self, z: np.ndarray) -> np.ndarray:
+        m, n = self.model, len(z)
+        signal = m.signals[self.scenario.file.follow].expr
+        return ca.Function("pose", [m.z], [signal]).map(n)(z.T).full().T
+
+    def check(self, name: str, answers: Answers, targets: np.ndarray, near: float = NEAR) -> None:
+        """Raises Disagreement unless pose(z) is the target and T balances z, both within `near`."""
+        m = self.model
+        pose = np.abs(self._pose(answers.z) - targets) / np.array(m.signals[self.scenario.file.follow].scale) * 1e-6
+        force = ca.substitute(m.balance, ca.vertcat(m.u, m.p), ca.vertcat(ca.SX.zeros(self.axes), ca.DM(m.p_nominal)))
+        off = ca.solve(ca.jacobian(force, m.z), force)
+        settled = ca.Function("off", [m.x, m.z], [off]).map(len(targets))(answers.T.T, answers.z.T).full()
+        for what, error in (("the pose misses its target by", pose), ("the forces balance elsewhere, off by", settled)):
+            _require(name, what, np.abs(error).max(), near)
+
+    def check_same(self, name: str, answers: Answers, reference: Answers, near: float = NEAR) -> None:
+        """Raises Disagreement unless displacements and status are those of `reference`."""
+        _require(name, "a displacement differs by", np.abs(answers.z - reference.z).max(), near)
+        if np.any(answers.status != reference.status):
+            raise Disagreement(f"{name}: another status at sample {int(np.argmax(answers.status != reference.status))}")
+
+    def check_circle(self, name: str, answers: Answers, near: float = NEAR) -> None:
+        """Raises Disagreement unless answers to the circle are IPOPT's and their drives, simulated, follow it.
+
+        The answer to target k leads from sample k - 1 to k.
+        """
+        self.check(name, answers, self.command, near)
+        trace = self.solution.trace
+        _require(name, "a displacement differs from IPOPT's by", np.abs(answers.z - trace.z).max(), near)
+        drives = np.roll(answers.u, -1, axis=0)
+        role = self.scenario.file.follow
+        reached = simulate(self.model, drives, self.scenario.sample_time or 1.0, trace.x[0]).signals[role][:-1]
+        error = np.abs(reached - self.command) / np.array(self.model.signals[role].scale) * 1e-6
+        _require(name, "its drives lead the model off the circle by", error.max(), near)
+
+    def reference(self, targets: np.ndarray) -> Answers:
+        """The controller of `ctrlgen.controller` over `targets`, starting settled at the last one."""
+        step = self.controller.step(self.controller.rest(), targets[-1], settle=True)
+        steps = []
+        for target in targets:
+            step = self.controller.step(step.state, target)
+            steps.append(step)
+        z, T, u = (np.array([getattr(s, f) for s in steps]) for f in ("displacement", "actuator_state", "drive"))
+        return Answers(z, T, u, np.array([int(s.status) for s in steps]))
+
+
+def _require(name: str, what: str, error: float, near: float) -> None:
+    if not error <= near:
+        raise Disagreement(f"{name}: {what} {error * 1e9:.3g} nm, more than {near * 1e9:g} nm")

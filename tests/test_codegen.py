@@ -1,0 +1,230 @@
+"""The generated C: same bytes, strict builds, true float, equal to two references, safe on bad calls."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from conftest import ROOT, SCENARIOS
+from ctrlgen import Controller, CtrlgenError, build_model, load_scenario
+from ctrlgen.compare import FLAGS
+from ctrlgen.cprint import Real, print_function
+from ctrlgen.generate import generate
+
+GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"
+NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, circle):
+    out = tmp_path_factory.mktemp("c")
+    return generate(circle.scenario, circle.model, out, circle)
+
+
+def build(compiler: str, sources: list[Path], out: Path, *more: str) -> None:
+    done = subprocess.run([compiler, *FLAGS, *more, *map(str, sources), "-lm", "-o", str(out)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_same_input_gives_the_same_bytes(folder, circle, tmp_path):
+    again = generate(circle.scenario, build_model(circle.scenario.device), tmp_path, circle)
+    for path in sorted(folder.path.iterdir()):
+        assert path.read_bytes() == (again.path / path.name).read_bytes(), path.name
+
+
+@pytest.mark.parametrize("suffix", ["f32.h", "f32.c"])
+def test_golden_c_is_what_is_generated(folder, suffix, request):
+    """Words exactly, constants to two roundings of a float, since libraries differ in the last digit between machines."""
+    name = f"circle20_online_{suffix}"
+    new = (folder.path / name).read_text()
+    if request.config.getoption("--update-golden"):
+        GOLDEN.mkdir(parents=True, exist_ok=True)
+        (GOLDEN / name).write_text(new)
+    old = (GOLDEN / name).read_text()
+    same_words = NUMBER.sub("#", old) == NUMBER.sub("#", new)
+    numbers = [np.array(NUMBER.findall(text), dtype=float) for text in (old, new)]
+    if not same_words or not np.allclose(*numbers, rtol=3e-7, atol=0):
+        diff = "".join(difflib.unified_diff(old.splitlines(True), new.splitlines(True), "golden", "generated", n=1))
+        pytest.fail(f"{name} changed; if that is meant: pytest tests/test_codegen.py --update-golden\n{diff[:3000]}")
+
+
+def test_float_c_knows_no_double(folder):
+    for path in folder.path.glob("*_f32.[ch]"):
+        text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.DOTALL)
+        if not path.name.startswith("test_"):
+            assert "double" not in text, path.name
+            bare = [m[0] for m in NUMBER.finditer(text) if text[m.end()] != "f"]
+            assert not bare, (path.name, bare[:3])
+
+
+def test_float_objects_call_no_double_function(folder, compiler, tmp_path):
+    if not shutil.which("nm"):
+        pytest.skip("nm (binutils) is missing: the symbols of the float objects were not read")
+    for name in (folder.online[Real.FLOAT], folder.player[Real.FLOAT]):
+        build(compiler, [folder.path / f"{name}.c"], tmp_path / "o.o", "-c")
+        symbols = subprocess.run(["nm", "-u", str(tmp_path / "o.o")], capture_output=True, text=True, check=True).stdout
+        wanted = set(symbols.split()) - {"U", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
+        assert wanted <= {"sqrtf"}, wanted
+
+
+def test_no_heap_no_globals_no_recursion_no_unbounded_loops(folder, compiler, tmp_path):
+    for names in (folder.online, folder.player):
+        for real, name in names.items():
+            text = (folder.path / f"{name}.c").read_text()
+            assert not re.search(r"\b(malloc|calloc|realloc|free|while|goto|do)\b", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))
+            assert all(re.fullmatch(r"\w+ = 0; \w+ < \d+; \w+\+\+", loop) for loop in re.findall(r"for \((.*?)\)", text))
+            build(compiler, [folder.path / f"{name}.c"], tmp_path / "o.o", "-c")
+            if shutil.which("nm"):
+                table = subprocess.run(["nm", str(tmp_path / "o.o")], capture_output=True, text=True, check=True).stdout
+                assert not re.search(r" [BbDdC] ", table), f"{real}: writable data\n{table}"
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compiler, tmp_path, real):
+    name = f"test_circle20_{real.suffix}"
+    sources = [folder.path / f"{name}.c", folder.path / f"{folder.online[real]}.c"]
+    build(compiler, sources, tmp_path / "good", f"-I{folder.path}")
+    good = subprocess.run([tmp_path / "good"], capture_output=True, text=True)
+    assert good.returncode == 0 and "65 of 65 vectors agree" in good.stdout
+    broken = tmp_path / f"{folder.online[real]}.c"
+    text = sources[1].read_text()
+    factor = real.literal(1.00001 if real is Real.DOUBLE else 1.0003)  # float: above four roundings of the temperature
+    wrong, count = re.subn(r"(= )(\(?[-\d.e]+f?\)? \* target\[5\];)", rf"\g<1>{factor} * \g<2>", text, count=1)
+    assert count == 1
+    broken.write_text(wrong)
+    build(compiler, [sources[0], broken], tmp_path / "bad", f"-I{folder.path}")
+    assert subprocess.run([tmp_path / "bad"], capture_output=True).returncode == 1
+
+
+def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):
+    """CasADi's generator and ours from the same graph: equal bit for bit in double."""
+    controller = Controller(circle.model, "pose", 1e-3)
+    generator = ca.CodeGenerator("reference.c")
+    kernels = [getattr(controller.moving, part) for part in ("displacement", "state", "drive", "advance")] + [controller.composite_ratio]
+    for kernel in kernels:
+        generator.add(kernel)
+    generator.generate(f"{tmp_path}/")
+    subprocess.run([compiler, "-O1", "-shared", "-fPIC", str(tmp_path / "reference.c"), "-lm", "-o", str(tmp_path / "reference.so")], check=True)
+    rng = np.random.default_rng(3)
+    for kernel in kernels:
+        ours = print_function(kernel, "ours", Real.DOUBLE)
+        inputs = [rng.uniform(0.2, 0.9, kernel.size1_in(i)) * (300 if kernel.name_in(i) in ("x", "state") else 4e-5) for i in range(kernel.n_in())]
+        main = "#include <stdio.h>\n#include <math.h>\n" + ours.text + "int main(void) {\n"
+        for i in range(kernel.n_in()):
+            if kernel.name_in(i) in ours.arguments:
+                main += f"static const double {kernel.name_in(i)}[] = {{{', '.join(repr(float(v)) for v in inputs[i])}}};\n"
+        size = kernel.size1_out(0)
+        main += f"double result[{size}]; {ours.call('result', **{a: a for a in ours.arguments})}; int i;\n"
+        main += f'for (i = 0; i < {size}; i++) (void)printf("%.17g\\n", result[i]); return 0; }}\n'
+        (tmp_path / "ours.c").write_text(main)
+        subprocess.run([compiler, "-std=c99", "-O1", str(tmp_path / "ours.c"), "-lm", "-o", str(tmp_path / "ours")], check=True)
+        printed = np.array(subprocess.run([tmp_path / "ours"], capture_output=True, text=True, check=True).stdout.split(), dtype=float)
+        theirs = ca.external(kernel.name(), str(tmp_path / "reference.so"))(*inputs).full().ravel()
+        assert printed == pytest.approx(theirs, rel=1e-14), kernel.name()  # both compilers may fold a constant once
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_every_operation_prints_what_casadi_computes(real, compiler, tmp_path):
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    expressions = ca.vertcat(
+        a + b, a - b, a * b, a / b, -a, a * a, 2 * a, 1 / a, ca.fmin(a, b), ca.fmax(a, b), ca.fabs(-a), ca.sign(a - b), ca.sqrt(a),
+        ca.exp(a), ca.log(a), ca.sin(a), ca.cos(a), ca.tan(a), ca.asin(a / 4), ca.acos(a / 4), ca.atan(a), ca.tanh(a), a**2.5, ca.atan2(a, b),
+        a < b, a <= b, ca.eq(a, b), ca.ne(a, b), ca.logic_and(a, b), ca.logic_or(a, b), ca.logic_not(a), ca.if_else(a < b, a, b), ca.floor(a),
+        ca.ceil(a), 0 * b + 3.25, ca.sinh(a), ca.cosh(a), a**b,
+    )  # fmt: skip
+    f = ca.Function("f", [a, b], [expressions], ["a", "b"], ["r"])
+    kernel = print_function(f, "f", real)
+    n = f.size1_out(0)
+    text = f"#include <stdio.h>\n#include <math.h>\n{kernel.text}int main(void) {{ const {real.value} a[1] = {{{real.literal(1.3)}}}; "
+    text += f"const {real.value} b[1] = {{{real.literal(0.7)}}}; {real.value} r[{n}]; int i; {kernel.call('r', a='a', b='b')}; "
+    text += f'for (i = 0; i < {n}; i++) {{ (void)printf("%.17g\\n", (double)r[i]); }} return 0; }}\n'
+    (tmp_path / "f.c").write_text(text)
+    build(compiler, [tmp_path / "f.c"], tmp_path / "f")
+    printed = np.array(subprocess.run([tmp_path / "f"], capture_output=True, text=True, check=True).stdout.split(), dtype=float)
+    expected = f(np.float32(1.3), np.float32(0.7)) if real is Real.FLOAT else f(1.3, 0.7)
+    assert printed == pytest.approx(expected.full().ravel(), rel=1e-15 if real is Real.DOUBLE else 5e-7, abs=0)
+
+
+def test_an_output_may_be_an_input(compiler, tmp_path):
+    """All outputs are stored last, so state = f(state) is not read half new."""
+    x = ca.SX.sym("x", 2)
+    kernel = print_function(ca.Function("swap", [x], [ca.vertcat(x[1], x[0] + x[1])], ["x"], ["r"]), "swap", Real.DOUBLE)
+    assert re.search(r"result\[0\] = x\[1\];\n    result\[1\] = t\d+;", kernel.text)
+
+
+def test_a_constant_beyond_float_is_refused():
+    x = ca.SX.sym("x")
+    with pytest.raises(CtrlgenError, match="does not fit a float"):
+        print_function(ca.Function("f", [x], [x * 1e-60], ["x"], ["r"]), "f", Real.FLOAT)
+    with pytest.raises(CtrlgenError, match="cannot be written"):
+        print_function(ca.Function("f", [x], [x * float("inf")], ["x"], ["r"]), "f", Real.DOUBLE)
+
+
+def test_null_and_hostile_calls_are_safe(folder, compiler, tmp_path):
+    """NULL pointers, a state of garbage, times and indices out of range: a status and admissible drives."""
+    online, player = folder.online[Real.FLOAT], folder.player[Real.FLOAT]
+    (tmp_path / "main.c").write_text(f"""
+#include "{online}.h"
+#include "{player}.h"
+#include <math.h>
+#include <stddef.h>
+int main(void)
+{{
+    {online}_state s;
+    {online}_output o;
+    const float up[6] = {{ 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 2e-5f }};
+    float u[6];
+    int i;
+    {online}_init(NULL);
+    if ({online}_step(NULL, up, &o) != {online.upper()}_INPUT) {{ return 1; }}
+    {online}_init(&s);
+    if ({online}_step(&s, NULL, &o) != {online.upper()}_INPUT) {{ return 2; }}
+    if ({online}_step(&s, up, NULL) != {online.upper()}_INPUT) {{ return 3; }}
+    for (i = 0; i < 6; i++) {{ s.x[i] = NAN; s.z[i] = NAN; }}
+    if ({online}_step(&s, up, &o) == 0) {{ return 4; }}
+    for (i = 0; i < 6; i++) {{ if (!((o.drive[i] >= 0.0f) && (o.drive[i] <= 1.0f))) {{ return 5; }} }}
+    if ({player}_at(NAN, u) != {player.upper()}_INPUT) {{ return 6; }}
+    if ({player}_at(-1.0f, u) != {player.upper()}_INPUT) {{ return 7; }}
+    if ({player}_at(1e30f, u) != {player.upper()}_INPUT) {{ return 8; }}
+    if ({player}_at(0.9999f, u) != 0) {{ return 9; }}
+    if ({player}_sample(4000000000UL, u) != 0) {{ return 10; }}
+    if ({player}_sample(0UL, NULL) != {player.upper()}_INPUT) {{ return 11; }}
+    return 0;
+}}
+""")
+    sources = [tmp_path / "main.c", folder.path / f"{online}.c", folder.path / f"{player}.c"]
+    build(compiler, sources, tmp_path / "main", f"-I{folder.path}", "-fsanitize=undefined", "-fno-sanitize-recover=all")
+    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True)
+    assert done.returncode == 0, (done.returncode, done.stderr)
+
+
+def test_two_controllers_link_into_one_program(folder, compiler, tmp_path):
+    scenario = load_scenario(SCENARIOS / "spiral")
+    other = generate(scenario, build_model(scenario.device), tmp_path / "spiral")
+    (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
+    sources = [folder.path / f"{name}.c" for name in (*folder.online.values(), *folder.player.values())]
+    sources += [other.path / f"{name}.c" for name in other.online.values()]
+    build(compiler, [tmp_path / "main.c", *sources], tmp_path / "main")
+
+
+def test_headers_state_names_units_limits_and_provenance(folder, circle):
+    text = (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
+    for words in ("theta_x [rad]", "delta_z [m]", "1X [W]", "1000 Hz", "22 degC <= actuator temperature <= 550 degC",
+                  "wire flexure stress <= 550 MPa", circle.scenario.digest["device"][:16], "Mech. Mach. Theory"):  # fmt: skip
+        assert words in text, words
+
+
+def test_the_cmake_project_builds_and_its_test_passes(folder, tmp_path):
+    if not shutil.which("cmake"):
+        pytest.skip("cmake is missing: the generated CMake project was not built")
+    for command in (["cmake", "-S", folder.path, "-B", tmp_path], ["cmake", "--build", tmp_path], ["ctest", "--test-dir", tmp_path]):
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert "100% tests passed" in done.stdout

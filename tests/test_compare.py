@@ -1,0 +1,81 @@
+"""The comparison finds what is wrong with a C file, and says where."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from ctrlgen import ToolError
+from ctrlgen import compare as compare_module
+from ctrlgen.compare import compare
+from ctrlgen.cprint import Real
+from ctrlgen.generate import generate
+
+
+@pytest.fixture
+def folder(tmp_path, circle, compiler):
+    return generate(circle.scenario, circle.model, tmp_path, circle)
+
+
+def spoil(folder, real: Real, kind: str, pattern: str, replacement: str) -> None:
+    path = folder.path / f"{getattr(folder, kind)[real]}.c"
+    text, count = re.subn(pattern, replacement, path.read_text(), count=1)
+    assert count == 1, pattern
+    path.write_text(text)
+
+
+def test_a_controller_that_is_a_little_off_is_found_by_each_reference(folder, circle):
+    spoil(folder, Real.DOUBLE, "online", r"= (\(?[-\d.e]+\)? \* target\[5\];)", r"= 1.0000001 * \1")
+    comparison = compare(folder, circle)
+    assert not comparison.passed
+    failed = {(row.build.split()[1], row.what) for row in comparison.rows if not row.passed}
+    assert ("double", "scenario, online C - CasADi") in failed
+    assert ("double", "scenario, online C - IPOPT") in failed or ("double", "online C -> model - command") in failed
+    assert not any(real == "float" for real, _ in failed)
+    assert min(row.first for row in comparison.rows if not row.passed) == 0
+
+
+def test_one_wrong_sample_of_the_player_is_found_at_its_place(folder, circle):
+    path = folder.path / f"{folder.player[Real.FLOAT]}.c"
+    lines = path.read_text().splitlines(True)
+    start = next(i for i, line in enumerate(lines) if "TABLE" in line)
+    lines[start + 1 + 321] = re.sub(r"0\.(\d)", lambda m: f"0.{(int(m[1]) + 1) % 10}", lines[start + 1 + 321], count=1)
+    path.write_text("".join(lines))
+    rows = [row for row in compare(folder, circle).rows if not row.passed]
+    assert {row.what for row in rows} >= {"player C - IPOPT", "player C -> model - command"}
+    assert {row.first for row in rows if row.what == "player C - IPOPT"} == {321}
+
+
+def test_a_forgotten_limit_is_found_by_the_hostile_sequence(folder, circle):
+    spoil(folder, Real.FLOAT, "online", r"(Z_HIGH\[6\] = \{ )5\.5e-05f", r"\g<1>9.5e-05f")
+    failed = {row.what for row in compare(folder, circle).rows if not row.passed}
+    assert "hostile sequence -> model: excess over a limit" in failed
+
+
+def test_c_with_a_warning_is_refused_with_the_compilers_words(folder, circle):
+    spoil(folder, Real.DOUBLE, "online", r"int status = 0;", "int status = 0; int unused_thing;")
+    with pytest.raises(ToolError, match="unused_thing"):
+        compare(folder, circle)
+
+
+def test_c_that_hangs_up_is_reported(folder, circle):
+    spoil(folder, Real.DOUBLE, "online", r"    if \(is_usable\(target\) == 0\) \{", "    if (target[5] > 0.0) { (void)*(volatile int *)0; }\n    if (is_usable(target) == 0) {")
+    with pytest.raises(ToolError):
+        compare(folder, circle)
+
+
+def test_without_a_compiler_the_message_says_what_to_install(folder, circle, monkeypatch):
+    monkeypatch.setattr(compare_module.shutil, "which", lambda _: None)
+    with pytest.raises(ToolError, match="apt-get install gcc"):
+        compare(folder, circle)
+
+
+def test_a_compiler_that_is_not_there_is_named_as_not_run(folder, circle, monkeypatch):
+    import shutil
+
+    real_which = shutil.which
+    present = "gcc" if real_which("gcc") else "clang"
+    monkeypatch.setattr(compare_module.shutil, "which", lambda name: real_which(name) if name == present else None)
+    comparison = compare(folder, circle)
+    assert comparison.passed and len(comparison.missing) == 1 and all(row.build.startswith(present) for row in comparison.rows)
