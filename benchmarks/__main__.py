@@ -24,7 +24,7 @@ def main() -> int:
         "'rounds' is the smallest and largest ratio of a single round: where it is wide, the machine was busy.\n\n"
         "examples:\n  python -m benchmarks\n  python -m benchmarks online --repeat 9",
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"which to run: {', '.join(BENCHMARKS)} (default: all)")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(BENCHMARKS)} (default: all)")
     parser.add_argument("--repeat", type=int, default=5, metavar="N", help="rounds, from 1 (default: 5)")
     arguments = parser.parse_args()
     if arguments.repeat < 1:

@@ -38,4 +38,5 @@ def run(repeat: int) -> list[Line | Note]:
 def _process(command: list[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise Disagreement(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout[-1000:]}{done.stderr[-2000:]}")
+        said = f"{done.stdout[-1000:]}{done.stderr[-2000:]}"
+        raise Disagreement(f"{' '.join(command)} ended with {done.returncode}:\n{said}")

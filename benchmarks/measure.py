@@ -6,7 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
+from typing import TypeVar
 
+K = TypeVar("K")
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
 HEADER = ("measured", "ours", "peer", "", "ratio", "rounds from .. to", "aim")
 
@@ -29,7 +31,7 @@ class Line:
     def cells(self) -> tuple[str, ...]:
         """One text per column of HEADER."""
         rounds = [a / b for a, b in zip(self.ours, self.peer, strict=True)]
-        aim = "" if self.aim is None else f"{'ok' if self.held else 'MISSED'}: below {duration(self.aim)}"
+        aim = "" if self.aim is None else f"< {duration(self.aim)} {'ok' if self.held else 'MISSED'}"
         ratio = f"{median(self.ours) / median(self.peer):.3g}"
         spread = f"{min(rounds):.3g} .. {max(rounds):.3g}"
         return self.what, duration(median(self.ours)), self.peer_name, duration(median(self.peer)), ratio, spread, aim
@@ -42,9 +44,9 @@ class Note:
     text: str
 
 
-def interleave(contenders: dict[str, Callable[[], float]], repeat: int) -> dict[str, list[float]]:
+def interleave(contenders: dict[K, Callable[[], float]], repeat: int) -> dict[K, list[float]]:
     """Runs every contender in turn, `repeat` rounds; a contender returns its own seconds."""
-    seconds: dict[str, list[float]] = {name: [] for name in contenders}
+    seconds: dict[K, list[float]] = {name: [] for name in contenders}
     for _ in range(repeat):
         for name, run in contenders.items():
             seconds[name].append(run())

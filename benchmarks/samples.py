@@ -2,7 +2,7 @@
 
 One sample: given the wanted pose, the stage displacements z and temperatures T with pose(z) = target and
 balance(z, T) = 0; the drives u that lead from the temperatures before to T follow in closed form, because the
-step is linear in u. Unknowns y = (z, T) and equations are divided by their typical sizes, as in `ctrlgen.solve`.
+step is linear in u. Unknowns y = (z, T) and equations are divided by their typical sizes, as in `ctrlgen.solution`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller import Controller, Status
+from ctrlgen.controller import RELATIVE_SLACK, Controller
 from ctrlgen.model import Model, build_model
 from ctrlgen.scenario import Scenario, load_scenario
-from ctrlgen.simulate import simulate
-from ctrlgen.solve import Solution, solve
+from ctrlgen.simulation import simulate
+from ctrlgen.solution import Solution, solve
 
 SCENARIO = Path(__file__).resolve().parent.parent / "scenarios" / "circle20"
 NEAR = 1e-11  # m: 0.01 nm, what two answers may differ by
 NEAR_FLOAT = 1e-10  # m, in single precision
 COUNT = 1000  # targets of the random sets
+PAUSE = 25  # samples between two random points of a path
 
 
 class Disagreement(Exception):
@@ -101,25 +102,32 @@ class Samples:
         return Answers(y[:, :n] * m.z_scale, y[:, n:] * m.x_scale + m.rest, u, np.zeros(len(y), dtype=int))
 
     def reachable(self) -> np.ndarray:
-        """Targets all over the range: random displacements, shrunk where a composite limit would break."""
+        """A path through random points of the range, slow enough to be followed: COUNT targets within every limit.
+
+        Points are random displacements, shrunk where they break a composite limit; the limits are convex, so that
+        the straight lines between points break none. Each line is eased by a cosine, and the path is closed.
+        """
         m = self.model
         low, high = m.z_bounds
-        z = np.random.default_rng(1).uniform(low, high, size=(COUNT, self.axes))
-        state, none, p = np.tile(m.rest[:, None], (1, COUNT)), np.zeros((self.axes, COUNT)), m.p_nominal[:, None]
-        values = dict(zip((limit.name for limit in m.limits), m.evaluate_limits.map(COUNT)(state, z.T, none, p), strict=True))
-        ratios = [np.max(values[c.name].full() / c.upper, axis=0) for c in m.composite_limits() if c.upper is not None]
-        return self._pose(z / np.maximum(np.max(ratios, axis=0), 1.0)[:, None] * (1 - 1e-6))
+        n = COUNT // PAUSE
+        z = np.random.default_rng(1).uniform(low + 0.1 * (high - low), high, size=(n, self.axes))
+        state, none = np.tile(m.rest[:, None], (1, n)), np.zeros((self.axes, n))
+        values = m.evaluate_limits.map(n)(state, z.T, none, np.tile(m.p_nominal[:, None], (1, n)))
+        by_name = {limit.name: value.full() for limit, value in zip(m.limits, values, strict=True)}
+        ratios = [np.max(by_name[c.name] / c.upper, axis=0) for c in m.composite_limits() if c.upper is not None]
+        z = z / np.maximum(np.max(ratios, axis=0), 1.0)[:, None] * (1 - 1e-6)
+        share = (1 - np.cos(np.pi * np.arange(PAUSE) / PAUSE)) / 2
+        lines = z[:, None, :] + share[None, :, None] * (np.roll(z, -1, axis=0) - z)[:, None, :]
+        return self._pose(lines.reshape(-1, self.axes))
 
     def beyond(self) -> np.ndarray:
-        """Targets for which the controller must clamp or shrink the displacement: each breaks a composite limit."""
+        """The reachable path enlarged, so that most of its targets break a composite limit."""
+        return 1.6 * self.reachable()
+
+    def jumps(self) -> np.ndarray:
+        """Random targets beyond the limits, each far from the one before: displacement, stress and drive give way."""
         low, high = self.model.z_bounds
-        z = np.random.default_rng(2).uniform(low - 0.2 * high, 1.3 * high, size=(3 * COUNT, self.axes))
-        targets = np.array(self._pose(z), dtype=np.float32).astype(float)
-        rest = self.controller.rest()
-        hit = [t for t in targets if Status.COMPOSITE in self.controller.step(rest, t).status][:COUNT]
-        if len(hit) < COUNT:
-            raise Disagreement(f"only {len(hit)} of {len(targets)} random targets break a composite limit")
-        return np.array(hit)
+        return self._pose(np.random.default_rng(2).uniform(low - 0.2 * high, 1.3 * high, size=(COUNT, self.axes)))
 
     def _pose(self, z: np.ndarray) -> np.ndarray:
         m, n = self.model, len(z)
@@ -141,6 +149,21 @@ class Samples:
         _require(name, "a displacement differs by", np.abs(answers.z - reference.z).max(), near)
         if np.any(answers.status != reference.status):
             raise Disagreement(f"{name}: another status at sample {int(np.argmax(answers.status != reference.status))}")
+
+    def check_limits(self, name: str, answers: Answers) -> None:
+        """Raises Disagreement unless the model driven by these answers keeps every limit, to RELATIVE_SLACK."""
+        m = self.model
+        u = answers.u[1:]
+        reached = simulate(m, u, self.scenario.sample_time or 1.0, answers.T[0])
+        x, z = reached.x[1:], reached.z[1:]
+        values = m.evaluate_limits.map(len(u))(x.T, z.T, u.T, np.tile(m.p_nominal[:, None], (1, len(u))))
+        for limit, value in zip(m.limits, values, strict=True):
+            v = value.full()
+            size = max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(v).max()
+            over = -np.inf if limit.upper is None else v.max() - limit.upper
+            under = -np.inf if limit.lower is None else limit.lower - v.min()
+            if not max(over, under) <= RELATIVE_SLACK * size:
+                raise Disagreement(f"{name}: {limit.label} goes {max(over, under) / size:.2g} of its bound beyond it")
 
     def check_circle(self, name: str, answers: Answers, near: float = NEAR) -> None:
         """Raises Disagreement unless answers to the circle are IPOPT's and their drives, simulated, follow it.

@@ -79,7 +79,7 @@ class Program:
         numbers = np.frombuffer(done.stdout, dtype=float)
         width = 1 + 3 * self.axes
         if done.returncode != 0 or numbers.size != len(targets) * width + passes:
-            raise Disagreement(f"{self.name}: the timing program ended with {done.returncode} after {numbers.size} numbers")
+            raise Disagreement(f"{self.name}: its program ended with {done.returncode} after {numbers.size} numbers")
         table = numbers[: len(targets) * width].reshape(len(targets), width)
         z, T, u = np.split(table[:, 1:], 3, axis=1)
         seconds = float(np.median(numbers[len(targets) * width :])) if passes else 0.0

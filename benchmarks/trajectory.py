@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks import least_squares
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import Answers, Samples
-from ctrlgen.solve import solve
+from ctrlgen.solution import solve
 
 
 class _Stopwatch:
@@ -51,5 +51,5 @@ def run(repeat: int) -> list[Line | Note]:
 
     seconds = interleave({"ours": timed(solve_once, n), "scipy": timed(scipy_solve, n)}, repeat)
     building = [whole - proper for whole, proper in zip(seconds["ours"], inside, strict=True)]
-    lines = (("circle, ctrlgen solve", seconds["ours"]), ("  IPOPT proper", inside), ("  building, reading out", building))
-    return [Line(f"{what}, per point", times, least_squares.NAME, seconds["scipy"]) for what, times in lines]
+    parts = {"circle, ctrlgen solve": seconds["ours"], "  IPOPT proper": inside, "  building, reading out": building}
+    return [Line(f"{what}, per point", times, least_squares.NAME, seconds["scipy"]) for what, times in parts.items()]

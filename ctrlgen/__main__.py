@@ -17,7 +17,6 @@ from rich.table import Table
 from ctrlgen import job, report
 from ctrlgen.devices import load_device
 from ctrlgen.errors import CtrlgenError, Fault, InputError, Unreachable
-from ctrlgen.files import write_text
 from ctrlgen.measures import in_unit
 from ctrlgen.model import build_model
 from ctrlgen.paths import Frame
@@ -32,9 +31,16 @@ app = typer.Typer(
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
 
-ScenarioPath = Annotated[Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)]
+ScenarioPath = Annotated[
+    Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)
+]
 DevicePath = Annotated[Path, typer.Argument(help="A device file (device.toml).", show_default=False)]
-OutFolder = Annotated[Path, typer.Option("--out", help="Result folder; replaced whole when the work is done, never half written.", show_default=False)]
+OutFolder = Annotated[
+    Path,
+    typer.Option(
+        "--out", help="Result folder; replaced whole when the work is done, never half written.", show_default=False
+    ),
+]
 
 
 @app.command()
@@ -93,7 +99,11 @@ def compare(scenario: ScenarioPath) -> None:
 
 
 @app.command()
-def check(file: Annotated[Path, typer.Argument(help="A device file, a scenario file or a scenario folder.", show_default=False)]) -> None:
+def check(
+    file: Annotated[
+        Path, typer.Argument(help="A device file, a scenario file or a scenario folder.", show_default=False)
+    ],
+) -> None:
     """Read a device or scenario and list every fault, or say what it describes. Nothing is computed.
 
     Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
@@ -107,7 +117,9 @@ def check(file: Annotated[Path, typer.Argument(help="A device file, a scenario f
     model = build_model(device)
     numbers = list(device.quantities())
     unsourced = [path for path, q in numbers if q.source is None]
-    out.print(f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators")
+    out.print(
+        f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators"
+    )
     for limit in model.limits:
         low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
         out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
@@ -129,8 +141,12 @@ def bode(
     signal_ = model.signals["pose"]
     pairs = [part.partition("=") for part in at.split(",") if part.strip()]
     if any(not value for _, _, value in pairs):
-        raise InputError("--at", [Fault(at, "write channel=value, separated by commas, such as delta_x=5um,delta_z=20um")])
-    pose = Frame(signal_.channels, signal_.units).point({name.strip(): value.strip() for name, _, value in pairs}, "--at")
+        raise InputError(
+            "--at", [Fault(at, "write channel=value, separated by commas, such as delta_x=5um,delta_z=20um")]
+        )
+    pose = Frame(signal_.channels, signal_.units).point(
+        {name.strip(): value.strip() for name, _, value in pairs}, "--at"
+    )
     if picture.suffix not in (".svg", ".png"):
         raise InputError("--out", [Fault(str(picture), "must end in .svg or .png")])
     draw_bode(model, pose, picture)
@@ -143,12 +159,19 @@ def _print_solution(outcome: job.Outcome) -> None:
     scenario = solution.scenario
     rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
     out.print(f"[bold]{scenario.file.title}[/bold]", soft_wrap=True)
-    out.print(f"{len(solution.command)} samples {rate}, {solution.model.device.title}, IPOPT {solution.iterations} iterations", soft_wrap=True)
-    table = _table(("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right"))
+    out.print(
+        f"{len(solution.command)} samples {rate}, {solution.model.device.title}, IPOPT {solution.iterations} iterations",
+        soft_wrap=True,
+    )
+    table = _table(
+        ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
+    )
     for margin in solution.margins:
         unit, tightest = margin.limit.unit, margin is solution.tightest
         share = "" if margin.share is None else f"{100 * margin.share:.1f} %"
-        where = f"{margin.channel}, " + (f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}")
+        where = f"{margin.channel}, " + (
+            f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
+        )
         row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
         table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
     out.print(table)
@@ -157,15 +180,18 @@ def _print_solution(outcome: job.Outcome) -> None:
         out.print(f"expected: {good} of {len(outcome.expected)} values in range")
     for e in outcome.expected:
         if not e.passed:
-            out.print(f"[red]  {e.value} = {in_unit(e.measured, e.unit):.7g} {e.unit}, expected {in_unit(e.low, e.unit):.7g} ... {in_unit(e.high, e.unit):.7g}[/red]")
+            measured, low, high = (f"{in_unit(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
+            out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
 
 
 def _print_comparison(outcome: job.Outcome) -> None:
     """One line per arithmetic and comparison."""
     if outcome.comparison is None or outcome.c is None:
         return
-    comparison = outcome.comparison
-    out.print(f"[bold]generated C[/bold], built strictly with {', '.join(comparison.compilers)}; {outcome.c.operations} operations a sample, {outcome.c.worst_operations} at most", soft_wrap=True)
+    comparison, c = outcome.comparison, outcome.c
+    tools = ", ".join(comparison.compilers)
+    cost = f"{c.operations} operations a sample, {c.worst_operations} at most"
+    out.print(f"[bold]generated C[/bold], built strictly with {tools}; {cost}", soft_wrap=True)
     for missing in comparison.missing:
         out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
     table = _table(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
@@ -173,8 +199,16 @@ def _print_comparison(outcome: job.Outcome) -> None:
         if row["passed"] and row["what"].endswith("CasADi"):
             continue
         unit = "" if row["unit"] == "1" else f" {row['unit']}"
-        verdict = "[green]ok[/green]" if row["passed"] else f"[red]OUT from sample {row['first']} ({row['build']})[/red]"
-        table.add_row(row["real"], f"{row['what']}, {row['signal']}", f"{row['worst']:.2g}{unit}", f"{row['limit']:.2g}{unit}", verdict)
+        verdict = (
+            "[green]ok[/green]" if row["passed"] else f"[red]OUT from sample {row['first']} ({row['build']})[/red]"
+        )
+        table.add_row(
+            row["real"],
+            f"{row['what']}, {row['signal']}",
+            f"{row['worst']:.2g}{unit}",
+            f"{row['limit']:.2g}{unit}",
+            verdict,
+        )
     out.print(table)
     good = sum(row.passed for row in comparison.rows)
     out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
@@ -207,7 +241,7 @@ def main() -> None:
     """Entry point: one clear message and a non-zero status for everything that can go wrong."""
     signal.signal(signal.SIGTERM, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     try:
-        status = app(standalone_mode=False)
+        status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
     except Unreachable as error:
         err.print("[bold red]unreachable[/bold red]: ", end="")
         err.print(str(error), markup=False, soft_wrap=True)
@@ -216,11 +250,7 @@ def main() -> None:
         err.print("[bold red]error[/bold red]: ", end="")
         err.print(str(error), markup=False, soft_wrap=True)
         status = 1
-    except KeyboardInterrupt:
-        err.print("interrupted; nothing was written")
-        status = 130
-    except typer.Abort:
-        err.print("interrupted; nothing was written")
+    except (KeyboardInterrupt, typer.Abort):
         status = 130
     except OSError as error:
         err.print(f"error: {error.strerror}: {error.filename}", markup=False, soft_wrap=True)
@@ -232,6 +262,8 @@ def main() -> None:
         err.print(f"error: {error.format_message()}", markup=False, soft_wrap=True)
         err.print(f"try: {context.command_path if context else 'ctrlgen'} --help", markup=False)
         status = 2
+    if status == 130:
+        err.print("interrupted; nothing was written")
     sys.exit(status if isinstance(status, int) else 0)
 
 

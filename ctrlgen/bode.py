@@ -11,10 +11,9 @@ import numpy as np
 
 from ctrlgen.figures import COLOURS, STYLE
 from ctrlgen.files import write_bytes
-from ctrlgen.linearise import linearise
+from ctrlgen.linearisation import linearise
 from ctrlgen.model import Model
 from ctrlgen.units import from_si
-
 
 LINES = ("-", "--")  # X and Y drives of a stage often coincide
 
@@ -42,8 +41,12 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
         for j, axis in enumerate(drive.channels):
             i = int(np.argmax(response.magnitude[:, j, 0] / np.array(signal.scale)))
             phase = np.degrees(np.unwrap(np.angle(response.complex[i, j] / system.dcgain()[i, j])))
-            grid["phase"].semilogx(hertz, phase, LINES[j % 2], color=COLOURS[j % 6], lw=1.3, label=f"{axis} -> {signal.channels[i]}")
-        grid["phase"].set_title("phase against the static response, strongest component of each drive [deg]", fontsize=9)
+            grid["phase"].semilogx(
+                hertz, phase, LINES[j % 2], color=COLOURS[j % 6], lw=1.3, label=f"{axis} -> {signal.channels[i]}"
+            )
+        grid["phase"].set_title(
+            "phase against the static response, strongest component of each drive [deg]", fontsize=9
+        )
         grid["phase"].set_xlabel("frequency [Hz]")
         grid["phase"].legend(ncols=3, fontsize=8)
         grid["a"].legend(ncols=3, fontsize=7)

@@ -13,7 +13,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ctrlgen.invert import Inverse, invert
+from ctrlgen.inverse import Inverse, invert
 from ctrlgen.model import Limit, Model
 
 RELATIVE_SLACK = 1e-5  # of a signal's typical size (0.1 nm, 1 mK): what a limit may be missed by before it is reported

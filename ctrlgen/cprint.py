@@ -43,7 +43,9 @@ class Real(Enum):
             with np.errstate(over="ignore", under="ignore"):
                 single = np.float32(value)
             if not np.isfinite(single) or (value != 0 and abs(single) < np.finfo(np.float32).tiny):
-                raise CtrlgenError(f"the constant {value:g} does not fit a float; rescale the model or export double only")
+                raise CtrlgenError(
+                    f"the constant {value:g} does not fit a float; rescale the model or export double only"
+                )
             text = str(single)
         if "." not in text and "e" not in text:
             text += ".0"
@@ -107,7 +109,10 @@ def print_function(function: ca.Function, name: str, real: Real) -> Kernel:
     lines += [f"    result[{i}] = {text};" for i, text in sorted(results)]
     arguments = tuple(function.name_in(i) for i in range(function.n_in()) if i in used)
     parameters = ", ".join(
-        [*(f"const {real.value} {a}[{function.size1_in(a)}]" for a in arguments), f"{real.value} result[{function.size1_out(0)}]"]
+        [
+            *(f"const {real.value} {a}[{function.size1_in(a)}]" for a in arguments),
+            f"{real.value} result[{function.size1_out(0)}]",
+        ]
     )
     return Kernel(name, f"static void {name}({parameters})\n{{\n" + "\n".join(lines) + "\n}\n", arguments, operations)
 
@@ -135,7 +140,8 @@ def _expression(op: int, a: list[str], real: Real) -> str:
         ca.OP_FMIN: "({0} < {1}) ? {0} : {1}", ca.OP_FMAX: "({0} > {1}) ? {0} : {1}", ca.OP_FABS: f"({{0}} < {zero}) ? -{{0}} : {{0}}",
         ca.OP_SIGN: f"({{0}} > {zero}) ? {one} : (({{0}} < {zero}) ? -{one} : {zero})",
         ca.OP_IF_ELSE_ZERO: f"({{0}} != {zero}) ? {{1}} : {zero}", ca.OP_NOT: f"({{0}} != {zero}) ? {zero} : {one}",
-        ca.OP_AND: f"(({{0}} != {zero}) && ({{1}} != {zero})) ? {one} : {zero}", ca.OP_OR: f"(({{0}} != {zero}) || ({{1}} != {zero})) ? {one} : {zero}",
+        ca.OP_AND: f"(({{0}} != {zero}) && ({{1}} != {zero})) ? {one} : {zero}",
+        ca.OP_OR: f"(({{0}} != {zero}) || ({{1}} != {zero})) ? {one} : {zero}",
     }  # fmt: skip
     if op not in forms:
         raise CtrlgenError(f"CasADi operation {op} has no C99 form here; add it to ctrlgen/cprint.py")

@@ -100,23 +100,31 @@ class Effect:
             raise ValueError(f"kind = {kind!r} is not an effect I know: {', '.join(sorted(Effect.library))}")
         chosen = Effect.library[kind]
         names = [p.name for p in chosen.params]
-        faults = [f"unknown key {key!r} (has: at, {', '.join(names)})" for key in given if key not in {"kind", "at", *names}]
+        faults = [
+            f"unknown key {key!r} (has: at, {', '.join(names)})" for key in given if key not in {"kind", "at", *names}
+        ]
         at = given.get("at")
         if not isinstance(at, str):
             faults.append(f'at is missing: name the {chosen.place.value} channel, such as at = "1X", or "all"')
         values = {}
         for param in chosen.params:
             if param.name not in given:
-                faults.append(f'{param.name} is missing ({param.doc}); write for example {param.name} = "{param.bounds[1]:g} {param.unit}"')
+                faults.append(
+                    f'{param.name} is missing ({param.doc}); write for example {param.name} = "{param.bounds[1]:g} {param.unit}"'
+                )
                 continue
-            low, high = (parse(f"{bound!r} {'' if param.unit == '1' else param.unit}", param.unit) for bound in param.bounds)
+            low, high = (
+                parse(f"{bound!r} {'' if param.unit == '1' else param.unit}", param.unit) for bound in param.bounds
+            )
             try:
                 values[param.name] = _read_quantity(param.unit, given[param.name])
             except ValueError as error:
                 faults.append(f"{param.name}: {error}")
                 continue
             if not low <= values[param.name].si <= high:
-                faults.append(f"{param.name} = {values[param.name].text} is outside {show(low, param.unit)} ... {show(high, param.unit)}")
+                faults.append(
+                    f"{param.name} = {values[param.name].text} is outside {show(low, param.unit)} ... {show(high, param.unit)}"
+                )
         if faults:
             raise ValueError(f"{kind}: " + "; ".join(faults))
         return chosen(str(at), values)

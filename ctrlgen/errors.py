@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ctrlgen.solve import Shortfall
+    from ctrlgen.shortfall import Shortfall
 
 
 class CtrlgenError(Exception):

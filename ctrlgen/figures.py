@@ -14,13 +14,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ctrlgen.measures import force_parts
-from ctrlgen.solve import REACHED, Solution
+from ctrlgen.shortfall import REACHED
+from ctrlgen.solution import Solution
 from ctrlgen.units import from_si
 
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")  # colour-blind safe, a pair per stage
 STYLE = {
     "font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
-    "grid.color": "#e6e6e6", "axes.edgecolor": "#666666", "axes.axisbelow": True, "svg.fonttype": "none", "svg.hashsalt": "ctrlgen", "legend.frameon": False,
+    "grid.color": "#e6e6e6", "axes.edgecolor": "#666666", "axes.axisbelow": True, "legend.frameon": False,
+    "svg.fonttype": "none", "svg.hashsalt": "ctrlgen",
     "figure.constrained_layout.use": True,
 }  # fmt: skip
 
@@ -59,16 +61,31 @@ def draw_path(solution: Solution) -> Figure:
     first, second = sorted(sorted(lengths, key=lambda i: -np.ptp(command[:, i]))[:2])
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.9), width_ratios=(1, 1.15))
     x, y = (from_si(command[:, i], "um") for i in (first, second))
-    left.plot(np.append(x, x[0]) if solution.scenario.closed else x, np.append(y, y[0]) if solution.scenario.closed else y, color="#999999", lw=3, label="commanded")
+    left.plot(
+        np.append(x, x[0]) if solution.scenario.closed else x,
+        np.append(y, y[0]) if solution.scenario.closed else y,
+        color="#999999",
+        lw=3,
+        label="commanded",
+    )
     step = max(1, len(command) // 40)
-    left.plot(from_si(reached[::step, first], "um"), from_si(reached[::step, second], "um"), ".", ms=5, color=COLOURS[2], label="modelled")
+    left.plot(
+        from_si(reached[::step, first], "um"),
+        from_si(reached[::step, second], "um"),
+        ".",
+        ms=5,
+        color=COLOURS[2],
+        label="modelled",
+    )
     left.set_aspect("equal", adjustable="datalim")
     left.set_xlabel(f"{signal.channels[first]} [um]")
     left.set_ylabel(f"{signal.channels[second]} [um]")
     left.legend(loc="center", fontsize=8)
     time, tolerance = solution.trace.time, from_si(REACHED * signal.scale[lengths[0]], "nm")
     for i, colour in zip(lengths, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
-        right.plot(time, from_si(reached[:, i] - command[:, i], "um") * 1e3, color=colour, lw=1, label=signal.channels[i])
+        right.plot(
+            time, from_si(reached[:, i] - command[:, i], "um") * 1e3, color=colour, lw=1, label=signal.channels[i]
+        )
     right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0)
     span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
     right.set_ylim(-span, span)
@@ -87,7 +104,15 @@ def draw_signal(solution: Solution, role: str) -> Figure:
     figure, axes = plt.subplots(figsize=(8.2, 3.2))
     horizontal = np.arange(len(values)) if static else solution.trace.time
     for i, channel in enumerate(signal.channels):
-        axes.plot(horizontal, from_si(values[:, i], signal.units[i]), "o-" if static else "-", ms=4, lw=1.3, color=COLOURS[i % 6], label=channel)
+        axes.plot(
+            horizontal,
+            from_si(values[:, i], signal.units[i]),
+            "o-" if static else "-",
+            ms=4,
+            lw=1.3,
+            color=COLOURS[i % 6],
+            label=channel,
+        )
     axes.set_xlabel("sample" if static else "time [s]")
     if static:
         axes.xaxis.get_major_locator().set_params(integer=True)
@@ -105,7 +130,13 @@ def draw_margins(solution: Solution) -> Figure:
         axes.barh(row, share, color=COLOURS[2] if margin is solution.tightest else COLOURS[0], height=0.6)
         unit = margin.limit.unit
         value, bound = from_si(margin.value, unit), from_si(margin.bound, unit)
-        axes.text(share + 1, row, f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}", va="center", fontsize=8)
+        axes.text(
+            share + 1,
+            row,
+            f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}",
+            va="center",
+            fontsize=8,
+        )
     axes.set_yticks(range(len(shown)), [m.limit.label for m in shown])
     axes.invert_yaxis()
     axes.set_xlim(0, 150)
@@ -120,8 +151,17 @@ def draw_stage_force(solution: Solution) -> Figure:
     axis = int(np.argmax(np.ptp(values, axis=0)))
     parts = force_parts(solution)
     figure, axes = plt.subplots(figsize=(6.2, 3.6))
-    axes.plot(values[:, axis], parts["linear"][:, axis], "s--", ms=4, color=COLOURS[0], label="linear force, S1 eq. (9)")
-    axes.plot(values[:, axis], solution.trace.signals["force"][:, axis], "o-", ms=4, color=COLOURS[2], label="linear + nonlinear, S1 eq. (12)")
+    axes.plot(
+        values[:, axis], parts["linear"][:, axis], "s--", ms=4, color=COLOURS[0], label="linear force, S1 eq. (9)"
+    )
+    axes.plot(
+        values[:, axis],
+        solution.trace.signals["force"][:, axis],
+        "o-",
+        ms=4,
+        color=COLOURS[2],
+        label="linear + nonlinear, S1 eq. (12)",
+    )
     axes.set_xlabel(f"displacement {solution.model.axes[axis]} [um]")
     axes.set_ylabel("force on the actuator bar [N]")
     axes.legend()

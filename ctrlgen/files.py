@@ -60,7 +60,9 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
     elif details["type"] == "extra_forbidden":
         siblings = _keys(model, location[:-1])
         near = difflib.get_close_matches(str(location[-1]), siblings, n=1)
-        message = "is not a key I know; " + (f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(siblings)}")
+        message = "is not a key I know; " + (
+            f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(siblings)}"
+        )
     elif details["type"] == "literal_error":
         message = f"{details['input']!r} must be {details['ctx']['expected']}"
     return Fault(where or "file", message)
@@ -112,7 +114,9 @@ def whole_folder(out: Path) -> Iterator[Path]:
         out.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
     except OSError as error:
-        raise InputError(out, [Fault("--out", f"cannot be written ({error.strerror}); name a folder you may write")]) from None
+        raise InputError(
+            out, [Fault("--out", f"cannot be written ({error.strerror}); name a folder you may write")]
+        ) from None
     try:
         yield draft
         (draft / MARKER).write_text("a result of ctrlgen; the next run with the same --out replaces this folder\n")

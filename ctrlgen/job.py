@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ctrlgen import report
-from ctrlgen.compare import Comparison, compare, find_compilers
+from ctrlgen.comparison import Comparison, compare, find_compilers
 from ctrlgen.files import whole_folder
-from ctrlgen.generate import CFolder, generate
+from ctrlgen.firmware import CFolder, generate
 from ctrlgen.measures import Expected, expectations
 from ctrlgen.model import build_model
 from ctrlgen.scenario import Scenario, load_scenario
-from ctrlgen.solve import Solution, solve
+from ctrlgen.solution import Solution, solve
 
 Progress = Callable[[str], None]
 STAGES = 8  # calls of `progress` in `run`: model, solve, C, four builds, report

@@ -10,7 +10,7 @@ import numpy as np
 
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.scenario import FILE
-from ctrlgen.solve import Solution
+from ctrlgen.solution import Solution
 from ctrlgen.units import from_si, parse
 
 _NAME = re.compile(r"^(\w+)\.(\w+)(?:\.(min|max|rms)|\[(\d+)\])?$")
@@ -59,7 +59,10 @@ def measure(solution: Solution, name: str) -> tuple[float, str]:
         unit = found[0].limit.unit
         return found[0].distance, "delta_degC" if unit == "degC" else unit
     followed = solution.scenario.file.follow
-    tables = {("temperature" if role == "state" else role): (signal, solution.trace.signals[role]) for role, signal in m.signals.items()}
+    tables = {
+        ("temperature" if role == "state" else role): (signal, solution.trace.signals[role])
+        for role, signal in m.signals.items()
+    }
     tables |= {f"force_{part}": (m.signals["force"], table) for part, table in force_parts(solution).items()}
     tables["error"] = (m.signals[followed], solution.trace.signals[followed] - solution.command)
     if group not in tables:

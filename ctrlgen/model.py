@@ -98,11 +98,18 @@ class Model:
             rate = ca.diag(A)
             gain = ca.vertcat(*(_phi_1(rate[i], h) for i in range(self.x.numel())))
             return self.x + gain * self.rates
-        norm = float(ca.norm_inf(ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal)))
+        norm = float(
+            ca.norm_inf(ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal))
+        )
         if h * norm > 1:
             raise InputError(
                 self.name,
-                [Fault("sample time", f"{h:g} s is too long for the fastest coupled state; use {1 / norm:.2g} s or less")],
+                [
+                    Fault(
+                        "sample time",
+                        f"{h:g} s is too long for the fastest coupled state; use {1 / norm:.2g} s or less",
+                    )
+                ],
             )
         term = total = h * self.rates
         for order in range(2, 13):
@@ -169,7 +176,9 @@ def build_model(device: Device, free: Sequence[str] = ()) -> Model:
     p = device.values(symbols)
     links = device.links(p)
     chain = _Chain(device, links, p)
-    return chain.model(ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1), np.array([nominal[path].si for path in free]))
+    return chain.model(
+        ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1), np.array([nominal[path].si for path in free])
+    )
 
 
 class _Chain:
@@ -184,13 +193,22 @@ class _Chain:
         faults = []
         for effect, values, k in self.effects:
             channels, units = self._channels(effect.place)
-            chosen = range(len(channels)) if effect.at == "all" else [i for i, c in enumerate(channels) if c == effect.at]
+            chosen = (
+                range(len(channels)) if effect.at == "all" else [i for i, c in enumerate(channels) if c == effect.at]
+            )
             if not chosen:
                 faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(channels)}, all"))
             for i in chosen:
                 if effect.channel_unit and not same_dimension(effect.channel_unit, units[i]):
-                    faults.append(Fault(f"effect[{k}].at", f"{effect.kind} acts in {effect.channel_unit}, but {channels[i]} is in {units[i]}"))
-                states = {state.name: ca.SX.sym(f"{effect.kind}_{k}_{state.name}_{channels[i]}") for state in effect.states}
+                    faults.append(
+                        Fault(
+                            f"effect[{k}].at",
+                            f"{effect.kind} acts in {effect.channel_unit}, but {channels[i]} is in {units[i]}",
+                        )
+                    )
+                states = {
+                    state.name: ca.SX.sym(f"{effect.kind}_{k}_{state.name}_{channels[i]}") for state in effect.states
+                }
                 self.members.append((effect, values, i, states))
                 names += [symbol.name() for symbol in states.values()]
                 scales += [state.scale for state in effect.states]
@@ -241,7 +259,9 @@ class _Chain:
             Signal("force", "actuator force", axes, ("N",) * n, "F_", actuator_force, force_scale),
             Signal("displacement", "stage displacement", axes, ("um",) * n, "d_", displacement, displacement_scale),
             Signal("pose", "platform pose", links.components, links.pose_units, "", pose, links.pose_scale),
-            Signal("reading", "sensor reading", links.components, links.pose_units, "reading_", reading, links.pose_scale),
+            Signal(
+                "reading", "sensor reading", links.components, links.pose_units, "reading_", reading, links.pose_scale
+            ),
         ]
         named = SimpleNamespace(drive=u, state=T, force=actuator_force, displacement=z)
         return Model(
@@ -255,7 +275,9 @@ class _Chain:
             x_names=tuple(f"{links.state.name}_{axis}" for axis in axes) + self.memory_names,
             rates=ca.vertcat(rates, memory_rates),
             balance=force - links.stage_force(z),
-            signals=dict(zip(("drive", "power", "state", "force", "displacement", "pose", "reading"), signals, strict=True)),
+            signals=dict(
+                zip(("drive", "power", "state", "force", "displacement", "pose", "reading"), signals, strict=True)
+            ),
             force_parts=links.stage_force_parts(z),
             limits=tuple(links.limits(named)),
             rest=np.concatenate([np.array([float(v) for v in links.rest]), np.zeros(len(self.memory_scales))]),

@@ -53,7 +53,9 @@ class Frame:
         """Unit vectors of the named channels, (n, channels). Raises InputError for unknown or mixed units."""
         for name in names:
             if name not in self.channels:
-                raise InputError("path", [Fault(where, f"{name!r} is not a channel; known: {', '.join(self.channels)}")])
+                raise InputError(
+                    "path", [Fault(where, f"{name!r} is not a channel; known: {', '.join(self.channels)}")]
+                )
         if len(set(names)) != len(names):
             raise InputError("path", [Fault(where, "names the same channel twice")])
         rows = np.eye(len(self.channels))[[self.channels.index(name) for name in names]]
@@ -94,7 +96,9 @@ class Circle(Path_):
         angle = 2 * np.pi * self.turns * np.arange(n) / n
         first, second = frame.directions(self.plane, "plane")
         radius = self.diameter.si / 2
-        return frame.point(self.centre, "centre") + radius * (np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second))
+        return frame.point(self.centre, "centre") + radius * (
+            np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second)
+        )
 
 
 class Line(Path_):
@@ -151,7 +155,11 @@ class Spiral(Path_):
         s = minimum_jerk(np.linspace(0, 1, n))
         first, second = frame.directions(self.plane, "plane")
         radius, angle = self.diameter.si / 2 * s, 2 * np.pi * self.turns * s
-        return frame.point(self.centre, "centre") + np.outer(radius * np.cos(angle), first) + np.outer(radius * np.sin(angle), second)
+        return (
+            frame.point(self.centre, "centre")
+            + np.outer(radius * np.cos(angle), first)
+            + np.outer(radius * np.sin(angle), second)
+        )
 
 
 class Lissajous(Path_):
@@ -214,13 +222,17 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
         name, _, unit = text.strip().partition("[")
         name, unit = name.strip(), unit.rstrip("] ").strip()
         if name not in frame.channels:
-            faults.append(Fault("line 1", f"column {text.strip()!r} is not a channel; known: {', '.join(frame.channels)}"))
+            faults.append(
+                Fault("line 1", f"column {text.strip()!r} is not a channel; known: {', '.join(frame.channels)}")
+            )
             continue
         index = frame.channels.index(name)
         try:
             parse(f"0 {unit}", frame.units[index])
         except ValueError:
-            faults.append(Fault("line 1", f'column {text.strip()!r} needs a unit; write "{name} [{frame.units[index]}]"'))
+            faults.append(
+                Fault("line 1", f'column {text.strip()!r} needs a unit; write "{name} [{frame.units[index]}]"')
+            )
         columns.append((index, unit, name))
     if faults:
         raise InputError(path, faults)
@@ -233,9 +245,11 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
             try:
                 values[k, index] = parse(f"{cell.strip()} {unit}", frame.units[index])
             except ValueError:
-                faults.append(Fault(f"line {line}, {name}", f"{cell.strip()!r} is not a finite number; write one or remove the row"))
+                faults.append(
+                    Fault(
+                        f"line {line}, {name}", f"{cell.strip()!r} is not a finite number; write one or remove the row"
+                    )
+                )
     if faults:
         raise InputError(path, faults[:20] + ([Fault("…", f"and {len(faults) - 20} more")] if len(faults) > 20 else []))
     return values
-
-

@@ -13,12 +13,12 @@ import jinja2
 import numpy as np
 
 from ctrlgen._version import __version__
-from ctrlgen.compare import Comparison
+from ctrlgen.comparison import Comparison
 from ctrlgen.figures import draw_all
 from ctrlgen.files import write_text
-from ctrlgen.generate import CFolder, codegen_folder
+from ctrlgen.firmware import CFolder, codegen_folder
 from ctrlgen.measures import Expected, in_unit
-from ctrlgen.solve import Margin, Solution
+from ctrlgen.solution import Margin, Solution
 from ctrlgen.units import from_si
 
 CSV_SIGNALS = ("pose", "displacement", "force", "state", "power")
@@ -30,7 +30,10 @@ def write_trajectory(solution: Solution, path: Path) -> None:
     Row k holds the state at time k and the power that acts from there to the next row. A device driven
     in volts has its voltage columns last.
     """
-    roles = [*CSV_SIGNALS, *(["drive"] if solution.model.signals["drive"].columns != solution.model.signals["power"].columns else [])]
+    roles = [
+        *CSV_SIGNALS,
+        *(["drive"] if solution.model.signals["drive"].columns != solution.model.signals["power"].columns else []),
+    ]
     header, columns = ["time [s]"], [solution.trace.time[:, None]]
     for role in roles:
         signal = solution.model.signals[role]
@@ -65,7 +68,8 @@ def summary(
         "ipopt_iterations": solution.iterations,
         "limits_added": list(solution.rows_added),
         "tracking_error": {
-            f"{c_} [{u}]": float(from_si(np.abs(error[:, i]).max(), u)) for i, (c_, u) in enumerate(zip(signal.channels, signal.units, strict=True))
+            f"{channel} [{unit}]": float(from_si(np.abs(error[:, i]).max(), unit))
+            for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
         },
         "margins": [_margin(m, solution) for m in solution.margins],
         "tightest": solution.tightest.limit.name,
@@ -113,7 +117,9 @@ def worst_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return table
 
 
-def write_report(out: Path, solution: Solution, comparison: Comparison | None, expected: tuple[Expected, ...], c: CFolder | None) -> None:
+def write_report(
+    out: Path, solution: Solution, comparison: Comparison | None, expected: tuple[Expected, ...], c: CFolder | None
+) -> None:
     """Everything a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html."""
     result = summary(solution, comparison, expected, c)
     write_text(out / "summary.json", json.dumps(result, indent=1) + "\n")

@@ -46,9 +46,13 @@ class ScenarioFile(Section):
     def _timing(self) -> ScenarioFile:
         if self.sample_rate is None:
             if self.duration is not None:
-                raise ValueError("duration without sample_rate; add sample_rate, or leave both out for a static scenario")
+                raise ValueError(
+                    "duration without sample_rate; add sample_rate, or leave both out for a static scenario"
+                )
             if self.points is None and not isinstance(self.path, Poses):
-                raise ValueError('a static scenario needs points = N; for motion in time give sample_rate = "1 kHz" and duration')
+                raise ValueError(
+                    'a static scenario needs points = N; for motion in time give sample_rate = "1 kHz" and duration'
+                )
         elif isinstance(self.path, Poses):
             if self.duration is not None or self.points is not None:
                 raise ValueError("a list of poses fixes the number of samples; leave out duration and points")
@@ -88,7 +92,9 @@ class Scenario:
         if self.file.sample_rate and self.file.duration:
             n = round(self.file.sample_rate.si * self.file.duration.si)
             if not 2 <= n <= 1_000_000:
-                raise InputError(self.folder / FILE, [Fault("duration", f"gives {n} samples; 2 to 1000000 are possible")])
+                raise InputError(
+                    self.folder / FILE, [Fault("duration", f"gives {n} samples; 2 to 1000000 are possible")]
+                )
         try:
             return path.samples(frame, n)
         except InputError as error:

@@ -89,7 +89,9 @@ def parse(text: object, unit: str) -> float:
         if written == "":
             raise ValueError(f'{text!r} has no unit; write for example "{value:g} {unit}"')
         hint = f'"{value:g} {unit}"' if unit != "1" else f'"{value:g}" without a unit'
-        raise ValueError(f"{text!r} has the wrong unit: {unit if unit != '1' else 'a plain number'} is needed, for example {hint}")
+        raise ValueError(
+            f"{text!r} has the wrong unit: {unit if unit != '1' else 'a plain number'} is needed, for example {hint}"
+        )
     return to_si(value, written)
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-
 from conftest import ROOT, SCENARIOS
+
 from ctrlgen import Controller, CtrlgenError, build_model, load_scenario
-from ctrlgen.compare import FLAGS
+from ctrlgen.comparison import FLAGS
 from ctrlgen.cprint import Real, print_function
-from ctrlgen.generate import generate
+from ctrlgen.firmware import generate
 
 GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"
 NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")
@@ -29,7 +29,9 @@ def folder(tmp_path_factory, circle):
 
 
 def build(compiler: str, sources: list[Path], out: Path, *more: str) -> None:
-    done = subprocess.run([compiler, *FLAGS, *more, *map(str, sources), "-lm", "-o", str(out)], capture_output=True, text=True)
+    done = subprocess.run(
+        [compiler, *FLAGS, *more, *map(str, sources), "-lm", "-o", str(out)], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -78,8 +80,12 @@ def test_no_heap_no_globals_no_recursion_no_unbounded_loops(folder, compiler, tm
     for names in (folder.online, folder.player):
         for real, name in names.items():
             text = (folder.path / f"{name}.c").read_text()
-            assert not re.search(r"\b(malloc|calloc|realloc|free|while|goto|do)\b", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))
-            assert all(re.fullmatch(r"\w+ = 0; \w+ < \d+; \w+\+\+", loop) for loop in re.findall(r"for \((.*?)\)", text))
+            assert not re.search(
+                r"\b(malloc|calloc|realloc|free|while|goto|do)\b", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+            )
+            assert all(
+                re.fullmatch(r"\w+ = 0; \w+ < \d+; \w+\+\+", loop) for loop in re.findall(r"for \((.*?)\)", text)
+            )
             build(compiler, [folder.path / f"{name}.c"], tmp_path / "o.o", "-c")
             if shutil.which("nm"):
                 table = subprocess.run(["nm", str(tmp_path / "o.o")], capture_output=True, text=True, check=True).stdout
@@ -107,25 +113,48 @@ def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):
     """CasADi's generator and ours from the same graph: equal bit for bit in double."""
     controller = Controller(circle.model, "pose", 1e-3)
     generator = ca.CodeGenerator("reference.c")
-    kernels = [getattr(controller.moving, part) for part in ("displacement", "state", "drive", "advance")] + [controller.composite_ratio]
+    kernels = [getattr(controller.moving, part) for part in ("displacement", "state", "drive", "advance")] + [
+        controller.composite_ratio
+    ]
     for kernel in kernels:
         generator.add(kernel)
     generator.generate(f"{tmp_path}/")
-    subprocess.run([compiler, "-O1", "-shared", "-fPIC", str(tmp_path / "reference.c"), "-lm", "-o", str(tmp_path / "reference.so")], check=True)
+    subprocess.run(
+        [
+            compiler,
+            "-O1",
+            "-shared",
+            "-fPIC",
+            str(tmp_path / "reference.c"),
+            "-lm",
+            "-o",
+            str(tmp_path / "reference.so"),
+        ],
+        check=True,
+    )
     rng = np.random.default_rng(3)
     for kernel in kernels:
         ours = print_function(kernel, "ours", Real.DOUBLE)
-        inputs = [rng.uniform(0.2, 0.9, kernel.size1_in(i)) * (300 if kernel.name_in(i) in ("x", "state") else 4e-5) for i in range(kernel.n_in())]
+        inputs = [
+            rng.uniform(0.2, 0.9, kernel.size1_in(i)) * (300 if kernel.name_in(i) in ("x", "state") else 4e-5)
+            for i in range(kernel.n_in())
+        ]
         main = "#include <stdio.h>\n#include <math.h>\n" + ours.text + "int main(void) {\n"
         for i in range(kernel.n_in()):
             if kernel.name_in(i) in ours.arguments:
-                main += f"static const double {kernel.name_in(i)}[] = {{{', '.join(repr(float(v)) for v in inputs[i])}}};\n"
+                main += (
+                    f"static const double {kernel.name_in(i)}[] = {{{', '.join(repr(float(v)) for v in inputs[i])}}};\n"
+                )
         size = kernel.size1_out(0)
         main += f"double result[{size}]; {ours.call('result', **{a: a for a in ours.arguments})}; int i;\n"
         main += f'for (i = 0; i < {size}; i++) (void)printf("%.17g\\n", result[i]); return 0; }}\n'
         (tmp_path / "ours.c").write_text(main)
-        subprocess.run([compiler, "-std=c99", "-O1", str(tmp_path / "ours.c"), "-lm", "-o", str(tmp_path / "ours")], check=True)
-        printed = np.array(subprocess.run([tmp_path / "ours"], capture_output=True, text=True, check=True).stdout.split(), dtype=float)
+        subprocess.run(
+            [compiler, "-std=c99", "-O1", str(tmp_path / "ours.c"), "-lm", "-o", str(tmp_path / "ours")], check=True
+        )
+        printed = np.array(
+            subprocess.run([tmp_path / "ours"], capture_output=True, text=True, check=True).stdout.split(), dtype=float
+        )
         theirs = ca.external(kernel.name(), str(tmp_path / "reference.so"))(*inputs).full().ravel()
         assert printed == pytest.approx(theirs, rel=1e-14), kernel.name()  # both compilers may fold a constant once
 
@@ -135,8 +164,10 @@ def test_every_operation_prints_what_casadi_computes(real, compiler, tmp_path):
     a, b = ca.SX.sym("a"), ca.SX.sym("b")
     expressions = ca.vertcat(
         a + b, a - b, a * b, a / b, -a, a * a, 2 * a, 1 / a, ca.fmin(a, b), ca.fmax(a, b), ca.fabs(-a), ca.sign(a - b), ca.sqrt(a),
-        ca.exp(a), ca.log(a), ca.sin(a), ca.cos(a), ca.tan(a), ca.asin(a / 4), ca.acos(a / 4), ca.atan(a), ca.tanh(a), a**2.5, ca.atan2(a, b),
-        a < b, a <= b, ca.eq(a, b), ca.ne(a, b), ca.logic_and(a, b), ca.logic_or(a, b), ca.logic_not(a), ca.if_else(a < b, a, b), ca.floor(a),
+        ca.exp(a), ca.log(a), ca.sin(a), ca.cos(a), ca.tan(a), ca.asin(a / 4), ca.acos(a / 4), ca.atan(a), ca.tanh(a), a**2.5,
+        ca.atan2(a, b),
+        a < b, a <= b, ca.eq(a, b), ca.ne(a, b), ca.logic_and(a, b), ca.logic_or(a, b), ca.logic_not(a), 
+        ca.if_else(a < b, a, b), ca.floor(a),
         ca.ceil(a), 0 * b + 3.25, ca.sinh(a), ca.cosh(a), a**b,
     )  # fmt: skip
     f = ca.Function("f", [a, b], [expressions], ["a", "b"], ["r"])
@@ -147,7 +178,9 @@ def test_every_operation_prints_what_casadi_computes(real, compiler, tmp_path):
     text += f'for (i = 0; i < {n}; i++) {{ (void)printf("%.17g\\n", (double)r[i]); }} return 0; }}\n'
     (tmp_path / "f.c").write_text(text)
     build(compiler, [tmp_path / "f.c"], tmp_path / "f")
-    printed = np.array(subprocess.run([tmp_path / "f"], capture_output=True, text=True, check=True).stdout.split(), dtype=float)
+    printed = np.array(
+        subprocess.run([tmp_path / "f"], capture_output=True, text=True, check=True).stdout.split(), dtype=float
+    )
     expected = f(np.float32(1.3), np.float32(0.7)) if real is Real.FLOAT else f(1.3, 0.7)
     assert printed == pytest.approx(expected.full().ravel(), rel=1e-15 if real is Real.DOUBLE else 5e-7, abs=0)
 
@@ -155,7 +188,9 @@ def test_every_operation_prints_what_casadi_computes(real, compiler, tmp_path):
 def test_an_output_may_be_an_input(compiler, tmp_path):
     """All outputs are stored last, so state = f(state) is not read half new."""
     x = ca.SX.sym("x", 2)
-    kernel = print_function(ca.Function("swap", [x], [ca.vertcat(x[1], x[0] + x[1])], ["x"], ["r"]), "swap", Real.DOUBLE)
+    kernel = print_function(
+        ca.Function("swap", [x], [ca.vertcat(x[1], x[0] + x[1])], ["x"], ["r"]), "swap", Real.DOUBLE
+    )
     assert re.search(r"result\[0\] = x\[1\];\n    result\[1\] = t\d+;", kernel.text)
 
 
@@ -224,7 +259,11 @@ def test_headers_state_names_units_limits_and_provenance(folder, circle):
 def test_the_cmake_project_builds_and_its_test_passes(folder, tmp_path):
     if not shutil.which("cmake"):
         pytest.skip("cmake is missing: the generated CMake project was not built")
-    for command in (["cmake", "-S", folder.path, "-B", tmp_path], ["cmake", "--build", tmp_path], ["ctest", "--test-dir", tmp_path]):
+    for command in (
+        ["cmake", "-S", folder.path, "-B", tmp_path],
+        ["cmake", "--build", tmp_path],
+        ["ctest", "--test-dir", tmp_path],
+    ):
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
     assert "100% tests passed" in done.stdout

@@ -6,12 +6,12 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-
 from conftest import DEVICE
+
 from ctrlgen import Controller, Status, build_model, simulate
 from ctrlgen.devices import Device
 from ctrlgen.files import validate
-from ctrlgen.invert import _solve, _Values
+from ctrlgen.inverse import _solve, _Values
 
 NM, H = 1e-9, 1e-3
 
@@ -36,7 +36,11 @@ def solve_one(equations, unknowns, **at) -> ca.DM:
     """Roots of `equations` by the block solver, all symbols but the unknowns at given values."""
     others = ca.vertcat(*at.values()) if at else ca.SX(0, 1)
     n = unknowns.numel()
-    known = _Values(ca.vertcat(others, unknowns), np.concatenate([np.zeros(others.numel()), np.zeros(n)]), np.ones(others.numel() + n))
+    known = _Values(
+        ca.vertcat(others, unknowns),
+        np.concatenate([np.zeros(others.numel()), np.zeros(n)]),
+        np.ones(others.numel() + n),
+    )
     return ca.Function("f", [others], [_solve(known, equations, unknowns)])
 
 

@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import pytest
-
 from conftest import DEVICE
+
 from ctrlgen import InputError, build_model, load_device
 
 
@@ -28,10 +28,10 @@ def test_all_faults_are_listed_at_once_each_with_its_place_and_a_remedy(tmp_path
     found = faults(
         tmp_path,
         ('young             = { value = "130 GPa"', 'young             = { value = "130 N"'),
-        ('lever_short  ', 'lever_shrot  '),
+        ("lever_short  ", "lever_shrot  "),
         ('poisson            = { value = "0.28"', 'poisson            = { value = "0.7"'),
         ('wire_length        = { value = "0.08 mm"', 'wire_length        = { value = "-0.08 mm"'),
-        ('stroke               = { value = "55 um"', 'stroke               = { value = 55'),
+        ('stroke               = { value = "55 um"', "stroke               = { value = 55"),
         ('drive = "power"', 'drive = "current"'),
     )
     assert "wrong unit" in found["actuator.young"] and "GPa" in found["actuator.young"]
@@ -47,7 +47,10 @@ def test_all_faults_are_listed_at_once_each_with_its_place_and_a_remedy(tmp_path
 @pytest.mark.parametrize(
     ("edit", "says"),
     [
-        (('lever_short          = { value = "100 um"', 'lever_short          = { value = "1.5 mm"'), "lever multiplies"),
+        (
+            ('lever_short          = { value = "100 um"', 'lever_short          = { value = "1.5 mm"'),
+            "lever multiplies",
+        ),
         (('temperature_limit = { value = "550 degC"', 'temperature_limit = { value = "10 degC"'), "can only heat"),
         (('stroke               = { value = "55 um"', 'stroke               = { value = "1.2 mm"'), "asin"),
         (('wire_length        = { value = "0.08 mm"', 'wire_length        = { value = "3 mm"'), "two wires"),

@@ -3,12 +3,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from conftest import effect_device
 from scipy.linalg import expm
 
-from conftest import effect_device
 from ctrlgen import InputError, build_model, simulate
 from ctrlgen.devices.mems_hexapod import matrices
-from ctrlgen.linearise import equilibrium, linearise
+from ctrlgen.linearisation import equilibrium, linearise
 from ctrlgen.physics import thermal_actuator, xy_stage
 
 POSE = np.array([0, 0, 0, 5e-6, -3e-6, 20e-6])
@@ -97,7 +97,9 @@ def test_free_parameters_give_the_derivative_that_differences_give(device):
         h = np.zeros(len(paths))
         h[k] = 1e-4 * nominal
         difference = (value(x, z, model.p_nominal + h) - value(x, z, model.p_nominal - h)).full().ravel() / (2 * h[k])
-        assert exact[:, k] == pytest.approx(difference, rel=1e-5, abs=1e-6 * np.abs(difference).max())  # h^2, and 1e-11/h
+        assert exact[:, k] == pytest.approx(
+            difference, rel=1e-5, abs=1e-6 * np.abs(difference).max()
+        )  # h^2, and 1e-11/h
 
 
 def test_a_free_parameter_at_its_nominal_value_changes_nothing(device, model):
@@ -112,6 +114,7 @@ def test_a_voltage_drive_heats_with_its_square(device):
     import tomllib
 
     from conftest import DEVICE
+
     from ctrlgen.devices import Device
     from ctrlgen.files import validate
 

@@ -7,8 +7,8 @@ import json
 
 import numpy as np
 import pytest
-
 from conftest import SCENARIOS
+
 from ctrlgen import InputError, Unreachable, load_scenario, run
 from ctrlgen.measures import expectations, measure
 

@@ -47,7 +47,10 @@ def geometry(h: Any) -> Geometry:
     Printed B_z = -H would make the struts 5.077 mm long; H as the strut's vertical run gives the printed
     5.4 mm.
     """
-    A = [ca.mtimes(rotation_z(angle), ca.vertcat(h.platform_radius, 0, -h.platform_thickness)) for angle in h.platform_angles]
+    A = [
+        ca.mtimes(rotation_z(angle), ca.vertcat(h.platform_radius, 0, -h.platform_thickness))
+        for angle in h.platform_angles
+    ]
     depth = -(h.height + h.platform_thickness)
     B = [ca.mtimes(rotation_z(angle), ca.vertcat(h.base_radius, 0, depth)) for angle in h.base_angles]
     centre = []
@@ -193,7 +196,9 @@ def wire_stress(d: Matrix, loads: WireLoads, h: Any) -> Matrix:
     """
     section = ca.pi * h.wire_diameter**3 / 32
     floor = (1e-9 * h.stress_limit) ** 2
-    bending = ca.sqrt(ca.mtimes(loads.bending_y / section, d) ** 2 + ca.mtimes(loads.bending_z / section, d) ** 2 + floor)
+    bending = ca.sqrt(
+        ca.mtimes(loads.bending_y / section, d) ** 2 + ca.mtimes(loads.bending_z / section, d) ** 2 + floor
+    )
     axial = ca.fabs(ca.mtimes(loads.tension / (ca.pi * h.wire_diameter**2 / 4), d))
     shear_2 = 3 * ca.mtimes(loads.torque / (2 * section), d) ** 2
     strut = [i // 4 for i in range(24)]

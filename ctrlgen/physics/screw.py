@@ -55,9 +55,7 @@ def inverse_adjoint(rotation: Matrix | None = None, position: Sequence[Scalar] |
     """[Ad]^-1 in closed form: [[R', 0], [-R' D, R']], shape (6, 6)."""
     R = ca.DM.eye(3) if rotation is None else rotation
     d = position if isinstance(position, (ca.SX, ca.DM)) else ca.vertcat(*position)
-    return ca.vertcat(
-        ca.horzcat(R.T, ca.DM.zeros(3, 3)), ca.horzcat(-ca.mtimes(R.T, ca.skew(d)), R.T)
-    )
+    return ca.vertcat(ca.horzcat(R.T, ca.DM.zeros(3, 3)), ca.horzcat(-ca.mtimes(R.T, ca.skew(d)), R.T))
 
 
 def move(matrix: Matrix, rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:

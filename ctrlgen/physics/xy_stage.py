@@ -125,9 +125,7 @@ def axis_stiffness(s: Any, a: Any) -> Matrix:
     for side in (1, -1):  # the arm runs from (x, side (b + e_4)) to (x, side b)
         # In the arm's frame (x along the arm) the bar pushes along side y: the two blocks are mirror images.
         push = rotation_z(side * ca.pi / 2)
-        driven_root = inverse(
-            parallel((inverse(about_centre), move(inverse(drive), push, (s.lever_short, 0, 0))))
-        )
+        driven_root = inverse(parallel((inverse(about_centre), move(inverse(drive), push, (s.lever_short, 0, 0)))))
         toward_plate = rotation_z(-side * ca.pi / 2)
         for x, root in ((-s.plate_half_length, driven_root), (s.plate_half_length, about_centre)):
             blocks.append(move(_arm_stiffness(root, s, a), toward_plate, (x, side * s.plate_half_width, 0)))

@@ -31,7 +31,9 @@ def balance_solver(model: Model) -> ca.Function:
     """Newton's method for the displacement: (z_guess, x, u, p) -> z with balance(x, z, u, p) = 0."""
     scaled = ca.substitute(model.balance, model.z, model.z * model.z_scale) / model.force_scale
     problem = {"x": model.z, "p": ca.vertcat(model.x, model.u, model.p), "g": scaled}
-    newton = ca.rootfinder(f"{model.name}_balance", "newton", problem, {"abstol": 1e-14, "abstolStep": 1e-14, "max_iter": 50})
+    newton = ca.rootfinder(
+        f"{model.name}_balance", "newton", problem, {"abstol": 1e-14, "abstolStep": 1e-14, "max_iter": 50}
+    )
     z, x, u, p = (ca.MX.sym(n, s.numel()) for n, s in (("z", model.z), ("x", model.x), ("u", model.u), ("p", model.p)))
     root = newton(z / model.z_scale, ca.vertcat(x, u, p)) * model.z_scale
     return ca.Function("balance", [z, x, u, p], [root])
@@ -44,7 +46,7 @@ def simulate(model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | 
     samples, the last with the last drive. Raises SolverError where no displacement balances the force.
     """
     steps = len(u)
-    x, z, u_k, u_next = (ca.MX.sym(n, s.numel()) for n, s in (("x", model.x), ("z", model.z), ("u", model.u), ("v", model.u)))
+    x, z, u_k = (ca.MX.sym(n, s.numel()) for n, s in (("x", model.x), ("z", model.z), ("u", model.u)))
     p = ca.DM(model.p_nominal)
     balance = balance_solver(model)
     step = ca.Function("step", [model.x, model.z, model.u, model.p], [model.step(sample_time)])
@@ -56,7 +58,9 @@ def simulate(model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | 
         start_z = balance(model.z_scale, start_x, u[0], p)
         states = one.mapaccum(steps)(ca.vertcat(start_x, start_z), u.T).full()
     except RuntimeError as error:
-        raise SolverError("no stage displacement balances the actuator force; check the drive and the stiffness") from error
+        raise SolverError(
+            "no stage displacement balances the actuator force; check the drive and the stiffness"
+        ) from error
     states = np.hstack([ca.vertcat(start_x, start_z).full(), states]).T
     drives = np.vstack([u, u[-1:]])
     n = model.x.numel()

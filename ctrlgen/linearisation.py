@@ -17,7 +17,15 @@ def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     step = controller.step(controller.rest(), pose)
     if step.status:
         broken = ", ".join(flag.name.lower() for flag in Status if flag in step.status and flag.name)
-        raise InputError("pose", [Fault("at", f"is not an admissible equilibrium (limits: {broken}); choose a reachable pose, such as delta_z=20um")])
+        raise InputError(
+            "pose",
+            [
+                Fault(
+                    "at",
+                    f"is not an admissible equilibrium (limits: {broken}); choose a reachable pose, such as delta_z=20um",
+                )
+            ],
+        )
     return step.state[0], step.displacement, step.drive
 
 
@@ -30,7 +38,9 @@ def linearise(model: Model, pose: np.ndarray) -> control.StateSpace:
     """
     x, z, u = equilibrium(model, pose)
     outputs = model.signals["pose"]
-    blocks = [ca.jacobian(e, s) for e in (model.rates, model.balance, outputs.expr) for s in (model.x, model.z, model.u)]
+    blocks = [
+        ca.jacobian(e, s) for e in (model.rates, model.balance, outputs.expr) for s in (model.x, model.z, model.u)
+    ]
     function = ca.Function("jacobians", [model.x, model.z, model.u, model.p], blocks)
     f_x, f_z, f_u, g_x, g_z, g_u, y_x, y_z, y_u = (b.full() for b in function(x, z, u, model.p_nominal))
     z_x, z_u = -np.linalg.solve(g_z, g_x), -np.linalg.solve(g_z, g_u)

@@ -19,7 +19,7 @@ from ctrlgen.cprint import Kernel, Real, print_function
 from ctrlgen.files import write_text
 from ctrlgen.model import Model
 from ctrlgen.scenario import Scenario
-from ctrlgen.solve import Solution
+from ctrlgen.solution import Solution
 from ctrlgen.units import show
 
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
@@ -46,7 +46,9 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
     """Writes the C of `scenario` to `out`; with a `solution` also its player. Raises CtrlgenError."""
     controller = Controller(model, scenario.file.follow, scenario.sample_time)
     online = {real: f"{scenario.name}_online_{real.suffix}" for real in Real}
-    player = {real: f"{scenario.name}_player_{real.suffix}" for real in Real} if solution and scenario.sample_time else {}
+    player = (
+        {real: f"{scenario.name}_player_{real.suffix}" for real in Real} if solution and scenario.sample_time else {}
+    )
     cost = (0, 0)
     for real in Real:
         context = _online_context(scenario, controller, real, online[real])
@@ -54,18 +56,26 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
         _render("online.h", context, out / f"{online[real]}.h")
         _render("online.c", context, out / f"{online[real]}.c")
         command = scenario.command(model) if solution is None else solution.command
-        _render("test.c", context | {"online": online[real]} | _vectors(controller, command, real), out / f"test_{scenario.name}_{real.suffix}.c")
+        _render(
+            "test.c",
+            context | {"online": online[real]} | _vectors(controller, command, real),
+            out / f"test_{scenario.name}_{real.suffix}.c",
+        )
         if solution and player:
             _render("player.h", context | _player_context(solution, player[real]), out / f"{player[real]}.h")
             _render("player.c", context | _player_context(solution, player[real]), out / f"{player[real]}.c")
-    sources = " ".join(f"{scenario.name}_{piece}_${{real}}.c" for piece in ("online", "player") if piece == "online" or player)
+    sources = " ".join(
+        f"{scenario.name}_{piece}_${{real}}.c" for piece in ("online", "player") if piece == "online" or player
+    )
     _render("CMakeLists.txt", {"name": scenario.name, "sources": sources}, out / "CMakeLists.txt")
     return CFolder(out, online, player, *cost)
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
-    """The program that `ctrlgen.compare` builds around one pair of controllers."""
-    context = _online_context(scenario, Controller(model, scenario.file.follow, scenario.sample_time), real, folder.online[real])
+    """The program that `ctrlgen.comparison` builds around one pair of controllers."""
+    context = _online_context(
+        scenario, Controller(model, scenario.file.follow, scenario.sample_time), real, folder.online[real]
+    )
     _render("harness.c", context | {"online": folder.online[real], "player": folder.player.get(real)}, path)
 
 
@@ -88,9 +98,17 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
         return kernels.setdefault(kernel.text.partition("(")[2], kernel)
 
     modes = []
-    for name, inverse, z in (("settle", controller.static, "out->displacement"), ("step", controller.moving, "state->z")):
+    for name, inverse, z in (
+        ("settle", controller.static, "out->displacement"),
+        ("step", controller.moving, "state->z"),
+    ):
         if inverse is not None:
-            parts = {part: printed(getattr(inverse, part), f"{name}_{part}" if part in ("drive", "advance") else f"wanted_{part}") for part in ("displacement", "state", "drive", "advance")}
+            parts = {
+                part: printed(
+                    getattr(inverse, part), f"{name}_{part}" if part in ("drive", "advance") else f"wanted_{part}"
+                )
+                for part in ("displacement", "state", "drive", "advance")
+            }
             uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive"))
             modes.append({"name": name, "z": z, "uses_state": uses_state, **parts})
     balance = printed(controller.static.settle, "balance_displacement")
@@ -106,7 +124,8 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     return {
         "prefix": prefix, "real": real, "version": __version__, "title": model.device.title, "source": model.device.source,
         "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
-        "drive_unit": drive.units[0], "state": model.signals["state"], "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
+        "drive_unit": drive.units[0], "state": model.signals["state"],
+        "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in model.composite_limits()) or "composite limits",
         "x_names": model.x_names, "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
@@ -149,7 +168,9 @@ def _vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[st
         vectors.append({"target": target, "drive": step.drive, "status": int(step.status)})
         if not step.status & Status.INPUT:
             kernel = (controller.static if settle or controller.moving is None else controller.moving).drive
-            off = kernel(*before, step.displacement, step.actuator_state * (1 + rounding)) - kernel(*before, step.displacement, step.actuator_state)
+            off = kernel(*before, step.displacement, step.actuator_state * (1 + rounding)) - kernel(
+                *before, step.displacement, step.actuator_state
+            )
             tolerance = max(tolerance, float(np.max(np.abs(off.full()))))
     return {"vectors": vectors, "tolerance": tolerance}
 
@@ -168,4 +189,3 @@ def _limit_text(limit: Any) -> str:
     low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
     high = "" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"
     return f"{low}{limit.label}{high}"
-

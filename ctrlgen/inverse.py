@@ -50,15 +50,23 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     # For each unknown: the value to expand about, and a value inside the range of operation.
     known = _Values(
         ca.vertcat(x, z, target, x_1, z_1, u_1),
-        np.concatenate([model.rest, 0 * model.z_scale, np.zeros(target.numel()), model.rest, 0 * model.z_scale, 0 * model.u_scale]),
-        np.concatenate([model.x_scale, model.z_scale, np.zeros(target.numel()), model.x_scale, model.z_scale, model.u_scale]),
+        np.concatenate(
+            [model.rest, 0 * model.z_scale, np.zeros(target.numel()), model.rest, 0 * model.z_scale, 0 * model.u_scale]
+        ),
+        np.concatenate(
+            [model.x_scale, model.z_scale, np.zeros(target.numel()), model.x_scale, model.z_scale, model.u_scale]
+        ),
     )
-    followed, balance, rates = (ca.substitute(e, now, end) for e in (model.signals[follow].expr, model.balance, model.rates))
+    followed, balance, rates = (
+        ca.substitute(e, now, end) for e in (model.signals[follow].expr, model.balance, model.rates)
+    )
     if sample_time is None:
         motion = rates
         advance = ca.substitute(_solve(known, rates, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
     else:
-        advance = ca.substitute(model.step(sample_time), ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
+        advance = ca.substitute(
+            model.step(sample_time), ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal))
+        )
         motion = x_1 - advance
 
     wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion), ca.vertcat(z_1, x_1, u_1))[:n]
@@ -71,7 +79,12 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
         _kernel("state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
         _kernel("drive", [x, z, z_1, x_1[:n]], ["x", "z", "wanted", "state"], wanted_u),
         _kernel("advance", [x, z, u_1], ["x", "z", "drive"], advance),
-        _kernel("settle", [x, z, u], ["x", "z", "drive"], _newton(ca.substitute(model.balance, model.p, ca.DM(model.p_nominal)), z, z)),
+        _kernel(
+            "settle",
+            [x, z, u],
+            ["x", "z", "drive"],
+            _newton(ca.substitute(model.balance, model.p, ca.DM(model.p_nominal)), z, z),
+        ),
     )
 
 

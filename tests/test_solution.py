@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from conftest import SCENARIOS
+
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, simulate, solve
 
 NM = 1e-9
@@ -14,7 +14,9 @@ def scenario(tmp_path):
     """A scenario from text, beside the shipped device."""
 
     def write(text: str):
-        (tmp_path / "scenario.toml").write_text(f'title = "t"\ndevice = "{SCENARIOS / "devices" / "mems_hexapod.toml"}"\n{text}')
+        (tmp_path / "scenario.toml").write_text(
+            f'title = "t"\ndevice = "{SCENARIOS / "devices" / "mems_hexapod.toml"}"\n{text}'
+        )
         return load_scenario(tmp_path)
 
     return write
@@ -44,7 +46,9 @@ def test_margins_are_those_of_the_trajectory(circle):
 
 
 def test_an_open_path_starts_settled_and_ends_held(scenario):
-    s = scenario('sample_rate = "1 kHz"\nduration = "0.1 s"\n[path]\nkind = "line"\nstart = { delta_z = "15 um" }\nend = { delta_z = "25 um" }\n')
+    s = scenario(
+        'sample_rate = "1 kHz"\nduration = "0.1 s"\n[path]\nkind = "line"\nstart = { delta_z = "15 um" }\nend = { delta_z = "25 um" }\n'
+    )
     solution = solve(s, build_model(s.device))
     m = solution.model
     start_power = (solution.trace.x[0] - 295.15) / 550
@@ -68,7 +72,9 @@ def test_the_nearest_pose_of_an_unreachable_one_is_reachable(scenario):
     with pytest.raises(Unreachable) as caught:
         solve(s, build_model(s.device))
     message, short = str(caught.value), caught.value.shortfall
-    assert "actuator 2X: needs -5 um" in message and "3Y: needs -8.66 um" in message  # rigid translation: d = R(psi)' (10, 0)
+    assert (
+        "actuator 2X: needs -5 um" in message and "3Y: needs -8.66 um" in message
+    )  # rigid translation: d = R(psi)' (10, 0)
     assert "1X" not in message.split("nearest")[0]
     p = short.nearest[0] * 0.999  # reachable poses form a cone, so shrinking stays inside
     theta = ", ".join(f'theta_{a} = "{v!r} rad"' for a, v in zip("xyz", p[:3].tolist(), strict=True))
@@ -78,7 +84,9 @@ def test_the_nearest_pose_of_an_unreachable_one_is_reachable(scenario):
 
 
 def test_a_path_too_fast_for_passive_cooling_names_the_heaters(scenario):
-    s = scenario('sample_rate = "1 kHz"\nduration = "12 ms"\n[path]\nkind = "circle"\ndiameter = "20 um"\ncentre = { delta_z = "20 um" }\n')
+    s = scenario(
+        'sample_rate = "1 kHz"\nduration = "12 ms"\n[path]\nkind = "circle"\ndiameter = "20 um"\ncentre = { delta_z = "20 um" }\n'
+    )
     with pytest.raises(Unreachable, match="cannot cool faster"):
         solve(s, build_model(s.device))
 

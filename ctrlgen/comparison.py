@@ -17,24 +17,26 @@ from pathlib import Path
 
 import numpy as np
 
-from ctrlgen.controller import Controller
 from ctrlgen.cprint import Real
 from ctrlgen.errors import ToolError
-from ctrlgen.generate import CFolder, write_harness
+from ctrlgen.firmware import CFolder, write_harness
 from ctrlgen.model import Model
-from ctrlgen.simulate import simulate, trace
-from ctrlgen.solve import Solution
+from ctrlgen.reference import Reference
+from ctrlgen.simulation import simulate, trace
+from ctrlgen.solution import Solution
 from ctrlgen.units import from_si
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O2")
 COMPILERS = ("gcc", "clang")
-RANDOM_TARGETS = 1000
 
 # What a difference may be, and why.
 LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometre; a tenth, below any sensor here
 ANGLE = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}  # rad: 1e-8 rad moves the platform's rim by 0.02 nm
 RELATIVE = 1e-12  # double C against CasADi: 4500 roundings
-EXCESS = {Real.DOUBLE: 1e-9, Real.FLOAT: 1e-5}  # of a limit's bound: roundings; the slack below which a limit is not reported
+EXCESS = {
+    Real.DOUBLE: 1e-9,
+    Real.FLOAT: 1e-5,
+}  # of a limit's bound: roundings; the slack below which a limit is not reported
 ROUNDINGS = 16  # float C against CasADi: roundings of the largest value that the chain may pile up
 
 
@@ -91,7 +93,7 @@ def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None]
     """Builds and runs `folder` with every compiler present. Raises ToolError when a build or a run fails."""
     compilers = find_compilers()
     builds = [(compiler, real) for compiler in compilers for real in Real]
-    reference = _Reference(solution)
+    reference = Reference(solution)
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         for real in Real:
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
@@ -111,7 +113,17 @@ def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None]
 def _build(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
     program = scratch / f"{compiler}_{real.suffix}"
     sources = [folder.path / f"{names[real]}.c" for names in (folder.online, folder.player) if names]
-    command = [compiler, *FLAGS, "-I", str(folder.path), str(scratch / f"harness_{real.suffix}.c"), *map(str, sources), "-lm", "-o", str(program)]
+    command = [
+        compiler,
+        *FLAGS,
+        "-I",
+        str(folder.path),
+        str(scratch / f"harness_{real.suffix}.c"),
+        *map(str, sources),
+        "-lm",
+        "-o",
+        str(program),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise ToolError(f"{compiler} refuses the {real.value} C:\n{done.stderr.strip()[:2000]}")
@@ -120,63 +132,27 @@ def _build(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
 
 def _run(program: Path, mode: str, records: np.ndarray, width: int) -> np.ndarray:
     """Output records (n, 1 + width) of doubles; the first column is the status."""
-    done = subprocess.run([str(program), mode], input=np.ascontiguousarray(records, dtype=float).tobytes(), capture_output=True, check=False)
+    done = subprocess.run(
+        [str(program), mode],
+        input=np.ascontiguousarray(records, dtype=float).tobytes(),
+        capture_output=True,
+        check=False,
+    )
     answer = np.frombuffer(done.stdout, dtype=float)
     if done.returncode != 0 or answer.size != len(records) * (1 + width):
-        raise ToolError(f"{program.name} stopped in mode '{mode}' with status {done.returncode} after {answer.size // (1 + width)} of {len(records)} records")
+        got = f"{answer.size // (1 + width)} of {len(records)} records"
+        raise ToolError(f"{program.name} stopped in mode '{mode}' with status {done.returncode} after {got}")
     return answer.reshape(len(records), 1 + width)
 
 
-class _Reference:
-    """What the C must reproduce, computed once for all builds."""
-
-    def __init__(self, solution: Solution) -> None:
-        self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
-        self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
-        self.random = self._random_targets()
-        self.settled = self._answers(self.random, follow=False)
-        self.hostile = self._hostile_targets()
-        self.chased = self._answers(self.hostile, follow=True) if self.scenario.sample_time else self.settled[:0]
-        self.command = solution.command
-        if self.scenario.sample_time:  # one more sample: back to the first, or the last one held
-            self.command = np.vstack([self.command, self.command[:1] if self.scenario.closed else self.command[-1:]])
-        self.followed = self._answers(self.command, follow=self.scenario.sample_time is not None)
-
-    def _random_targets(self) -> np.ndarray:
-        """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""
-        m, rng = self.model, np.random.default_rng(20)
-        low, high = m.z_bounds
-        z = rng.uniform(low, high, size=(RANDOM_TARGETS // 2, len(m.axes)))
-        ratio = self.controller.composite_ratio.map(len(z))(z.T).full().ravel()
-        z = z / np.maximum(ratio, 1.0)[:, None]
-        x, u = np.tile(m.rest, (len(z), 1)), np.zeros_like(z)
-        signal = self.scenario.file.follow
-        reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
-        anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
-        return np.vstack([reachable, anywhere])
-
-    def _hostile_targets(self) -> np.ndarray:
-        """A sequence of jumps between reachable and absurd targets, with some that are not numbers."""
-        rng = np.random.default_rng(21)
-        targets = rng.permutation(self.random)[: RANDOM_TARGETS // 4].repeat(2, axis=0)
-        targets[::7] *= 10 ** rng.uniform(0, 3, (len(targets[::7]), 1))
-        targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
-        return targets
-
-    def _answers(self, targets: np.ndarray, *, follow: bool) -> np.ndarray:
-        """(n, 1 + 3 axes): status, drive, displacement, actuator state."""
-        rows, state = [], self.controller.rest()
-        for k, target in enumerate(targets):
-            step = self.controller.step(state, target, settle=not follow or k == 0)
-            state = step.state
-            rows.append(np.concatenate([[step.status], step.drive, step.displacement, step.actuator_state]))
-        return np.array(rows)
-
-
-def _rows(build: str, real: Real, program: Path, ref: _Reference) -> list[Row]:
+def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
     """All comparisons of one build."""
     n, m = len(ref.model.axes), ref.model
-    signals = (("drive", slice(1, 1 + n)), ("displacement", slice(1 + n, 1 + 2 * n)), ("state", slice(1 + 2 * n, 1 + 3 * n)))
+    signals = (
+        ("drive", slice(1, 1 + n)),
+        ("displacement", slice(1 + n, 1 + 2 * n)),
+        ("state", slice(1 + 2 * n, 1 + 3 * n)),
+    )
     rows = []
 
     def add(what: str, role: str, difference: np.ndarray, limit: float, channels: slice = slice(None)) -> None:
@@ -203,7 +179,11 @@ def _rows(build: str, real: Real, program: Path, ref: _Reference) -> list[Row]:
         if real is Real.DOUBLE:  # in float a bisection may turn the other way, which is as good an answer
             against_casadi("hostile sequence, online C - CasADi", chased, ref.chased)
         excess = _excess(m, chased[1:, 1 : 1 + n], ref.scenario.sample_time, chased[0, 1 + 2 * n :])
-        rows.append(_row(build, "hostile sequence -> model: excess over a limit", "share of its bound", "1", excess, EXCESS[real]))
+        rows.append(
+            _row(
+                build, "hostile sequence -> model: excess over a limit", "share of its bound", "1", excess, EXCESS[real]
+            )
+        )
 
     # The drive that acts from sample k to k + 1 is the answer to target k + 1.
     solved = ref.solution.drive
@@ -214,7 +194,9 @@ def _rows(build: str, real: Real, program: Path, ref: _Reference) -> list[Row]:
     pose = m.signals[ref.scenario.file.follow]
     for what, drives in _drive_sets(program, ref, online):
         if ref.scenario.sample_time:
-            reached = simulate(m, drives, ref.scenario.sample_time, ref.solution.trace.x[0]).signals[ref.scenario.file.follow]
+            reached = simulate(m, drives, ref.scenario.sample_time, ref.solution.trace.x[0]).signals[
+                ref.scenario.file.follow
+            ]
             difference = reached - ref.command
         else:
             z, state = followed[:, 1 + n : 1 + 2 * n], followed[:, 1 + 2 * n :]
@@ -223,18 +205,29 @@ def _rows(build: str, real: Real, program: Path, ref: _Reference) -> list[Row]:
         for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
             channels = [i for i, u in enumerate(pose.units) if u == unit]
             if channels:
-                add(f"{what} -> model - command", ref.scenario.file.follow, difference, limit, slice(channels[0], channels[-1] + 1))
+                add(
+                    f"{what} -> model - command",
+                    ref.scenario.file.follow,
+                    difference,
+                    limit,
+                    slice(channels[0], channels[-1] + 1),
+                )
     if ref.scenario.sample_time:
         table = _run(program, "sample", np.arange(len(solved)), n)
         single = solved if real is Real.DOUBLE else solved.astype(np.float32).astype(float)
         add("player C - IPOPT", "drive", table[:, 1:] - single, 0.0)
         times = (np.arange(len(solved)) + 0.5) * ref.scenario.sample_time
         between = _run(program, "at", times[:-1], n)
-        add("player C at mid-sample - IPOPT", "drive", between[:, 1:] - solved[:-1], 1e-9 if real is Real.DOUBLE else 1e-4 * np.abs(solved).max())
+        add(
+            "player C at mid-sample - IPOPT",
+            "drive",
+            between[:, 1:] - solved[:-1],
+            1e-9 if real is Real.DOUBLE else 1e-4 * np.abs(solved).max(),
+        )
     return rows
 
 
-def _drive_sets(program: Path, ref: _Reference, online: np.ndarray) -> list[tuple[str, np.ndarray]]:
+def _drive_sets(program: Path, ref: Reference, online: np.ndarray) -> list[tuple[str, np.ndarray]]:
     """Drives to send through the model: those of the online C, and the player's."""
     sets = [("online C", online)]
     if ref.scenario.sample_time:
@@ -246,7 +239,9 @@ def _excess(model: Model, drives: np.ndarray, sample_time: float, state_0: np.nd
     """(n, limits): how far the model driven so goes beyond each limit, over the bound's size; 0 where it is kept."""
     reached = simulate(model, drives, sample_time, np.concatenate([state_0, model.rest[len(state_0) :]]))
     u = np.vstack([drives[:1], drives])
-    values = model.evaluate_limits.map(len(u))(reached.x.T, reached.z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(u))))
+    values = model.evaluate_limits.map(len(u))(
+        reached.x.T, reached.z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(u)))
+    )
     columns = []
     for limit, value in zip(model.limits, values, strict=True):
         v, size = value.full().T, max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(value.full()).max()
@@ -256,7 +251,7 @@ def _excess(model: Model, drives: np.ndarray, sample_time: float, state_0: np.nd
     return np.column_stack(columns)
 
 
-def _float_limit(model: Model, role: str, size: float, ref: _Reference) -> float:
+def _float_limit(model: Model, role: str, size: float, ref: Reference) -> float:
     """What `ROUNDINGS` float roundings of the largest value amount to; for the drive, of the actuator state behind it."""
     eps = float(np.finfo(np.float32).eps)
     if role != "drive":
@@ -278,4 +273,6 @@ def _row(build: str, what: str, label: str, unit: str, difference: np.ndarray, l
     beyond = np.flatnonzero(~(size <= limit))
     scale = from_si(1.0, unit) if unit not in ("K",) else 1.0
     worst, rms = float(size.max()) * scale, float(np.sqrt(np.mean(difference**2))) * scale
-    return Row(build, what, label, unit, worst, rms, limit * scale, len(difference), int(beyond[0]) if beyond.size else None)
+    return Row(
+        build, what, label, unit, worst, rms, limit * scale, len(difference), int(beyond[0]) if beyond.size else None
+    )

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
+import ctrlgen.comparison as compare_module
 from ctrlgen import ToolError
-from ctrlgen import compare as compare_module
-from ctrlgen.compare import compare
+from ctrlgen.comparison import compare
 from ctrlgen.cprint import Real
-from ctrlgen.generate import generate
+from ctrlgen.firmware import generate
 
 
 @pytest.fixture
@@ -60,7 +60,13 @@ def test_c_with_a_warning_is_refused_with_the_compilers_words(folder, circle):
 
 
 def test_c_that_hangs_up_is_reported(folder, circle):
-    spoil(folder, Real.DOUBLE, "online", r"    if \(is_usable\(target\) == 0\) \{", "    if (target[5] > 0.0) { (void)*(volatile int *)0; }\n    if (is_usable(target) == 0) {")
+    spoil(
+        folder,
+        Real.DOUBLE,
+        "online",
+        r"    if \(is_usable\(target\) == 0\) \{",
+        "    if (target[5] > 0.0) { (void)*(volatile int *)0; }\n    if (is_usable(target) == 0) {",
+    )
     with pytest.raises(ToolError):
         compare(folder, circle)
 
@@ -78,4 +84,8 @@ def test_a_compiler_that_is_not_there_is_named_as_not_run(folder, circle, monkey
     present = "gcc" if real_which("gcc") else "clang"
     monkeypatch.setattr(compare_module.shutil, "which", lambda name: real_which(name) if name == present else None)
     comparison = compare(folder, circle)
-    assert comparison.passed and len(comparison.missing) == 1 and all(row.build.startswith(present) for row in comparison.rows)
+    assert (
+        comparison.passed
+        and len(comparison.missing) == 1
+        and all(row.build.startswith(present) for row in comparison.rows)
+    )

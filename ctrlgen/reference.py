@@ -1,0 +1,57 @@
+"""The answers that generated C must reproduce: the controller evaluated by CasADi, over three kinds of targets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ctrlgen.controller import Controller
+from ctrlgen.simulation import trace
+from ctrlgen.solution import Solution
+
+RANDOM_TARGETS = 1000
+
+
+class Reference:
+    """What the C must reproduce, computed once for all builds."""
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
+        self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
+        self.random = self._random_targets()
+        self.settled = self._answers(self.random, follow=False)
+        self.hostile = self._hostile_targets()
+        self.chased = self._answers(self.hostile, follow=True) if self.scenario.sample_time else self.settled[:0]
+        self.command = solution.command
+        if self.scenario.sample_time:  # one more sample: back to the first, or the last one held
+            self.command = np.vstack([self.command, self.command[:1] if self.scenario.closed else self.command[-1:]])
+        self.followed = self._answers(self.command, follow=self.scenario.sample_time is not None)
+
+    def _random_targets(self) -> np.ndarray:
+        """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""
+        m, rng = self.model, np.random.default_rng(20)
+        low, high = m.z_bounds
+        z = rng.uniform(low, high, size=(RANDOM_TARGETS // 2, len(m.axes)))
+        ratio = self.controller.composite_ratio.map(len(z))(z.T).full().ravel()
+        z = z / np.maximum(ratio, 1.0)[:, None]
+        x, u = np.tile(m.rest, (len(z), 1)), np.zeros_like(z)
+        signal = self.scenario.file.follow
+        reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
+        anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
+        return np.vstack([reachable, anywhere])
+
+    def _hostile_targets(self) -> np.ndarray:
+        """A sequence of jumps between reachable and absurd targets, with some that are not numbers."""
+        rng = np.random.default_rng(21)
+        targets = rng.permutation(self.random)[: RANDOM_TARGETS // 4].repeat(2, axis=0)
+        targets[::7] *= 10 ** rng.uniform(0, 3, (len(targets[::7]), 1))
+        targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
+        return targets
+
+    def _answers(self, targets: np.ndarray, *, follow: bool) -> np.ndarray:
+        """(n, 1 + 3 axes): status, drive, displacement, actuator state."""
+        rows, state = [], self.controller.rest()
+        for k, target in enumerate(targets):
+            step = self.controller.step(state, target, settle=not follow or k == 0)
+            state = step.state
+            rows.append(np.concatenate([[step.status], step.drive, step.displacement, step.actuator_state]))
+        return np.array(rows)

@@ -1,0 +1,171 @@
+"""The command line as a new user meets it: help, wrong input, interruption; never a half result."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from conftest import DEVICE, SCENARIOS
+
+COMMANDS = ("run", "solve", "generate", "compare", "check", "bode")
+
+
+def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    env = {**os.environ, **environment, "COLUMNS": "200"}
+    return subprocess.run([sys.executable, "-m", "ctrlgen", *map(str, words)], capture_output=True, text=True, env=env)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_a_help_with_an_example(command):
+    done = ctrlgen(command, "--help")
+    assert done.returncode == 0 and f"ctrlgen {command} " in done.stdout and "Example" in done.stdout
+
+
+def test_help_names_every_command_and_a_first_step():
+    done = ctrlgen("--help")
+    assert all(re.search(rf"\b{command}\b", done.stdout) for command in COMMANDS)
+    assert "ctrlgen run scenarios/circle20" in done.stdout
+
+
+def test_a_misspelt_command_or_option_is_answered_with_the_right_one():
+    assert "Did you mean 'run'" in ctrlgen("rum").stderr
+    done = ctrlgen("run", SCENARIOS / "circle20")
+    assert done.returncode == 2 and "--out" in done.stderr and "--help" in done.stderr
+
+
+@pytest.fixture
+def scenario(tmp_path) -> Path:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "scenario.toml").write_text(
+        f'title = "t"\ndevice = "{DEVICE}"\n[path]\nkind = "poses"\nfile = "poses.csv"\n'
+    )
+    (folder / "poses.csv").write_text("delta_z [um]\n20\n21\n")
+    return folder
+
+
+def refused(done: subprocess.CompletedProcess[str], *says: str) -> None:
+    """One clear message, a non-zero status, no traceback."""
+    assert done.returncode == 1, done
+    assert "Traceback" not in done.stderr and done.stdout == ""
+    for words in says:
+        assert words in done.stderr, done.stderr
+
+
+def test_malformed_toml_names_the_file_and_line(scenario, tmp_path):
+    (scenario / "scenario.toml").write_text('title = "t"\ndevice = \n')
+    refused(ctrlgen("run", scenario, "--out", tmp_path / "out"), "scenario.toml", "line 2", "toml.io")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_wrong_unit_names_the_key_and_the_remedy(scenario, tmp_path):
+    device = tmp_path / "device.toml"
+    device.write_text(DEVICE.read_text().replace('"4.127 mm"', '"4.127 mN"'))
+    text = (scenario / "scenario.toml").read_text().replace(str(DEVICE), str(device))
+    (scenario / "scenario.toml").write_text(text)
+    refused(ctrlgen("run", scenario, "--out", tmp_path / "out"), "hexapod.height", "um is needed")
+
+
+def test_a_cell_that_is_not_a_number_names_its_line(scenario, tmp_path):
+    (scenario / "poses.csv").write_text("delta_z [um]\n20\nNaN\n")
+    refused(ctrlgen("solve", scenario, "--out", tmp_path / "out"), "poses.csv", "line 3", "'NaN'")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_compiler_is_named_before_any_work(scenario, tmp_path):
+    refused(
+        ctrlgen("run", scenario, "--out", tmp_path / "out", PATH=str(tmp_path)), "no C compiler", "apt-get install gcc"
+    )
+
+
+def test_generate_needs_no_compiler(scenario, tmp_path):
+    done = ctrlgen("generate", scenario, "--out", tmp_path / "c", PATH=str(tmp_path))
+    assert done.returncode == 0 and (tmp_path / "c" / "mine_online_f32.c").exists()
+
+
+def test_an_unwritable_folder_is_refused(scenario, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    refused(ctrlgen("run", scenario, "--out", tmp_path / "file"), "is a file")
+    refused(ctrlgen("run", scenario, "--out", tmp_path / "file" / "below"), "cannot be written")
+    refused(ctrlgen("run", scenario, "--out", "/proc/ctrlgen/out"), "cannot be written")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_folder_with_other_peoples_files_is_not_replaced(scenario, tmp_path):
+    out = tmp_path / "thesis"
+    out.mkdir()
+    (out / "chapter1.tex").write_text("precious")
+    refused(ctrlgen("solve", scenario, "--out", out), "did not make")
+    assert (out / "chapter1.tex").read_text() == "precious"
+
+
+def test_an_earlier_result_is_replaced_whole_and_kept_when_the_next_run_fails(scenario, tmp_path):
+    out = tmp_path / "out"
+    assert ctrlgen("solve", scenario, "--out", out).returncode == 0
+    before = (out / "trajectory.csv").read_text()
+    (scenario / "poses.csv").write_text("delta_z [um]\n900\n")
+    refused_run = ctrlgen("solve", scenario, "--out", out)
+    assert refused_run.returncode == 1 and (out / "trajectory.csv").read_text() == before
+    (scenario / "poses.csv").write_text("delta_z [um]\n25\n")
+    assert ctrlgen("solve", scenario, "--out", out).returncode == 0
+    assert (out / "trajectory.csv").read_text() != before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine", "out"]
+
+
+def test_unreachable_says_which_actuator_by_how_much_and_what_is_nearest(tmp_path):
+    done = ctrlgen("run", SCENARIOS / "unreachable", "--out", tmp_path / "out")
+    refused(done, "actuator 2X: needs -5 um", "only pushes", "nearest reachable")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_leaves_nothing_behind(tmp_path, stop):
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "ctrlgen", "run", str(SCENARIOS / "spiral"), "--out", str(out)],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.iterdir()):  # until the work has begun
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    time.sleep(0.8)
+    process.send_signal(stop)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 130 and "nothing was written" in message and "Traceback" not in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path):
+    with open(scenario / "scenario.toml", "a") as file:
+        file.write('\n[[expect]]\nvalue = "force.1X.max"\nrange = ["1 N", "2 N"]\n')
+    done = ctrlgen("solve", scenario, "--out", tmp_path / "out")
+    assert done.returncode == 1 and "force.1X.max" in done.stdout and "out of tolerance" in done.stdout
+
+
+def test_check_tells_what_a_file_describes():
+    assert "6 actuators" in ctrlgen("check", DEVICE).stdout
+    assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20").stdout
+
+
+@pytest.mark.parametrize("suffix", ["svg", "png"])
+def test_bode_draws_a_picture(tmp_path, suffix):
+    done = ctrlgen("bode", DEVICE, "--out", tmp_path / f"b.{suffix}", "--at", "delta_x=2um,delta_z=20um")
+    assert done.returncode == 0 and (tmp_path / f"b.{suffix}").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [(("--out", "b.pdf"), ".svg or .png"), (("--out", "b.svg", "--at", "delta_z"), "channel=value"),
+     (("--out", "b.svg", "--at", "delta_q=1um"), "delta_q"), (("--out", "b.svg", "--at", "delta_z=900um"), "not an admissible"),
+     (("--out", "b.svg", "--at", "delta_z=3V"), "wrong unit")],
+)  # fmt: skip
+def test_bode_refuses_what_it_cannot_draw(words, says):
+    refused(ctrlgen("bode", DEVICE, *words), says)

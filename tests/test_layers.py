@@ -1,0 +1,83 @@
+"""The direction of the data flow: a module imports only what stands above it."""
+
+from __future__ import annotations
+
+import ast
+
+import pytest
+from conftest import ROOT
+
+PACKAGE = ROOT / "ctrlgen"
+LAYERS = [
+    "_version errors units",
+    "files",
+    "physics.screw", "physics.flexure", "physics.thermal_actuator", "physics.xy_stage physics.hexapod",
+    "effect", "effects",
+    "devices.base", "devices.mems_hexapod", "devices",
+    "model", "simulation inverse", "controller linearisation",
+    "paths", "scenario", "programme", "shortfall", "solution",
+    "cprint", "firmware", "reference", "comparison",
+    "measures", "figures", "bode report",
+    "job", "", "__main__",
+]  # fmt: skip
+RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def name_of(path) -> str:
+    """'physics.screw' for ctrlgen/physics/screw.py; effects count as one layer; '' is the package itself."""
+    parts = list(path.relative_to(PACKAGE).with_suffix("").parts)
+    if parts[-1] == "__init__":
+        parts.pop()
+    return "effects" if parts[:1] == ["effects"] else ".".join(parts)
+
+
+def our_imports(path) -> set[str]:
+    """Modules of ours that a file imports at its top level; a type-checking block does not run."""
+    names = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "ctrlgen":
+            module = node.module.removeprefix("ctrlgen").removeprefix(".")
+            inside = {f"{module}.{a.name}".removeprefix(".") for a in node.names}
+            names |= {name for name in inside if name in RANK} or {module}
+        elif isinstance(node, ast.Import):
+            names |= {a.name.removeprefix("ctrlgen.") for a in node.names if a.name.startswith("ctrlgen.")}
+    return names
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_imports_point_upwards(path):
+    name = name_of(path)
+    for imported in our_imports(path):
+        imported = "effects" if imported.startswith("effects") else imported
+        if imported == "" and name == "__main__":
+            continue
+        assert RANK[imported] <= RANK[name], f"{name} imports {imported}, which stands below it in the layout"
+
+
+@pytest.mark.parametrize("path", [p for p in MODULES if "physics" in p.parts], ids=name_of)
+def test_the_physics_knows_no_device_file(path):
+    assert all(imported.startswith("physics") for imported in our_imports(path))
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in MODULES if p.parent.name == "effects" and p.stem != "__init__"], ids=lambda p: p.stem
+)
+def test_an_effect_needs_the_extension_point_and_nothing_else(path):
+    assert our_imports(path) == {"effect"}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_no_module_knows_a_scenario_by_name(path):
+    literals = {
+        n.value
+        for n in ast.walk(ast.parse(path.read_text()))
+        if isinstance(n, ast.Constant) and isinstance(n.value, str)
+    }
+    named = {s.parent.name for s in (ROOT / "scenarios").glob("*/scenario.toml")}
+    assert not literals & {name for name in named if not name.isalpha()}  # 'spiral' is also a kind of path
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_files_are_short_enough_to_be_one_noun(path):
+    assert len(path.read_text().splitlines()) <= 400
