@@ -93,20 +93,15 @@ def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None]
     """Builds and runs `folder` with every compiler present. Raises ToolError when a build or a run fails."""
     compilers = find_compilers()
     builds = [(compiler, real) for compiler in compilers for real in Real]
-    reference = Reference(solution)
-    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch, ThreadPoolExecutor(max_workers=2) as pool:
         for real in Real:
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
-
-        def one(build: tuple[str, Real]) -> list[Row]:
-            compiler, real = build
-            program = _build(compiler, real, folder, Path(scratch))
-            rows = _rows(f"{compiler} {real.value}", real, program, reference)
+        programs = [pool.submit(_build, compiler, real, folder, Path(scratch)) for compiler, real in builds]
+        reference = Reference(solution)  # while the compilers work
+        rows: list[Row] = []
+        for (compiler, real), program in zip(builds, programs, strict=True):
+            rows += _rows(f"{compiler} {real.value}", real, program.result(), reference)
             progress(f"{compiler} {real.value}")
-            return rows
-
-        with ThreadPoolExecutor(max_workers=2) as pool:
-            rows = [row for part in pool.map(one, builds) for row in part]
     return Comparison(tuple(rows), compilers, tuple(c for c in COMPILERS if c not in compilers))
 
 

@@ -65,8 +65,10 @@ class Controller:
     def composite_ratio(self) -> ca.Function:
         """z -> the largest of the guarded limits' expr/upper; above 1 a limit is broken."""
         z = self.model.z
-        ratios = [limit.expr / limit.upper for limit in self.guarded_limits]
-        worst = ca.mmax(ca.vertcat(*ratios)) if ratios else ca.SX(0)
+        squares = [
+            limit.expr**2 * (1 / limit.upper**2) for limit in self.guarded_limits if limit.upper
+        ]  # one root at the end
+        worst = ca.sqrt(ca.mmax(ca.vertcat(*squares))) if squares else ca.SX(0)
         return ca.Function("composite_ratio", [z], [worst], ["z"], ["ratio"], {"cse": True})
 
     @cached_property

@@ -86,7 +86,8 @@ def print_function(function: ca.Function, name: str, real: Real) -> Kernel:
     """
     results: list[tuple[int, str]] = []
     lines: list[str] = []
-    value: dict[int, str] = {}
+    value: dict[int, str] = {}  # by work slot, as CasADi reuses them
+    constant: dict[int, float] = {}
     used: set[int] = set()
     operations = 0
     for k in range(function.n_instructions()):
@@ -99,9 +100,14 @@ def print_function(function: ca.Function, name: str, real: Real) -> Kernel:
             results.append((_dense(function.sparsity_out(0), outputs[1]), value[inputs[0]]))
             continue
         if op == ca.OP_CONST:
-            value[outputs[0]] = _signed(real.literal(function.instruction_constant(k)))
+            constant[outputs[0]] = function.instruction_constant(k)
+            value[outputs[0]] = _signed(real.literal(constant[outputs[0]]))
             continue
+        constant.pop(outputs[0] if outputs else -1, None)
         operations += 1
+        if op == ca.OP_DIV and inputs[1] in constant:  # a multiplication is several times cheaper
+            value[-1] = _signed(real.literal(1 / constant[inputs[1]]))
+            op, inputs = ca.OP_MUL, [inputs[0], -1]
         lines.append(f"    const {real.value} t{k} = {_expression(op, [value[i] for i in inputs], real)};")
         value[outputs[0]] = f"t{k}"
     written = {i for i, _ in results}

@@ -73,10 +73,15 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
     """The program that `ctrlgen.comparison` builds around one pair of controllers."""
-    context = _online_context(
-        scenario, Controller(model, scenario.file.follow, scenario.sample_time), real, folder.online[real]
-    )
-    _render("harness.c", context | {"online": folder.online[real], "player": folder.player.get(real)}, path)
+    context = {
+        "real": real,
+        "online": folder.online[real],
+        "player": folder.player.get(real),
+        "n": len(model.axes),
+        "m": len(model.signals[scenario.file.follow].channels),
+        "rate": scenario.sample_time is not None,
+    }
+    _render("harness.c", context, path)
 
 
 def _render(template: str, context: dict[str, Any], path: Path) -> None:

@@ -42,7 +42,7 @@ class Reference:
     def _hostile_targets(self) -> np.ndarray:
         """A sequence of jumps between reachable and absurd targets, with some that are not numbers."""
         rng = np.random.default_rng(21)
-        targets = rng.permutation(self.random)[: RANDOM_TARGETS // 4].repeat(2, axis=0)
+        targets = rng.permutation(self.random)[: RANDOM_TARGETS // 8].repeat(2, axis=0)
         targets[::7] *= 10 ** rng.uniform(0, 3, (len(targets[::7]), 1))
         targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
         return targets

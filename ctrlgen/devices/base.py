@@ -46,7 +46,7 @@ class Signal:
 class Limit:
     """lower <= expr <= upper, channel by channel; SI. None where a side is free.
 
-    A limit on anything but a model variable itself must be convex in the displacement and zero
+    A limit on anything but a model variable itself must be convex in the displacement, never negative, and zero
     at home: the online controller restores it by shrinking the displacement toward home.
     """
 

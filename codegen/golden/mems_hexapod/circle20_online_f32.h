@@ -15,7 +15,7 @@
  *   notch rotation <= 5 deg
  *   wire flexure stress <= 550 MPa
  *
- * Arithmetic operations per call: 264 within limits, 5633 at most. Arithmetic: float.
+ * Arithmetic operations per call: 264 within limits, 5610 at most. Arithmetic: float.
  * Physics: S1: Mech. Mach. Theory 80 (2014) 246-264, doi 10.1016/j.mechmachtheory.2014.05.004
  * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4, scenario b450b4cc90d85534 (sha256). Do not edit.
  */
