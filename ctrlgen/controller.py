@@ -16,8 +16,7 @@ import numpy as np
 from ctrlgen.inverse import Inverse, invert
 from ctrlgen.model import Limit, Model
 
-RELATIVE_SLACK = 1e-5  # of a signal's typical size (0.1 nm, 1 mK): what a limit may be missed by before it is reported
-
+SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for
 BISECTIONS = 12  # of the way to a target that the drives cannot reach in one sample: 1/4096 of it
 
 
@@ -38,6 +37,7 @@ class Controller:
     model: Model
     follow: str
     sample_time: float | None
+    slack: float = SLACK
 
     @cached_property
     def static(self) -> Inverse:
@@ -85,6 +85,16 @@ class Controller:
         """Largest |target| per channel that is taken for a command at all: 1e5 typical sizes, far outside any range."""
         return 1e5 * np.array(self.model.signals[self.follow].scale)
 
+    @cached_property
+    def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What displacement, actuator state and drive may miss a limit by unreported; the drive's is the state's, carried through."""
+        m, n = self.model, len(self.model.axes)
+        state_slack = self.slack * m.x_scale[:n]
+        x, z = self.rest()
+        kernel = (self.moving or self.static).drive
+        drives = [_row(kernel(x, z, z, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
+        return self.slack * m.z_scale, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
+
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
         """State of a cold device: (x, z)."""
         return self.model.rest.copy(), np.zeros(len(self.model.axes))
@@ -98,6 +108,7 @@ class Controller:
         m = self.model
         k = self.static if settle or self.moving is None else self.moving
         (z_low, z_high), (x_low, x_high), (u_low, u_high) = m.z_bounds, m.x_bounds, m.u_bounds
+        z_slack, s_slack, u_slack = self.slacks
         n = len(m.axes)
         x, z = state
         if not np.all(np.abs(target) <= self.input_limits):  # false for NaN too
@@ -105,13 +116,13 @@ class Controller:
             return Step(Status.INPUT, z, x[:n], u_low, (x_next, _row(k.settle(x_next, z, u_low))))
 
         def acting(wanted: np.ndarray) -> tuple[np.ndarray, bool]:
-            return _clamp(_row(k.state(x, z, wanted)), x_low[:n], x_high[:n], m.x_scale[:n])
+            return _clamp(_row(k.state(x, z, wanted)), x_low[:n], x_high[:n], s_slack)
 
         def drive(wanted: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, bool]:
-            return _clamp(_row(k.drive(x, z, wanted, held)), u_low, u_high, m.u_scale)
+            return _clamp(_row(k.drive(x, z, wanted, held)), u_low, u_high, u_slack)
 
         status = Status(0)
-        wanted, hit = _clamp(_row(k.displacement(x, z, target)), z_low, z_high, m.z_scale)
+        wanted, hit = _clamp(_row(k.displacement(x, z, target)), z_low, z_high, z_slack)
         status |= Status.DISPLACEMENT if hit else Status(0)
         held, hit = acting(wanted)
         if hit:
@@ -122,7 +133,7 @@ class Controller:
             if ratio > 1:
                 wanted = wanted / ratio
                 held, _ = acting(wanted)
-            status |= Status.COMPOSITE if ratio > 1 + RELATIVE_SLACK else Status(0)
+            status |= Status.COMPOSITE if ratio > 1 + self.slack else Status(0)
         u, beyond = drive(wanted, held)
         if beyond:
             status |= Status.DRIVE
@@ -156,7 +167,7 @@ def _row(value: ca.DM) -> np.ndarray:
     return value.full().ravel()
 
 
-def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, bool]:
+def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:
     """`wanted` limited to low ... high, and whether that moved it by more than the slack."""
     limited = np.clip(wanted, low, high)
-    return limited, bool(np.any(np.abs(limited - wanted) > RELATIVE_SLACK * scale))
+    return limited, bool(np.any(np.abs(limited - wanted) > slack))

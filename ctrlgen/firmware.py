@@ -6,7 +6,7 @@ double and in float, with a CMake file and a test of reference vectors. Same inp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import jinja2
 import numpy as np
 
 from ctrlgen._version import __version__
-from ctrlgen.controller import BISECTIONS, RELATIVE_SLACK, Controller, Status
+from ctrlgen.controller import BISECTIONS, SLACK, Controller, Status
 from ctrlgen.cprint import Kernel, Real, print_function
 from ctrlgen.files import write_text
 from ctrlgen.model import Model
@@ -22,6 +22,7 @@ from ctrlgen.scenario import Scenario
 from ctrlgen.solution import Solution
 from ctrlgen.units import show
 
+FLOAT_SLACK = 4e-6  # as SLACK of the controller, for float: 0.4 mK, which four roundings of a temperature amount to
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
 
 
@@ -78,6 +79,7 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real,
         "online": folder.online[real],
         "player": folder.player.get(real),
         "n": len(model.axes),
+        "nx": model.x.numel(),
         "m": len(model.signals[scenario.file.follow].channels),
         "rate": scenario.sample_time is not None,
     }
@@ -98,9 +100,14 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     n = len(model.axes)
     kernels: dict[str, Kernel] = {}  # by body: what settling and stepping share is printed once
 
-    def printed(function: Any, name: str) -> Kernel:
-        kernel = print_function(function, name, real)
-        return kernels.setdefault(kernel.text.partition("(")[2], kernel)
+    def printed(function: Any, *names: str) -> Kernel:
+        """Under the first of `names` that no other body has."""
+        taken = {kernel.name for kernel in kernels.values()}
+        kernel = print_function(function, names[0], real)
+        body = kernel.text.partition("(")[2]
+        if body not in kernels and kernel.name in taken:
+            kernel = print_function(function, names[-1], real)
+        return kernels.setdefault(body, kernel)
 
     modes = []
     for name, inverse, z in (
@@ -109,9 +116,7 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     ):
         if inverse is not None:
             parts = {
-                part: printed(
-                    getattr(inverse, part), f"{name}_{part}" if part in ("drive", "advance") else f"wanted_{part}"
-                )
+                part: printed(getattr(inverse, part), f"wanted_{part}", f"{name}_{part}")
                 for part in ("displacement", "state", "drive", "advance")
             }
             uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive"))
@@ -121,6 +126,8 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     if controller.guarded_limits:
         ratio = printed(controller.composite_ratio, "composite_ratio")
     (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
+    slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
+    z_slack, s_slack, u_slack = slack.slacks
     drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
     last = modes[-1]
     step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", "advance"))
@@ -135,11 +142,10 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
         "composite": ", ".join(limit.label for limit in model.composite_limits()) or "composite limits",
         "x_names": model.x_names, "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
         "balance": balance, "bisections": BISECTIONS, "safe": controller.safe_displacement if ratio else 0.0,
-        "relative_slack": RELATIVE_SLACK, "cost": {"step": step_cost, "worst": worst_cost},
+        "relative_slack": FLOAT_SLACK if real is Real.FLOAT else SLACK, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,
-        "z_low": z_low, "z_high": z_high, "z_slack": RELATIVE_SLACK * model.z_scale,
-        "s_low": x_low[:n], "s_high": x_high[:n], "s_slack": RELATIVE_SLACK * model.x_scale[:n],
-        "u_low": u_low, "u_high": u_high, "u_slack": RELATIVE_SLACK * model.u_scale,
+        "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "s_low": x_low[:n], "s_high": x_high[:n], "s_slack": s_slack,
+        "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
     }  # fmt: skip
 
 

@@ -7,7 +7,7 @@
                 every limit of the device
 
 in variables divided by their typical size; derivatives are exact and sparse. Closed paths are
-periodic; open ones start in equilibrium at their first sample and hold the last one. With s = 0 the
+periodic; open ones start in equilibrium at their first sample. With s = 0 the
 trajectory is followed; otherwise the solution is the nearest one and `solve` says so.
 Reference: A. Waechter, L. T. Biegler, Math. Program. 106 (2006) 25 (IPOPT).
 """
@@ -25,7 +25,7 @@ from ctrlgen.model import Limit, Model
 from ctrlgen.scenario import Scenario
 from ctrlgen.simulation import Trace, trace
 
-WEIGHT = 1e6  # of the shortfall against the barrier, which otherwise pushes it off an active bound by sqrt(mu)
+WEIGHT = 1e8  # of the shortfall against the barrier, which otherwise pushes it off an active bound by sqrt(mu)
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,12 @@ class Programme:
     """The nonlinear programme of one scenario; `run` solves it with a choice of composite limits."""
 
     def __init__(self, model: Model, scenario: Scenario, command: np.ndarray) -> None:
-        self.model, self.scenario, self.command = model, scenario, command
+        self.model, self.scenario = model, scenario
         self.signal = model.signals[scenario.file.follow]
-        self.n = len(command)
+        self.wanted = len(command)  # an open path is held for one more sample, so that its last drive is determined
+        held = scenario.sample_time is not None and not scenario.closed
+        self.command = np.vstack([command, command[-1:]]) if held else command
+        self.n = len(self.command)
         self.sizes = (model.x.numel(), model.z.numel(), model.u.numel(), self.signal.expr.numel())
 
     def _rows(self, limits: Sequence[Limit]) -> tuple[ca.Function, np.ndarray, np.ndarray]:
@@ -87,7 +90,7 @@ class Programme:
             U_before, X_next = U, X
         elif closed:
             U_before, X_next = ca.horzcat(U[:, -1], U[:, :-1]), ca.horzcat(X[:, 1:], X[:, 0])
-        else:  # settled before the first sample by u_start; the last pose is held for one more sample
+        else:  # settled before the first sample by u_start; nothing follows the last
             u_start, x_end = ca.MX.sym("u0", self.sizes[2]), ca.MX.sym("x1", self.sizes[0])
             U_before, X_next = ca.horzcat(u_start, U[:, :-1]), ca.horzcat(X[:, 1:], x_end)
             extra = [u_start, x_end]
@@ -145,10 +148,11 @@ class Programme:
                 [u[-1:] if closed else values[None, table.size : table.size + self.sizes[2]] * m.u_scale, u[:-1]]
             )
         )
-        time = np.arange(n) * (self.scenario.sample_time or 1.0)
-        result = trace(m, time, x, z, u)
+        keep = slice(0, self.wanted)
+        x, z, u, s, before = x[keep], z[keep], u[keep], s[keep], before[keep]
+        result = trace(m, np.arange(len(x)) * (self.scenario.sample_time or 1.0), x, z, u)
         if not static:
-            reached = trace(m, time, x, z, before)
+            reached = trace(m, result.time, x, z, before)
             result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
         return Result(x, z, u, s, result, stats["iter_count"])
 

@@ -18,13 +18,19 @@ class Reference:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
         self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
         self.random = self._random_targets()
-        self.settled = self._answers(self.random, follow=False)
+        self.settled = self._answers(self.random, None)
+        self.command, self.path = solution.command, solution.command
+        if self.scenario.sample_time is None:
+            self.followed = self._answers(self.command, None)
+            return
+        # From IPOPT's first sample on: each target is the next sample; a closed path ends where it began, an open one is held.
+        self.start = (solution.trace.x[0], solution.trace.z[0])
+        last = solution.command[:1] if self.scenario.closed else solution.command[-1:]
+        self.path = np.vstack([solution.command, last])
+        self.command = self.path[1:]
+        self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets()
-        self.chased = self._answers(self.hostile, follow=True) if self.scenario.sample_time else self.settled[:0]
-        self.command = solution.command
-        if self.scenario.sample_time:  # one more sample: back to the first, or the last one held
-            self.command = np.vstack([self.command, self.command[:1] if self.scenario.closed else self.command[-1:]])
-        self.followed = self._answers(self.command, follow=self.scenario.sample_time is not None)
+        self.chased = self._answers(self.hostile, self.controller.rest())
 
     def _random_targets(self) -> np.ndarray:
         """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""
@@ -47,11 +53,11 @@ class Reference:
         targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
         return targets
 
-    def _answers(self, targets: np.ndarray, *, follow: bool) -> np.ndarray:
-        """(n, 1 + 3 axes): status, drive, displacement, actuator state."""
-        rows, state = [], self.controller.rest()
-        for k, target in enumerate(targets):
-            step = self.controller.step(state, target, settle=not follow or k == 0)
+    def _answers(self, targets: np.ndarray, start: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray:
+        """(n, 1 + 3 axes): status, drive, displacement, actuator state; steps from `start`, or settles at each target."""
+        rows, state = [], start or self.controller.rest()
+        for target in targets:
+            step = self.controller.step(state, target, settle=start is None)
             state = step.state
             rows.append(np.concatenate([[step.status], step.drive, step.displacement, step.actuator_state]))
         return np.array(rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -63,7 +64,7 @@ class ScenarioFile(Section):
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scenario ready to solve. `file` is what was written; `name` the folder's name; `digest` of file and device."""
+    """A scenario ready to solve. `file` is what was written; `name` the folder's name as a C identifier; `digest` of file and device."""
 
     name: str
     folder: Path
@@ -115,4 +116,10 @@ def load_scenario(path: Path | str) -> Scenario:
         texts["poses"] = read_text(file_path.parent / file.path.file)
     digest = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
-    return Scenario(name, file_path.parent, file, device, digest)
+    return Scenario(_identifier(name), file_path.parent, file, device, digest)
+
+
+def _identifier(name: str) -> str:
+    """`name` as a C identifier, which becomes the prefix of the generated functions: 'my circle-1' -> 'my_circle_1'."""
+    cleaned = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    return cleaned if cleaned[:1].isalpha() else f"s_{cleaned}"

@@ -7,13 +7,13 @@
 static const float TARGET_LIMIT[6] = { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }; /* SI */
 static const float Z_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
 static const float Z_HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
-static const float Z_SLACK[6] = { 1e-10f, 1e-10f, 1e-10f, 1e-10f, 1e-10f, 1e-10f }; /* m */
+static const float Z_SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
 static const float S_LOW[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* K */
 static const float S_HIGH[6] = { 823.15f, 823.15f, 823.15f, 823.15f, 823.15f, 823.15f }; /* K */
-static const float S_SLACK[6] = { 0.001f, 0.001f, 0.001f, 0.001f, 0.001f, 0.001f }; /* K */
+static const float S_SLACK[6] = { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f }; /* K */
 static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
-static const float U_SLACK[6] = { 1e-05f, 1e-05f, 1e-05f, 1e-05f, 1e-05f, 1e-05f }; /* W */
+static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
 static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X, temperature_1Y, temperature_2X, temperature_2Y, temperature_3X, temperature_3Y */
 
 static void wanted_displacement(const float target[6], float result[6])
@@ -222,7 +222,7 @@ static void wanted_state(const float wanted[6], float result[6])
     result[5] = t140;
 }
 
-static void settle_drive(const float state[6], float result[6])
+static void wanted_drive(const float state[6], float result[6])
 {
     const float t3 = state[0] - 295.15f;
     const float t5 = t3 * 200.0f;
@@ -250,7 +250,7 @@ static void settle_drive(const float state[6], float result[6])
     result[5] = t31;
 }
 
-static void settle_advance(const float drive[6], float result[6])
+static void wanted_advance(const float drive[6], float result[6])
 {
     const float t4 = 550.0f * drive[0];
     const float t6 = t4 * 200.0f;
@@ -2444,7 +2444,7 @@ static int shrink(float wanted[6])
             for (i = 0; i < 6; i++) {
                 wanted[i] = wanted[i] / worst[0];
             }
-            hit = (worst[0] > 1.00001f) ? 2 : 1;
+            hit = (worst[0] > 1.000004f) ? 2 : 1;
         }
     }
     return hit;
@@ -2454,7 +2454,7 @@ static int settle_attempt(const circle20_online_f32_state *state, circle20_onlin
 {
     wanted_state(out->displacement, out->temperature);
     (void)limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK);
-    settle_drive(out->temperature, out->drive);
+    wanted_drive(out->temperature, out->drive);
     (void)state;
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
@@ -2545,7 +2545,7 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
             out->displacement[i] = state->z[i];
             out->temperature[i] = state->x[i];
         }
-        settle_advance(out->drive, state->x);
+        wanted_advance(out->drive, state->x);
         balance_displacement(state->x, out->displacement, state->z);
         return CIRCLE20_ONLINE_F32_INPUT;
     }
@@ -2570,14 +2570,14 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
         wanted_state(out->displacement, out->temperature);
         (void)limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK);
     }
-    settle_drive(out->temperature, out->drive);
+    wanted_drive(out->temperature, out->drive);
     limited = limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
     if (limited != 0) {
         static const float home[6] = { 0.0f };
         limited = settle_approach(state, home, out);
         status += CIRCLE20_ONLINE_F32_DRIVE;
     }
-    settle_advance(out->drive, state->x);
+    wanted_advance(out->drive, state->x);
     if (limited != 0) {
         balance_displacement(state->x, out->displacement, out->displacement);
     }
