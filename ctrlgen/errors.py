@@ -12,10 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from ctrlgen.shortfall import Shortfall
+import numpy as np
 
 
 class CtrlgenError(Exception):
@@ -41,6 +39,16 @@ class InputError(CtrlgenError):
         self.faults = tuple(faults)
         count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
         super().__init__("\n".join([f"{self.source}: {count}", *(f"  - {fault}" for fault in self.faults)]))
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """What keeps a trajectory from being followed: samples, and the nearest admissible trajectory."""
+
+    samples: tuple[int, ...]
+    worst: int
+    command: np.ndarray
+    nearest: np.ndarray
 
 
 class Unreachable(CtrlgenError):

@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ctrlgen.controller import Controller
-from ctrlgen.errors import Unreachable
+from ctrlgen.errors import Shortfall, Unreachable
 from ctrlgen.model import Limit, Model, Signal
 from ctrlgen.programme import Result
 from ctrlgen.scenario import Scenario
 from ctrlgen.units import from_si, show
 
 REACHED = 1e-5  # shortfall, in typical sizes (1 um, or 1 um at the platform's rim), that counts as none: 0.01 nm
-
-
-@dataclass(frozen=True)
-class Shortfall:
-    """What keeps a trajectory from being followed: samples, and the nearest admissible trajectory."""
-
-    samples: tuple[int, ...]
-    worst: int
-    command: np.ndarray
-    nearest: np.ndarray
 
 
 def unreachable(

@@ -38,7 +38,8 @@ CASES = {
     "effects, closed path": (WITH_EFFECTS, 'sample_rate = "1 kHz"\nduration = "0.5 s"\n' + CIRCLE.format(12)),
     "effects, open path": (
         WITH_EFFECTS,
-        'sample_rate = "500 Hz"\nduration = "1 s"\n[path]\nkind = "spiral"\nturns = 3\ndiameter = "12 um"\ncentre = { delta_z = "22 um" }\n',
+        'sample_rate = "500 Hz"\nduration = "1 s"\n'
+        '[path]\nkind = "spiral"\nturns = 3\ndiameter = "12 um"\ncentre = { delta_z = "22 um" }\n',
     ),
     "effects, equilibria": (
         WITH_EFFECTS,
