@@ -140,11 +140,10 @@ def _run(program: Path, mode: str, records: np.ndarray, width: int, start: tuple
 def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
     """All comparisons of one build."""
     n, m = len(ref.model.axes), ref.model
-    signals = (
-        ("drive", slice(1, 1 + n)),
-        ("displacement", slice(1 + n, 1 + 2 * n)),
-        ("state", slice(1 + 2 * n, 1 + 3 * n)),
-    )
+    signals = [("drive", slice(1, 1 + n)), ("displacement", slice(1 + n, 1 + 2 * n))]
+    width = 2 * n + m.n_states
+    if m.n_states:
+        signals.append(("state", slice(1 + 2 * n, 1 + width)))
     rows = []
 
     def add(what: str, role: str, difference: np.ndarray, limit: float, channels: slice = slice(None)) -> None:
@@ -165,16 +164,16 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
 
     moving = ref.scenario.sample_time is not None
     followed = (
-        _run(program, "follow", ref.command, 3 * n, ref.start)
+        _run(program, "follow", ref.command, width, ref.start)
         if moving
-        else _run(program, "settle", ref.command, 3 * n)
+        else _run(program, "settle", ref.command, width)
     )
     against_casadi("scenario, online C - CasADi", followed, ref.followed)
-    settled = _run(program, "settle", ref.random, 3 * n)
+    settled = _run(program, "settle", ref.random, width)
     against_casadi("random targets, online C - CasADi", settled, ref.settled)
     if moving:
         cold = ref.controller.rest()
-        chased = _run(program, "follow", ref.hostile, 3 * n, cold)
+        chased = _run(program, "follow", ref.hostile, width, cold)
         if real is Real.DOUBLE:  # in float the bisections lead apart
             against_casadi("hostile sequence, online C - CasADi", chased, ref.chased)
         what = "hostile sequence -> model: excess over a limit"
@@ -191,7 +190,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
             reached = simulate(m, drives, ref.scenario.sample_time, ref.solution.trace.x[0]).signals[role]
         else:
             z, state = followed[:, 1 + n : 1 + 2 * n], followed[:, 1 + 2 * n :]
-            x = np.hstack([state, ref.solution.trace.x[:, n:]])
+            x = np.hstack([state, ref.solution.trace.x[:, m.n_states :]])
             reached = trace(m, np.zeros(len(z)), x, z, drives).signals[role]
         for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
             channels = [i for i, u in enumerate(m.signals[role].units) if u == unit]
@@ -237,18 +236,18 @@ def _excess(model: Model, drives: np.ndarray, sample_time: float, x_0: np.ndarra
 
 
 def _float_limit(model: Model, role: str, size: float, ref: Reference) -> float:
-    """What `ROUNDINGS` float roundings of the largest value amount to; for the drive, of the actuator state behind it."""
+    """What `ROUNDINGS` float roundings of the largest value amount to; for the drive, of what it follows from."""
     eps = float(np.finfo(np.float32).eps)
     if role != "drive":
         return ROUNDINGS * eps * size
-    n = len(model.axes)
+    n, off = len(model.axes), 1 + ROUNDINGS / 2 * eps
     kernels = ref.controller.moving or ref.controller.static
     worst = 0.0
     for before, row in zip(ref.followed[:-1:37], ref.followed[1::37], strict=False):
-        x = np.concatenate([before[1 + 2 * n :], model.rest[n:]])
+        x = np.concatenate([before[1 + 2 * n :], model.rest[model.n_states :]])
         z, wanted, state = before[1 + n : 1 + 2 * n], row[1 + n : 1 + 2 * n], row[1 + 2 * n :]
-        off = kernels.drive(x, z, wanted, state * (1 + ROUNDINGS / 2 * eps)) - kernels.drive(x, z, wanted, state)
-        worst = max(worst, float(np.max(np.abs(off.full()))))
+        moved = kernels.drive(x, z, wanted * off, state * off) - kernels.drive(x, z, wanted, state)
+        worst = max(worst, float(np.max(np.abs(moved.full()))))
     return max(worst, ROUNDINGS * eps * size)
 
 

@@ -87,13 +87,13 @@ class Controller:
 
     @cached_property
     def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What displacement, actuator state and drive may miss a limit by unreported; the drive's is the state's, carried through."""
-        m, n = self.model, len(self.model.axes)
-        state_slack = self.slack * m.x_scale[:n]
+        """What displacement, actuator state and drive may miss a limit by unreported; the drive's is theirs, carried through."""
+        m, n = self.model, self.model.n_states
+        z_slack, state_slack = self.slack * m.z_scale, self.slack * m.x_scale[:n]
         x, z = self.rest()
         kernel = (self.moving or self.static).drive
-        drives = [_row(kernel(x, z, z, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
-        return self.slack * m.z_scale, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
+        drives = [_row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
+        return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
         """State of a cold device: (x, z)."""
@@ -109,7 +109,7 @@ class Controller:
         k = self.static if settle or self.moving is None else self.moving
         (z_low, z_high), (x_low, x_high), (u_low, u_high) = m.z_bounds, m.x_bounds, m.u_bounds
         z_slack, s_slack, u_slack = self.slacks
-        n = len(m.axes)
+        n = m.n_states
         x, z = state
         if not np.all(np.abs(target) <= self.input_limits):  # false for NaN too
             x_next = _row(k.advance(x, z, u_low))
@@ -137,7 +137,7 @@ class Controller:
         u, beyond = drive(wanted, held)
         if beyond:
             status |= Status.DRIVE
-            origin = np.zeros(n) if settle or self.moving is None else z
+            origin = np.zeros_like(z) if settle or self.moving is None else z
             share, step = 0.0, 1.0
             for _ in range(BISECTIONS):
                 step /= 2

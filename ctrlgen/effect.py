@@ -56,7 +56,7 @@ class Effect:
     `term(s, p)` is the contribution, in the unit of the place. `s` gives `value` (the signal at this
     place and channel before any effect), `all` (the same for every channel, a vector), `index` (of
     this channel) and the effect's own states; for axis channels also `displacement` and
-    `temperature`. `p` gives the parameters in SI.
+    the actuator's `state`, such as its temperature. `p` gives the parameters in SI.
     """
 
     library: ClassVar[dict[str, type[Effect]]] = {}

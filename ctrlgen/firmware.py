@@ -80,6 +80,7 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real,
         "player": folder.player.get(real),
         "n": len(model.axes),
         "nx": model.x.numel(),
+        "n_s": model.n_states,
         "m": len(model.signals[scenario.file.follow].channels),
         "rate": scenario.sample_time is not None,
     }
@@ -136,7 +137,7 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     return {
         "prefix": prefix, "real": real, "version": __version__, "title": model.device.title, "source": model.device.source,
         "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
-        "drive_unit": drive.units[0], "state": model.signals["state"],
+        "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in model.composite_limits()) or "composite limits",
@@ -144,7 +145,8 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
         "balance": balance, "bisections": BISECTIONS, "safe": controller.safe_displacement if ratio else 0.0,
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else SLACK, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,
-        "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "s_low": x_low[:n], "s_high": x_high[:n], "s_slack": s_slack,
+        "z_low": z_low, "z_high": z_high, "z_slack": z_slack, 
+        "s_low": x_low[: model.n_states], "s_high": x_high[: model.n_states], "s_slack": s_slack,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
     }  # fmt: skip
 
@@ -163,7 +165,7 @@ def _player_context(solution: Solution, prefix: str) -> dict[str, Any]:
 def _vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
     """Targets and the drives and status the reference answers, and what rounding may change.
 
-    The tolerance is the change of drive that four roundings of the actuator state cause.
+    The tolerance is the change of drive that four roundings of what it follows from cause.
     """
     rng = np.random.default_rng(0)
     scale = np.array(controller.model.signals[controller.follow].scale)
@@ -179,9 +181,8 @@ def _vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[st
         vectors.append({"target": target, "drive": step.drive, "status": int(step.status)})
         if not step.status & Status.INPUT:
             kernel = (controller.static if settle or controller.moving is None else controller.moving).drive
-            off = kernel(*before, step.displacement, step.actuator_state * (1 + rounding)) - kernel(
-                *before, step.displacement, step.actuator_state
-            )
+            reached = (step.displacement, step.actuator_state)
+            off = kernel(*before, *(value * (1 + rounding) for value in reached)) - kernel(*before, *reached)
             tolerance = max(tolerance, float(np.max(np.abs(off.full()))))
     return {"vectors": vectors, "tolerance": tolerance}
 

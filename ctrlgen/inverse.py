@@ -25,7 +25,7 @@ NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves 
 class Inverse:
     """Kernels, SX functions in SI, that a controller calls in this order.
 
-    `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted;
+    `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted (none for actuators without memory);
     `drive` (x, z, z_wanted, s_wanted) -> u; `advance` (x, z, u) -> x at the next sample. x, z are those of
     the present sample. A static inverse reads neither, except that its `advance` takes the new z.
     `settle` (x, z, u) -> the displacement that balances the actuators' forces, by Newton from z.
@@ -43,7 +43,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
 
     Free parameters stand at their nominal values.
     """
-    x, z, u, n = model.x, model.z, model.u, len(model.axes)
+    x, z, u, n, n_s = model.x, model.z, model.u, len(model.axes), model.n_states
     x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
     target = ca.SX.sym("target", model.signals[follow].expr.numel())
     now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, ca.DM(model.p_nominal))
@@ -72,12 +72,13 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion), ca.vertcat(z_1, x_1, u_1))[:n]
     # The later kernels take the earlier results as given, because the controller has limited them meanwhile.
     later = _solve(known, ca.vertcat(balance, motion), ca.vertcat(x_1, u_1))
-    wanted_state, memory = later[:n], later[n : x.numel()]
-    wanted_u = _solve(known, ca.substitute(motion[:n], x_1[n:], memory), u_1)
+    wanted_state, memory = later[:n_s], later[n_s : x.numel()]
+    drive_of_state = ca.substitute(motion[:n_s], x_1[n_s:], memory)
+    wanted_u = _solve(known, drive_of_state, u_1) if n_s else later[x.numel() :]
     return Inverse(
         _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
         _kernel("state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
-        _kernel("drive", [x, z, z_1, x_1[:n]], ["x", "z", "wanted", "state"], wanted_u),
+        _kernel("drive", [x, z, z_1, x_1[:n_s]], ["x", "z", "wanted", "state"], wanted_u),
         _kernel("advance", [x, z, u_1], ["x", "z", "drive"], advance),
         _kernel(
             "settle",

@@ -27,14 +27,16 @@ from ctrlgen.units import same_dimension
 class Model:
     """The physics of one device, symbolic.
 
-    `x` (n_x,), `z` (n_axes,), `u` (n_axes,), `p` (n_free,): symbols. `rates` dx/dt (n_x,) and `balance`
-    0 = g(x, z) (n_axes,) in N. `signals` by their role, in the order of the chain: drive, power,
-    state, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
+    `x` (n_x,), `z` (n_axes,), `u` (n_axes,), `p` (n_free,): symbols. The first `n_states` of x are the actuators'
+    (temperatures), the others effects' memories. `rates` dx/dt (n_x,) and `balance` 0 = g(x, z, u) (n_axes,).
+    `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
+    is one, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
     """
 
     name: str
     device: Device
     x: ca.SX
+    n_states: int
     z: ca.SX
     u: ca.SX
     p: ca.SX
@@ -221,7 +223,9 @@ class _Chain:
     def _channels(self, place: Place) -> tuple[tuple[str, ...], tuple[str, ...]]:
         if place in (Place.POSE, Place.SENSOR):
             return self.links.components, self.links.pose_units
-        unit = {Place.DRIVE: self.links.drive.units[0], Place.FORCE: "N", Place.DISPLACEMENT: "um"}[place]
+        unit = {Place.DRIVE: self.links.drive.units[0], Place.FORCE: self.links.force_unit, Place.DISPLACEMENT: "um"}[
+            place
+        ]
         return self.links.axes, (unit,) * len(self.links.axes)
 
     def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
@@ -232,56 +236,55 @@ class _Chain:
                 continue
             s = SimpleNamespace(value=before[i], all=before, index=i, **states)
             if place not in (Place.POSE, Place.SENSOR):
-                s.displacement, s.temperature = self.z[i], self.links.state.expr[i]
+                s.displacement = self.z[i]
+                s.state = None if self.links.state is None else self.links.state.expr[i]
             total[i] += effect.term(s, values)
             rates = effect.rates(s, values)
             self.memory_rates[index] = ca.vertcat(*(rates[name] for name in states))
         return total
 
     def model(self, p: ca.SX, p_nominal: np.ndarray) -> Model:
-        links = self.links
-        u, T, z = links.drive.expr, links.state.expr, self.z
+        links, axes, n = self.links, self.links.axes, len(self.links.axes)
+        u, z = links.drive.expr, self.z
+        x = ca.SX(0, 1) if links.state is None else links.state.expr
         drive = self._with_terms(Place.DRIVE, u)
-        power = links.power(drive)
-        rates = links.rates(T, power)
-        actuator_force = links.actuator_force(T)
-        force = self._with_terms(Place.FORCE, actuator_force)
+        pushed = links.force(drive, x, z)
+        balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z)
         displacement = self._with_terms(Place.DISPLACEMENT, z)
         pose = self._with_terms(Place.POSE, links.pose(displacement))
         reading = self._with_terms(Place.SENSOR, pose)
         memory_rates = ca.vertcat(*(self.memory_rates[i] for i in sorted(self.memory_rates)))
-        axes, n = links.axes, len(links.axes)
-        displacement_scale, force_scale = (links.displacement_scale,) * n, (links.force_scale,) * n
-        signals = [
-            links.drive,
-            Signal("power", "heater power", axes, ("W",) * n, "P_", power, (links.power_scale,) * n),
-            links.state,
-            Signal("force", "actuator force", axes, ("N",) * n, "F_", actuator_force, force_scale),
-            Signal("displacement", "stage displacement", axes, ("um",) * n, "d_", displacement, displacement_scale),
-            Signal("pose", "platform pose", links.components, links.pose_units, "", pose, links.pose_scale),
-            Signal(
-                "reading", "sensor reading", links.components, links.pose_units, "reading_", reading, links.pose_scale
-            ),
-        ]
-        named = SimpleNamespace(drive=u, state=T, force=actuator_force, displacement=z)
+        units, sizes = (links.force_unit,) * n, (links.force_scale,) * n
+        posed = (links.components, links.pose_units)
+        travel = (links.displacement_scale,) * n
+        signals = {
+            "drive": links.drive,
+            **{signal.name: signal for signal in links.extra(drive, x, z)},
+            **({} if links.state is None else {"state": links.state}),
+            "force": Signal("force", "actuator force", axes, units, "F_", pushed, sizes),
+            "displacement": Signal("displacement", "stage displacement", axes, ("um",) * n, "d_", displacement, travel),
+            "pose": Signal("pose", "platform pose", *posed, "", pose, links.pose_scale),
+            "reading": Signal("reading", "sensor reading", *posed, "reading_", reading, links.pose_scale),
+        }
+        state_names = () if links.state is None else tuple(f"{links.state.name}_{axis}" for axis in axes)
+        state_scale = () if links.state is None else links.state.scale
         return Model(
             name=self.device.name,
             device=self.device,
-            x=ca.vertcat(T, self.memory),
+            x=ca.vertcat(x, self.memory),
+            n_states=x.numel(),
             z=z,
             u=u,
             p=p,
             p_nominal=p_nominal,
-            x_names=tuple(f"{links.state.name}_{axis}" for axis in axes) + self.memory_names,
-            rates=ca.vertcat(rates, memory_rates),
-            balance=force - links.stage_force(z),
-            signals=dict(
-                zip(("drive", "power", "state", "force", "displacement", "pose", "reading"), signals, strict=True)
-            ),
-            force_parts=links.stage_force_parts(z),
-            limits=tuple(links.limits(named)),
+            x_names=state_names + self.memory_names,
+            rates=ca.vertcat(links.rates(x, drive), memory_rates),
+            balance=balance,
+            signals=signals,
+            force_parts=links.resistance_parts(z),
+            limits=tuple(links.limits(SimpleNamespace(drive=u, state=x, force=pushed, displacement=z))),
             rest=np.concatenate([np.array([float(v) for v in links.rest]), np.zeros(len(self.memory_scales))]),
-            x_scale=np.array([*links.state.scale, *self.memory_scales]),
+            x_scale=np.array([*state_scale, *self.memory_scales]),
             z_scale=np.full(n, links.displacement_scale),
             u_scale=np.array(links.drive.scale),
             force_scale=links.force_scale,

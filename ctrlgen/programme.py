@@ -97,8 +97,7 @@ class Programme:
             settled = m.dynamics(
                 X[:, 0] * m.x_scale + m.rest, Z[:, 0] * m.z_scale, u_start * m.u_scale, ca.DM(m.p_nominal)
             )[0]
-            acting = len(m.axes)
-            extra_rows = [settled / m.x_scale, x_end[:acting] - X[:acting, -1]]
+            extra_rows = [settled / m.x_scale, x_end[: m.n_states] - X[: m.n_states, -1]]
             (xl, xh), (ul, uh) = self._bounds("x"), self._bounds("u")
             extra_low, extra_high = [ul, xl], [uh, xh]
         command = self.command / self.signal.scale

@@ -60,8 +60,10 @@ def _dynamic_causes(model: Model, result: Result, samples: Sequence[int]) -> lis
     causes = []
     for values, bounds, what, low_reason in (
         (result.u, model.u_bounds, model.signals["drive"], "it cannot cool faster than passively"),
-        (result.x[:, : len(model.axes)], model.x_bounds, model.signals["state"], "it cannot go below ambient"),
+        (result.x[:, : model.n_states], model.x_bounds, model.signals.get("state"), "it cannot go below its rest"),
     ):
+        if what is None:
+            continue
         low, high = bounds
         for i, axis in enumerate(model.axes):
             for bound, reason in ((low[i], low_reason), (high[i], "that is its maximum")):

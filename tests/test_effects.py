@@ -91,7 +91,7 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
         every = np.array([others, value, others, others, value, others]) * factor(place_unit)
         s = SimpleNamespace(
             value=value * factor(place_unit), all=ca.DM(every), index=1,
-            displacement=displacement * factor("m"), temperature=temperature * factor("K"),
+            displacement=displacement * factor("m"), state=temperature * factor("K"),
             **{state.name: memory[state.name] * factor(state.unit) for state in effect.states},
         )  # fmt: skip
         p = SimpleNamespace(**{q.name: numbers[q.name] * factor(q.unit) for q in effect.params})

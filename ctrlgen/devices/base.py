@@ -63,8 +63,10 @@ class Limit:
 class Links:
     """The physics of one device as a chain of symbolic maps; `ctrlgen.model` joins them.
 
-    drive u -> (`power`) -> state x by `rates` -> `actuator_force` on the axis == `stage_force` of the
-    displacement d -> `pose`. Each map takes and gives SX column vectors in SI.
+    drive u -> state x by `rates` -> `force` on the axis == `resistance` of the displacement d -> `pose`. Each
+    map takes and gives SX column vectors in SI. A device whose actuators remember nothing has no `state` (and
+    `rates` of nothing); `force_unit` says in what the balance is: N, or m where displacement itself is commanded.
+    `extra` are signals worth reporting that follow from (drive, state, d), such as a heater's power.
     """
 
     axes: tuple[str, ...]
@@ -72,18 +74,18 @@ class Links:
     pose_units: tuple[str, ...]
     pose_scale: tuple[float, ...]
     drive: Signal
-    state: Signal
+    state: Signal | None
     rest: tuple[float, ...]
     displacement_scale: float
     force_scale: float
-    power_scale: float
-    power: Callable[[ca.SX], ca.SX]
     rates: Callable[[ca.SX, ca.SX], ca.SX]
-    actuator_force: Callable[[ca.SX], ca.SX]
-    stage_force: Callable[[ca.SX], ca.SX]
-    stage_force_parts: Callable[[ca.SX], dict[str, ca.SX]]
+    force: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    resistance: Callable[[ca.SX], ca.SX]
     pose: Callable[[ca.SX], ca.SX]
     limits: Callable[[SimpleNamespace], Sequence[Limit]]
+    force_unit: str = "N"
+    extra: Callable[[ca.SX, ca.SX, ca.SX], Sequence[Signal]] = lambda u, x, d: ()
+    resistance_parts: Callable[[ca.SX], dict[str, ca.SX]] = lambda d: {}
 
 
 class Device(Section):

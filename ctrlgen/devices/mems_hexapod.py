@@ -143,6 +143,9 @@ class MemsHexapod(Device):
         )
         rotation_scale = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
 
+        def heat(u: ca.SX) -> ca.SX:
+            return u**2 / a.heater_resistance if voltage else u
+
         def limits(signal: SimpleNamespace) -> list[Limit]:
             d = signal.displacement
             ends = ("base_bottom", "base_top", "platform_bottom", "platform_top")
@@ -175,15 +178,16 @@ class MemsHexapod(Device):
             rest=(a.ambient,) * 6,
             displacement_scale=1e-5,
             force_scale=0.05,
-            power_scale=power_limit,
-            power=lambda u: u**2 / a.heater_resistance if voltage else u,
-            rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
-            actuator_force=lambda T: thermal_actuator.force(T, a),
-            stage_force=lambda d: xy_stage.force(d, s, a),
-            stage_force_parts=lambda d: {
+            rates=lambda T, u: thermal_actuator.temperature_rate(T, heat(u), a),
+            force=lambda u, T, d: thermal_actuator.force(T, a),
+            resistance=lambda d: xy_stage.force(d, s, a),
+            resistance_parts=lambda d: {
                 "linear": xy_stage.linear_force(d, s, a),
                 "nonlinear": xy_stage.nonlinear_force(d, s),
             },
+            extra=lambda u, T, d: [
+                Signal("power", "heater power", self.axes, ("W",) * 6, "P_", heat(u), (power_limit,) * 6)
+            ],
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
         )

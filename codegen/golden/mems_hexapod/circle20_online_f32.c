@@ -8,9 +8,9 @@ static const float TARGET_LIMIT[6] = { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.
 static const float Z_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
 static const float Z_HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
 static const float Z_SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
-static const float S_LOW[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* K */
-static const float S_HIGH[6] = { 823.15f, 823.15f, 823.15f, 823.15f, 823.15f, 823.15f }; /* K */
-static const float S_SLACK[6] = { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f }; /* K */
+static const float S_LOW[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
+static const float S_HIGH[6] = { 823.15f, 823.15f, 823.15f, 823.15f, 823.15f, 823.15f };
+static const float S_SLACK[6] = { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f };
 static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
@@ -2452,9 +2452,9 @@ static int shrink(float wanted[6])
 /* Drives that put the device at out->displacement; 1 if they had to be limited. */
 static int settle_attempt(const circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
-    wanted_state(out->displacement, out->temperature);
-    (void)limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK);
-    wanted_drive(out->temperature, out->drive);
+    wanted_state(out->displacement, out->state);
+    (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
+    wanted_drive(out->state, out->drive);
     (void)state;
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
@@ -2487,9 +2487,9 @@ static int settle_approach(const circle20_online_f32_state *state, const float o
 /* Drives that put the device at out->displacement; 1 if they had to be limited. */
 static int step_attempt(const circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
-    wanted_state(out->displacement, out->temperature);
-    (void)limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK);
-    step_drive(state->x, out->temperature, out->drive);
+    wanted_state(out->displacement, out->state);
+    (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
+    step_drive(state->x, out->state, out->drive);
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
 
@@ -2543,7 +2543,7 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
         for (i = 0; i < 6; i++) {
             out->drive[i] = U_LOW[i];
             out->displacement[i] = state->z[i];
-            out->temperature[i] = state->x[i];
+            out->state[i] = state->x[i];
         }
         wanted_advance(out->drive, state->x);
         balance_displacement(state->x, out->displacement, state->z);
@@ -2553,11 +2553,11 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
     if (limit_all(out->displacement, Z_LOW, Z_HIGH, Z_SLACK) != 0) {
         status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
     }
-    wanted_state(out->displacement, out->temperature);
-    if (limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK) != 0) {
+    wanted_state(out->displacement, out->state);
+    if (limit_all(out->state, S_LOW, S_HIGH, S_SLACK) != 0) {
         float held[6];
         for (i = 0; i < 6; i++) {
-            held[i] = out->temperature[i];
+            held[i] = out->state[i];
         }
         balance_displacement(held, out->displacement, out->displacement);
         status += CIRCLE20_ONLINE_F32_STATE;
@@ -2567,10 +2567,10 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
         status += CIRCLE20_ONLINE_F32_COMPOSITE;
     }
     if (shrunk > 0) {
-        wanted_state(out->displacement, out->temperature);
-        (void)limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK);
+        wanted_state(out->displacement, out->state);
+        (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
     }
-    wanted_drive(out->temperature, out->drive);
+    wanted_drive(out->state, out->drive);
     limited = limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
     if (limited != 0) {
         static const float home[6] = { 0.0f };
@@ -2599,7 +2599,7 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
         for (i = 0; i < 6; i++) {
             out->drive[i] = U_LOW[i];
             out->displacement[i] = state->z[i];
-            out->temperature[i] = state->x[i];
+            out->state[i] = state->x[i];
         }
         step_advance(state->x, out->drive, state->x);
         balance_displacement(state->x, out->displacement, state->z);
@@ -2609,11 +2609,11 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
     if (limit_all(out->displacement, Z_LOW, Z_HIGH, Z_SLACK) != 0) {
         status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
     }
-    wanted_state(out->displacement, out->temperature);
-    if (limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK) != 0) {
+    wanted_state(out->displacement, out->state);
+    if (limit_all(out->state, S_LOW, S_HIGH, S_SLACK) != 0) {
         float held[6];
         for (i = 0; i < 6; i++) {
-            held[i] = out->temperature[i];
+            held[i] = out->state[i];
         }
         balance_displacement(held, out->displacement, out->displacement);
         status += CIRCLE20_ONLINE_F32_STATE;
@@ -2623,10 +2623,10 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
         status += CIRCLE20_ONLINE_F32_COMPOSITE;
     }
     if (shrunk > 0) {
-        wanted_state(out->displacement, out->temperature);
-        (void)limit_all(out->temperature, S_LOW, S_HIGH, S_SLACK);
+        wanted_state(out->displacement, out->state);
+        (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
     }
-    step_drive(state->x, out->temperature, out->drive);
+    step_drive(state->x, out->state, out->drive);
     limited = limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
     if (limited != 0) {
         limited = step_approach(state, state->z, out);

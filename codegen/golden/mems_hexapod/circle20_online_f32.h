@@ -5,7 +5,8 @@
  *
  * target[6]  platform pose: theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m], delta_y [m], delta_z [m]
  * drive[6]   heater power: 1X [W], 1Y [W], 2X [W], 2Y [W], 3X [W], 3Y [W]
- * displacement[6], temperature[6]: same order, [m] and [K]: where the drive will put the device
+ * displacement[6]: stage displacement [m] that the drive will reach
+ * state[6]   actuator temperature then: 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K]
  *
  * Limits kept:
  *   0 W <= heater power <= 1 W
@@ -41,7 +42,7 @@ typedef struct {
 typedef struct {
     float drive[6];        /* 1X [W], 1Y [W], 2X [W], 2Y [W], 3X [W], 3Y [W] */
     float displacement[6]; /* m */
-    float temperature[6];  /* K */
+    float state[6];        /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
 } circle20_online_f32_output;
 
 /* A cold device at rest. */
