@@ -14,7 +14,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller import RELATIVE_SLACK, Controller
+from ctrlgen.comparison import EXCESS
+from ctrlgen.controller import Controller
+from ctrlgen.cprint import Real
 from ctrlgen.model import Model, build_model
 from ctrlgen.scenario import Scenario, load_scenario
 from ctrlgen.simulation import simulate
@@ -151,7 +153,7 @@ class Samples:
             raise Disagreement(f"{name}: another status at sample {int(np.argmax(answers.status != reference.status))}")
 
     def check_limits(self, name: str, answers: Answers) -> None:
-        """Raises Disagreement unless the model driven by these answers keeps every limit, to RELATIVE_SLACK."""
+        """Raises Disagreement unless the model driven by these answers keeps every limit, to what float rounding may leave."""
         m = self.model
         u = answers.u[1:]
         reached = simulate(m, u, self.scenario.sample_time or 1.0, answers.T[0])
@@ -162,7 +164,7 @@ class Samples:
             size = max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(v).max()
             over = -np.inf if limit.upper is None else v.max() - limit.upper
             under = -np.inf if limit.lower is None else limit.lower - v.min()
-            if not max(over, under) <= RELATIVE_SLACK * size:
+            if not max(over, under) <= EXCESS[Real.FLOAT] * size:
                 raise Disagreement(f"{name}: {limit.label} goes {max(over, under) / size:.2g} of its bound beyond it")
 
     def check_circle(self, name: str, answers: Answers, near: float = NEAR) -> None:

@@ -106,7 +106,7 @@ typedef {real} real;
 static {prefix}_state state;
 static {prefix}_output out;
 #define Z(i) out.displacement[i]
-#define T(i) out.temperature[i]
+#define T(i) out.state[i]
 #define U(i) out.drive[i]
 static int answer_to(const real *target)
 {{

@@ -4,19 +4,59 @@ outcome = ctrlgen.run("scenarios/circle20", "out/circle20")
 print(outcome.passed, outcome.solution.tightest)
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from ctrlgen._version import __version__
-from ctrlgen.comparison import Comparison, compare
-from ctrlgen.controller import Controller, Status
-from ctrlgen.devices import load_device
-from ctrlgen.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
-from ctrlgen.firmware import generate
-from ctrlgen.job import Outcome, run
-from ctrlgen.model import Model, build_model
-from ctrlgen.scenario import load_scenario
-from ctrlgen.simulation import Trace, simulate
-from ctrlgen.solution import Solution, solve
+
+if TYPE_CHECKING:
+    from ctrlgen.comparison import Comparison, compare
+    from ctrlgen.controller import Controller, Status
+    from ctrlgen.devices import load_device
+    from ctrlgen.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
+    from ctrlgen.firmware import generate
+    from ctrlgen.job import Outcome, run
+    from ctrlgen.model import Model, build_model
+    from ctrlgen.scenario import load_scenario
+    from ctrlgen.simulation import Trace, simulate
+    from ctrlgen.solution import Solution, solve
+
+_HOME = {
+    "comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
+    "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware": ("generate",),
+    "job": ("Outcome", "run"), "model": ("Model", "build_model"), "scenario": ("load_scenario",),
+    "simulation": ("Trace", "simulate"), "solution": ("Solution", "solve"),
+}  # fmt: skip
+_MODULE = {name: module for module, names in _HOME.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Imports a public name when it is first used, so that `import ctrlgen` is quick."""
+    if name not in _MODULE:
+        raise AttributeError(f"module 'ctrlgen' has no attribute {name!r}")
+    return getattr(import_module(f"ctrlgen.{_MODULE[name]}"), name)
+
 
 __all__ = [
-    "Comparison", "Controller", "CtrlgenError", "InputError", "Model", "Outcome", "Solution", "SolverError", "Status", "ToolError",
-    "Trace", "Unreachable", "__version__", "build_model", "compare", "generate", "load_device", "load_scenario", "run", "simulate", "solve",
-]  # fmt: skip
+    "Comparison",
+    "Controller",
+    "CtrlgenError",
+    "InputError",
+    "Model",
+    "Outcome",
+    "Solution",
+    "SolverError",
+    "Status",
+    "ToolError",
+    "Trace",
+    "Unreachable",
+    "__version__",
+    "build_model",
+    "compare",
+    "generate",
+    "load_device",
+    "load_scenario",
+    "run",
+    "simulate",
+    "solve",
+]

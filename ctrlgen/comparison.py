@@ -7,6 +7,7 @@ drives that the C computed.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import tempfile
@@ -15,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 
 from ctrlgen.controller import Status
@@ -76,15 +78,18 @@ class Comparison:
 
 
 def find_compilers() -> dict[str, str]:
-    """Present C compilers with their version line. Raises ToolError when there is none."""
+    """Present C compilers with their version line: gcc and clang, or else $CC or cc. Raises ToolError when there is none."""
+    present = [name for name in COMPILERS if shutil.which(name)]
+    others = [name for name in (os.environ.get("CC", ""), "cc") if name and shutil.which(name)]
     found = {}
-    for name in COMPILERS:
-        if shutil.which(name):
-            version = subprocess.run([name, "--version"], capture_output=True, text=True, check=False).stdout
-            found[name] = (version.splitlines() or [name])[0]
+    for name in present or others[:1]:
+        done = subprocess.run([name, "--version"], capture_output=True, text=True, check=False, start_new_session=True)
+        if done.returncode != 0:
+            raise ToolError(f"{name} --version ends with status {done.returncode}; repair or remove that compiler")
+        found[name] = (done.stdout.splitlines() or [name])[0]
     if not found:
         raise ToolError(
-            f"no C compiler found (looked for {', '.join(COMPILERS)}); install one, on Debian: apt-get install gcc. "
+            f"no C compiler found (looked for {', '.join(COMPILERS)}, $CC, cc); install one, on Debian: apt-get install gcc. "
             "`ctrlgen generate` writes the C without it"
         )
     return found
@@ -107,29 +112,33 @@ def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None]
 
 
 def _build(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
+    """The harness and the shipped test, linked with the same objects; returns the harness, the test beside it."""
     program = scratch / f"{compiler}_{real.suffix}"
-    sources = [folder.path / f"{names[real]}.c" for names in (folder.online, folder.player) if names]
-    command = [
-        compiler,
-        *FLAGS,
-        "-I",
-        str(folder.path),
-        str(scratch / f"harness_{real.suffix}.c"),
-        *map(str, sources),
-        "-lm",
-        "-o",
-        str(program),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise ToolError(f"{compiler} refuses the {real.value} C:\n{done.stderr.strip()[:2000]}")
+    names = [pieces[real] for pieces in (folder.online, folder.player) if pieces]
+    objects = [scratch / f"{compiler}_{name}.o" for name in names]
+    for name, target in zip(names, objects, strict=True):
+        _compile(compiler, real, folder, ["-c", str(folder.path / f"{name}.c"), "-o", str(target)])
+    linked = [*map(str, objects), "-lm", "-o"]
+    _compile(compiler, real, folder, [str(scratch / f"harness_{real.suffix}.c"), *linked, str(program)])
+    _compile(compiler, real, folder, [str(folder.path / f"{folder.test[real]}.c"), *linked, f"{program}_test"])
     return program
+
+
+def _compile(compiler: str, real: Real, folder: CFolder, words: list[str]) -> None:
+    """Raises ToolError with the compiler's words, KeyboardInterrupt when it was killed."""
+    command = [compiler, *FLAGS, "-I", str(folder.path), *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, start_new_session=True)
+    if done.returncode < 0:
+        raise KeyboardInterrupt
+    if done.returncode != 0:
+        said = done.stderr.strip()[:2000] or f"(it said nothing; status {done.returncode} for: {' '.join(command)})"
+        raise ToolError(f"{compiler} refuses the {real.value} C:\n{said}")
 
 
 def _run(program: Path, mode: str, records: np.ndarray, width: int, start: tuple[np.ndarray, ...] = ()) -> np.ndarray:
     """Output records (n, 1 + width) of doubles; the first column is the status. `start` is read before the records."""
     sent = b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in (*start, records))
-    done = subprocess.run([str(program), mode], input=sent, capture_output=True, check=False)
+    done = subprocess.run([str(program), mode], input=sent, capture_output=True, check=False, start_new_session=True)
     answer = np.frombuffer(done.stdout, dtype=float)
     if done.returncode != 0 or answer.size != len(records) * (1 + width):
         got = f"{answer.size // (1 + width)} of {len(records)} records"
@@ -160,6 +169,8 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
         for role, columns in signals:
             size = np.abs(reference[:, columns]).max() or m.signals[role].scale[0]
             limit = RELATIVE * size if real is Real.DOUBLE else _float_limit(m, role, size, ref)
+            if role == "displacement" and real is Real.FLOAT:
+                limit = max(limit, LENGTH[real])
             add(what, role, answer[:, columns] - reference[:, columns], limit)
 
     moving = ref.scenario.sample_time is not None
@@ -171,6 +182,20 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
     against_casadi("scenario, online C - CasADi", followed, ref.followed)
     settled = _run(program, "settle", ref.random, width)
     against_casadi("random targets, online C - CasADi", settled, ref.settled)
+    rows.append(_shipped_test(build, program))
+    for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
+        channels = [i for i, u in enumerate(m.signals[ref.scenario.file.follow].units) if u == unit]
+        plain = np.flatnonzero(ref.settled[: len(ref.random) // 2, 0] == 0)
+        if channels and plain.size:
+            reached = _equilibria(ref, settled[plain])
+            span = slice(channels[0], channels[-1] + 1)
+            add(
+                "random targets, online C -> model - target",
+                ref.scenario.file.follow,
+                reached - ref.random[plain],
+                limit,
+                span,
+            )
     if moving:
         cold = ref.controller.rest()
         chased = _run(program, "follow", ref.hostile, width, cold)
@@ -181,7 +206,9 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
         rows.append(_row(build, what, "share of its bound", "1", excess, EXCESS[real]))
 
     solved, online = ref.solution.drive, followed[:, 1 : 1 + n]
-    limit = 1e-8 * m.u_scale.max() if real is Real.DOUBLE else _float_limit(m, "drive", np.abs(solved).max(), ref)
+    limit = 1e-8 * m.u_scale.max()  # ten times IPOPT's own tolerance
+    if real is Real.FLOAT:
+        limit = max(limit, _float_limit(m, "drive", np.abs(solved).max(), ref))
     add("scenario, online C - IPOPT", "drive", online - solved, limit)
 
     role = ref.scenario.file.follow
@@ -200,15 +227,42 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
         table = _run(program, "sample", np.arange(len(solved)), n)
         single = solved if real is Real.DOUBLE else solved.astype(np.float32).astype(float)
         add("player C - IPOPT", "drive", table[:, 1:] - single, 0.0)
-        times = (np.arange(len(solved)) + 0.5) * ref.scenario.sample_time
-        between = _run(program, "at", times[:-1], n)
-        add(
-            "player C at mid-sample - IPOPT",
-            "drive",
-            between[:, 1:] - solved[:-1],
-            1e-9 if real is Real.DOUBLE else 1e-4 * np.abs(solved).max(),
-        )
+        times = (
+            np.arange(len(solved) - 1) + 0.75
+        ) * ref.scenario.sample_time  # a quarter of the way from middle to middle
+        between = _run(program, "at", times, n)
+        expected = 0.75 * solved[:-1] + 0.25 * solved[1:]
+        limit = (1e-9 if real is Real.DOUBLE else 1e-4) * max(
+            np.abs(solved).max(), 1e-3 * m.u_scale.max()
+        )  # rounding of the time
+        add("player C a quarter on - linear between samples", "drive", between[:, 1:] - expected, limit)
     return rows
+
+
+def _shipped_test(build: str, program: Path) -> Row:
+    """The generated folder's own test of reference vectors: 0 when it passes."""
+    done = subprocess.run([f"{program}_test"], capture_output=True, text=True, check=False, start_new_session=True)
+    failed = float(done.returncode != 0)
+    return Row(
+        build, "the folder's own test", "vectors", "1", failed, failed, 0.0, 1, None if done.returncode == 0 else 0
+    )
+
+
+def _equilibria(ref: Reference, answers: np.ndarray) -> np.ndarray:
+    """(n, channels): where the model comes to rest under constant drives, found by simulating it, not by the inverse."""
+    m = ref.model
+    n = len(m.axes)
+    drives = answers[:, 1 : 1 + n]
+    x, z, u = (ca.MX.sym(name, s.numel()) for name, s in (("x", m.x), ("z", m.z), ("u", m.u)))
+    dynamics = m.dynamics(x, z, u, m.p_nominal)
+    scale = np.concatenate([m.x_scale, m.z_scale])
+    scaled = ca.vertcat(dynamics[0] / m.x_scale, dynamics[1] / m.force_scale)
+    w = ca.MX.sym("w", len(scale))
+    at = ca.substitute([scaled], [x, z], [w[: len(m.rest)] * m.x_scale + m.rest, w[len(m.rest) :] * m.z_scale])[0]
+    newton = ca.rootfinder("rest", "newton", {"x": w, "p": u, "g": at}, {"abstol": 1e-14, "max_iter": 60})
+    roots = newton.map(len(drives))(np.ones((len(scale), len(drives))), drives.T).full().T
+    states, displacements = roots[:, : len(m.rest)] * m.x_scale + m.rest, roots[:, len(m.rest) :] * m.z_scale
+    return trace(m, np.zeros(len(drives)), states, displacements, drives).signals[ref.scenario.file.follow]
 
 
 def _drive_sets(program: Path, ref: Reference, online: np.ndarray) -> list[tuple[str, np.ndarray]]:

@@ -14,9 +14,10 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.inverse import Inverse, invert
-from ctrlgen.model import Limit, Model
+from ctrlgen.model import Limit, Model, build_model
 
 SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for
+MEMORY_SHRINKS = 4  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
 BISECTIONS = 12  # of the way to a target that the drives cannot reach in one sample: 1/4096 of it
 
 
@@ -42,43 +43,64 @@ class Controller:
     @cached_property
     def static(self) -> Inverse:
         """Kernels for equilibria."""
-        return invert(self.model, self.follow, None)
+        return invert(self.nominal, self.follow, None)
 
     @cached_property
     def moving(self) -> Inverse | None:
         """Kernels for the next sample; None where there is no sample time."""
-        return None if self.sample_time is None else invert(self.model, self.follow, self.sample_time)
+        return None if self.sample_time is None else invert(self.nominal, self.follow, self.sample_time)
 
-    def _worst_in_range(self, ratio: ca.SX) -> float:
-        """The largest value of a convex `ratio` over the displacement range: that of its worst corner."""
-        z = self.model.z
-        corners = np.array(list(product(*zip(*self.model.z_bounds, strict=True)))).T
-        return float(ca.mmax(ca.Function("f", [z], [ratio]).map(corners.shape[1])(corners)))
+    @cached_property
+    def nominal(self) -> Model:
+        """The model with every parameter at its nominal number, which is what a controller can use."""
+        return build_model(self.model.device) if self.model.p.numel() else self.model
+
+    def _worst_in_range(self, limit: Limit) -> float:
+        """The largest share of a convex limit over the displacement range, nothing remembered: that of its worst corner."""
+        m = self.nominal
+        corners = np.array(list(product(*zip(*m.z_bounds, strict=True)))).T
+        shares = ca.Function("shares", [m.x, m.z], [limit.expr / limit.upper])
+        return float(
+            np.max(shares.map(corners.shape[1])(np.tile(m.rest[:, None], (1, corners.shape[1])), corners).full())
+        )
 
     @cached_property
     def guarded_limits(self) -> tuple[Limit, ...]:
         """Composite limits that the range of the displacement alone does not keep."""
-        limits = [limit for limit in self.model.composite_limits() if limit.upper is not None]
-        return tuple(limit for limit in limits if self._worst_in_range(ca.mmax(limit.expr / limit.upper)) > 1)
+        limits = [limit for limit in self.nominal.composite_limits() if limit.upper is not None]
+        x = self.nominal.x
+        return tuple(limit for limit in limits if ca.depends_on(limit.expr, x) or self._worst_in_range(limit) > 1)
 
     @cached_property
     def composite_ratio(self) -> ca.Function:
-        """z -> the largest of the guarded limits' expr/upper; above 1 a limit is broken."""
-        z = self.model.z
+        """(x, z, wanted) -> the largest of the guarded limits' expr/upper at the wanted displacement; above 1 one is broken."""
+        m = self.nominal
+        wanted = ca.SX.sym("wanted", m.z.numel())
+        x_then = ca.vertcat(m.x[: m.n_states], (self.moving or self.static).memory(m.x, m.z, wanted))
         squares = [
-            limit.expr**2 * (1 / limit.upper**2) for limit in self.guarded_limits if limit.upper
-        ]  # one root at the end
-        worst = ca.sqrt(ca.mmax(ca.vertcat(*squares))) if squares else ca.SX(0)
-        return ca.Function("composite_ratio", [z], [worst], ["z"], ["ratio"], {"cse": True})
+            ca.substitute(limit.expr, ca.vertcat(m.x, m.z), ca.vertcat(x_then, wanted)) ** 2 * (1 / limit.upper**2)
+            for limit in self.guarded_limits if limit.upper
+        ]  # fmt: skip
+        worst = ca.sqrt(ca.mmax(ca.vertcat(*squares))) if squares else ca.SX(0)  # one root at the end
+        return ca.Function(
+            "composite_ratio", [m.x, m.z, wanted], [worst], ["x", "z", "wanted"], ["ratio"], {"cse": True}
+        )
+
+    @property
+    def shrinks(self) -> int:
+        """How often a displacement is shrunk toward home: once, if all of a limit shrinks with it."""
+        return MEMORY_SHRINKS if self.nominal.x.numel() > self.nominal.n_states else 1
 
     @cached_property
     def safe_displacement(self) -> float:
-        """The edge [m] of a box [0, edge]^n in which no guarded limit can be broken.
+        """The edge [m] of a box [0, edge]^n in which no guarded limit can be broken; below all where memories matter.
 
-        The limits are convex and zero at home, so the box shrunk by the worst corner's ratio is safe.
+        The limits are convex and zero at home, so the box shrunk by the worst corner's share is safe.
         """
-        _, high = self.model.z_bounds
-        return float(np.max(high)) / max(self._worst_in_range(self.composite_ratio(self.model.z)), 1.0)
+        low, high = self.nominal.z_bounds
+        if self.nominal.x.numel() > self.nominal.n_states or not self.guarded_limits:
+            return float(np.min(low)) - 1.0
+        return float(np.max(high)) / max(1.0, *(self._worst_in_range(limit) for limit in self.guarded_limits))
 
     @cached_property
     def input_limits(self) -> np.ndarray:
@@ -88,7 +110,7 @@ class Controller:
     @cached_property
     def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What displacement, actuator state and drive may miss a limit by unreported; the drive's is theirs, carried through."""
-        m, n = self.model, self.model.n_states
+        m, n = self.nominal, self.nominal.n_states
         z_slack, state_slack = self.slack * m.z_scale, self.slack * m.x_scale[:n]
         x, z = self.rest()
         kernel = (self.moving or self.static).drive
@@ -105,7 +127,7 @@ class Controller:
         With `settle` the equilibrium at `target` instead, and its state. A target that the drives
         cannot reach in time is approached on the straight line of displacements, which the convex limits allow.
         """
-        m = self.model
+        m = self.nominal
         k = self.static if settle or self.moving is None else self.moving
         (z_low, z_high), (x_low, x_high), (u_low, u_high) = m.z_bounds, m.x_bounds, m.u_bounds
         z_slack, s_slack, u_slack = self.slacks
@@ -128,12 +150,14 @@ class Controller:
         if hit:
             status |= Status.STATE
             wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, u_low))
-        if np.max(wanted) > self.safe_displacement:
-            ratio = float(self.composite_ratio(wanted))
-            if ratio > 1:
-                wanted = wanted / ratio
+        if self.guarded_limits and np.max(wanted) > self.safe_displacement:
+            first = ratio = float(self.composite_ratio(x, z, wanted))
+            for _ in range(self.shrinks):
+                wanted = wanted / max(ratio, 1.0)
+                ratio = float(self.composite_ratio(x, z, wanted)) if self.shrinks > 1 else 1.0
+            if first > 1:
                 held, _ = acting(wanted)
-            status |= Status.COMPOSITE if ratio > 1 + self.slack else Status(0)
+            status |= Status.COMPOSITE if first > 1 + self.slack else Status(0)
         u, beyond = drive(wanted, held)
         if beyond:
             status |= Status.DRIVE

@@ -24,6 +24,7 @@ class Place(Enum):
     """Where a term is added on the way from command to reading."""
 
     DRIVE = "drive"  # on what the amplifier delivers to an actuator
+    HEAT = "heat"  # on what arrives in an actuator: the heater's power, whatever the drive is
     FORCE = "force"  # on the actuator bar, positive along the actuator's push
     DISPLACEMENT = "displacement"  # between the stage and the mechanism it carries
     POSE = "pose"  # between the mechanism and the platform

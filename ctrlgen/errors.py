@@ -4,8 +4,7 @@ CtrlgenError
 ├── InputError        a file or an argument is wrong; lists every fault found
 ├── Unreachable       the device cannot follow the trajectory; carries the nearest one
 ├── SolverError       IPOPT stopped without a solution
-├── ToolError         a compiler is missing or refuses the generated C
-└── ToleranceError    a comparison is out of tolerance
+└── ToolError         a compiler is missing or refuses the generated C
 """
 
 from __future__ import annotations
@@ -65,7 +64,3 @@ class SolverError(CtrlgenError):
 
 class ToolError(CtrlgenError):
     """A program outside ctrlgen (a C compiler) is missing or failed."""
-
-
-class ToleranceError(CtrlgenError):
-    """Two computations of the same quantity differ by more than the stated tolerance."""

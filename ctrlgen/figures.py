@@ -17,6 +17,7 @@ from ctrlgen.measures import force_parts
 from ctrlgen.shortfall import REACHED
 from ctrlgen.solution import Solution
 from ctrlgen.units import from_si
+from ctrlgen.workspace import Ball, Workspace
 
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")  # colour-blind safe, a pair per stage
 STYLE = {
@@ -97,7 +98,7 @@ def draw_path(solution: Solution) -> Figure:
 
 
 def draw_signal(solution: Solution, role: str) -> Figure:
-    """The six channels of one signal over time, or over the samples of a static scenario (S1 Fig. 14(b) for the forces)."""
+    """The six channels of one signal over time, or over the samples of a static scenario (S1 Fig. 14(b) shows such forces)."""
     signal = solution.model.signals[role]
     values = solution.trace.signals[role]
     static = solution.scenario.sample_time is None
@@ -107,7 +108,7 @@ def draw_signal(solution: Solution, role: str) -> Figure:
         axes.plot(
             horizontal,
             from_si(values[:, i], signal.units[i]),
-            "o-" if static else "-",
+            "o" if static else "-",
             ms=4,
             lw=1.3,
             color=COLOURS[i % 6],
@@ -165,4 +166,29 @@ def draw_stage_force(solution: Solution) -> Figure:
     axes.set_xlabel(f"displacement {solution.model.axes[axis]} [um]")
     axes.set_ylabel("force on the actuator bar [N]")
     axes.legend()
+    return figure
+
+
+def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) -> Figure:
+    """Slices of the workspace in two translations, one outline a base pose, and the largest ball, seen from two sides."""
+    signal = workspace.model.signals["pose"]
+    x, y, z = (i for i, unit in enumerate(signal.units) if unit == "um")
+    figure, panels = plt.subplots(1, 2, figsize=(8.6, 4.2))
+    for base, colour in zip(bases, COLOURS[::2], strict=False):
+        edge = from_si(workspace.outline(base, x, y), "um")
+        label = f"{signal.channels[z]} = {from_si(base[z], 'um'):.3g} um"
+        panels[0].fill(*edge.T, facecolor=colour, edgecolor=colour, alpha=0.25, lw=1.5, label=label)
+    side = from_si(workspace.outline(ball.centre, x, z), "um")
+    panels[1].fill(
+        *side.T, facecolor=COLOURS[0], edgecolor=COLOURS[0], alpha=0.25, lw=1.5, label="through the ball's centre"
+    )
+    centre = from_si(ball.centre, "um")
+    radius = ball.radius * from_si(signal.scale[x], "um")
+    panels[1].add_patch(plt.Circle((centre[x], centre[z]), radius, fill=False, color=COLOURS[2], lw=1.5))
+    panels[1].plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius:.3g} um")
+    for panel, across, up in ((panels[0], x, y), (panels[1], x, z)):
+        panel.set_aspect("equal", adjustable="datalim")
+        panel.set_xlabel(f"{signal.channels[across]} [um]")
+        panel.set_ylabel(f"{signal.channels[up]} [um]")
+        panel.legend(fontsize=8, loc="upper right")
     return figure

@@ -50,7 +50,10 @@ def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Mod
 
 
 def _fault(model: type[BaseModel], details: Any) -> Fault:
-    location = [part for part in details["loc"] if part != "function-before"]
+    tags = {"function-before", *_tags(model)}  # pydantic's own names of the branches of a union
+    location = [
+        part for k, part in enumerate(details["loc"]) if not (part in tags and (k > 0 or part == "function-before"))
+    ]
     where = ""
     for part in location:
         where += f"[{part}]" if isinstance(part, int) else (f".{part}" if where else str(part))
@@ -63,9 +66,34 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
         message = "is not a key I know; " + (
             f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(siblings)}"
         )
+    elif details["type"] in _REMEDY:
+        message = f"{details['input']!r}: {_REMEDY[details['type']]}"
     elif details["type"] == "literal_error":
         message = f"{details['input']!r} must be {details['ctx']['expected']}"
     return Fault(where or "file", message)
+
+
+_REMEDY = {
+    "tuple_type": "write a list, such as [..., ...]",
+    "string_type": 'write a text in quotes, such as "..."',
+    "int_type": "write a whole number",
+    "int_parsing": "write a whole number",
+    "float_type": "write a number without a unit",
+    "float_parsing": "write a number without a unit",
+    "bool_type": "write true or false",
+    "model_type": "write a table, such as { ... } or [section]",
+    "dict_type": 'write a table, such as { delta_z = "20 um" }',
+}
+
+
+def _tags(model: type[BaseModel]) -> set[str]:
+    """Values of `kind` by which unions inside `model` are told apart."""
+    found = set()
+    for field in model.model_fields.values():
+        for member in getattr(field.annotation, "__args__", ()):
+            kind = getattr(member, "model_fields", {}).get("kind")
+            found |= set(getattr(getattr(kind, "annotation", None), "__args__", ()))
+    return found
 
 
 def _keys(model: type[BaseModel], location: list[Any]) -> list[str]:
@@ -101,36 +129,51 @@ def write_bytes(path: Path, content: bytes) -> None:
 def whole_folder(out: Path) -> Iterator[Path]:
     """A folder that appears at `out` only when the block ends without an error.
 
-    Yields a temporary folder beside `out`; on success it replaces `out`, which must be absent, empty,
-    or an earlier result (it holds `.ctrlgen`). On an error or Ctrl-C `out` is left as it was.
+    Yields a temporary folder beside `out`; on success it replaces `out`, which must be absent, empty, or an
+    earlier result and nothing else (`.ctrlgen` lists what was made). On an error or Ctrl-C `out` is left as it was.
     Raises InputError when `out` cannot be written or holds somebody else's files.
     """
-    out = Path(os.path.abspath(out))
-    if out.exists() and not out.is_dir():
-        raise InputError(out, [Fault("--out", "is a file; name a folder")])
-    if out.is_dir() and any(out.iterdir()) and not (out / MARKER).exists():
-        raise InputError(out, [Fault("--out", "holds files that ctrlgen did not make; name an empty or new folder")])
     try:
+        out = Path(out).resolve()
+        if out.exists() and not out.is_dir():
+            raise InputError(out, [Fault("--out", "is a file; name a folder")])
+        foreign = _foreign(out)
+        if foreign:
+            what = f"holds {foreign[0]}, which ctrlgen did not make; move it away, or name an empty or new folder"
+            raise InputError(out, [Fault("--out", what)])
         out.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
     except OSError as error:
         raise InputError(
             out, [Fault("--out", f"cannot be written ({error.strerror}); name a folder you may write")]
         ) from None
+    retired = draft.with_name(draft.name + ".old")
     try:
         yield draft
-        (draft / MARKER).write_text("a result of ctrlgen; the next run with the same --out replaces this folder\n")
+        made = sorted(str(path.relative_to(draft)) for path in draft.rglob("*") if path.is_file())
+        (draft / MARKER).write_text("\n".join(made) + "\n", encoding="utf-8")
         draft.chmod(0o755)
         if out.exists():
-            retired = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-            os.replace(out, retired / "old")
-            os.replace(draft, out)
-            shutil.rmtree(retired)
-        else:
-            os.replace(draft, out)
+            os.replace(out, retired)
+        os.replace(draft, out)
     except BaseException:
+        if retired.exists() and not out.exists():
+            os.replace(retired, out)
         shutil.rmtree(draft, ignore_errors=True)
         raise
+    finally:
+        shutil.rmtree(retired, ignore_errors=True)
+
+
+def _foreign(out: Path) -> list[str]:
+    """Files in `out` that an earlier run did not list as its own."""
+    if not out.is_dir():
+        return []
+    marker = out / MARKER
+    made = {MARKER, *marker.read_text(encoding="utf-8").splitlines()} if marker.exists() else set()
+    return sorted(
+        name for path in out.rglob("*") if path.is_file() and (name := str(path.relative_to(out))) not in made
+    )
 
 
 MARKER = ".ctrlgen"

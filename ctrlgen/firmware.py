@@ -20,7 +20,7 @@ from ctrlgen.files import write_text
 from ctrlgen.model import Model
 from ctrlgen.scenario import Scenario
 from ctrlgen.solution import Solution
-from ctrlgen.units import show
+from ctrlgen.units import base_unit, show
 
 FLOAT_SLACK = 4e-6  # as SLACK of the controller, for float: 0.4 mK, which four roundings of a temperature amount to
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
@@ -39,6 +39,7 @@ class CFolder:
     path: Path
     online: dict[Real, str]
     player: dict[Real, str]
+    test: dict[Real, str]
     operations: int
     worst_operations: int
 
@@ -69,7 +70,7 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
         f"{scenario.name}_{piece}_${{real}}.c" for piece in ("online", "player") if piece == "online" or player
     )
     _render("CMakeLists.txt", {"name": scenario.name, "sources": sources}, out / "CMakeLists.txt")
-    return CFolder(out, online, player, *cost)
+    return CFolder(out, online, player, {real: f"test_{scenario.name}_{real.suffix}" for real in Real}, *cost)
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
@@ -97,7 +98,7 @@ def _render(template: str, context: dict[str, Any], path: Path) -> None:
 
 def _online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
     """Everything the templates of one online controller need."""
-    model = controller.model
+    model = controller.nominal
     n = len(model.axes)
     kernels: dict[str, Kernel] = {}  # by body: what settling and stepping share is printed once
 
@@ -133,16 +134,26 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     last = modes[-1]
     step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", "advance"))
     once_more = last["state"].operations + last["drive"].operations
-    worst_cost = step_cost + 2 * balance.operations + (ratio.operations if ratio else 0) + once_more * (BISECTIONS + 2)
+    worst_cost = (
+        step_cost
+        + 2 * balance.operations
+        + (controller.shrinks * ratio.operations if ratio else 0)
+        + once_more * (BISECTIONS + 2)
+    )
     return {
-        "prefix": prefix, "real": real, "version": __version__, "title": model.device.title, "source": model.device.source,
+        "prefix": prefix, "real": real, "version": __version__, "title": _comment(model.device.title),
+        "source": _comment(model.device.source),
         "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
-        "composite": ", ".join(limit.label for limit in model.composite_limits()) or "composite limits",
-        "x_names": model.x_names, "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
-        "balance": balance, "bisections": BISECTIONS, "safe": controller.safe_displacement if ratio else 0.0,
+        "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
+        
+        "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
+        
+        "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
+        "balance": balance, "bisections": BISECTIONS, "shrinks": controller.shrinks,
+        "ratio_uses_state": bool(ratio) and bool({"x", "z"} & set(ratio.arguments)), "safe": controller.safe_displacement if ratio else 0.0,
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else SLACK, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack, 
@@ -154,7 +165,7 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
 def _player_context(solution: Solution, prefix: str) -> dict[str, Any]:
     return {
         "prefix": prefix,
-        "title": solution.scenario.file.title,
+        "title": _comment(solution.scenario.file.title),
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
         "table": solution.drive,
@@ -167,6 +178,7 @@ def _vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[st
 
     The tolerance is the change of drive that four roundings of what it follows from cause.
     """
+    controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     rng = np.random.default_rng(0)
     scale = np.array(controller.model.signals[controller.follow].scale)
     beyond = rng.normal(size=(16, command.shape[1])) * 40 * scale
@@ -175,16 +187,27 @@ def _vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[st
     rounding = 4 * (np.finfo(np.float32).eps if real is Real.FLOAT else np.finfo(np.float64).eps)
     for k, target in enumerate(targets):
         target = np.array(target, dtype=np.float32).astype(float) if real is Real.FLOAT else target
-        settle = k == 0 or controller.moving is None
+        settle = k == 0 or k >= len(targets) - len(beyond) - 1 or controller.moving is None
         before, step = state, controller.step(state, target, settle=settle)
         state = step.state
-        vectors.append({"target": target, "drive": step.drive, "status": int(step.status)})
-        if not step.status & Status.INPUT:
+        exact = (
+            not step.status & Status.DRIVE
+        )  # a bisection may turn the other way in float: only its status is compared
+        vectors.append(
+            {"target": target, "drive": step.drive, "status": int(step.status), "settle": settle, "exact": exact}
+        )
+        if exact and not step.status & Status.INPUT:
             kernel = (controller.static if settle or controller.moving is None else controller.moving).drive
             reached = (step.displacement, step.actuator_state)
             off = kernel(*before, *(value * (1 + rounding) for value in reached)) - kernel(*before, *reached)
             tolerance = max(tolerance, float(np.max(np.abs(off.full()))))
+    tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
     return {"vectors": vectors, "tolerance": tolerance}
+
+
+def _comment(text: str) -> str:
+    """`text` as it may stand inside a C comment, on one line."""
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")
 
 
 def _number(value: float) -> float | int:
@@ -193,8 +216,7 @@ def _number(value: float) -> float | int:
 
 def _si_text(signal: Any) -> str:
     """'theta_x [rad], ... delta_z [m]' with the SI unit of each channel."""
-    units = {"um": "m", "degC": "K"}
-    return ", ".join(f"{c} [{units.get(u, u)}]" for c, u in zip(signal.channels, signal.units, strict=True))
+    return ", ".join(f"{c} [{base_unit(u)}]" for c, u in zip(signal.channels, signal.units, strict=True))
 
 
 def _limit_text(limit: Any) -> str:

@@ -25,15 +25,17 @@ NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves 
 class Inverse:
     """Kernels, SX functions in SI, that a controller calls in this order.
 
-    `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted (none for actuators without memory);
-    `drive` (x, z, z_wanted, s_wanted) -> u; `advance` (x, z, u) -> x at the next sample. x, z are those of
-    the present sample. A static inverse reads neither, except that its `advance` takes the new z.
-    `settle` (x, z, u) -> the displacement that balances the actuators' forces, by Newton from z.
+    `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted (none for
+    actuators without memory); `drive` (x, z, z_wanted, s_wanted) -> u; `memory` (x, z, z_wanted) -> the effects'
+    memories then; `advance` (x, z, u) -> x at the next sample; `settle` (x, z, u) -> the displacement that balances
+    the actuators' forces, by Newton from z. x, z are those of the present sample. A static inverse reads
+    neither, except that its `advance` takes the new z.
     """
 
     displacement: ca.Function
     state: ca.Function
     drive: ca.Function
+    memory: ca.Function
     advance: ca.Function
     settle: ca.Function
 
@@ -45,40 +47,38 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     """
     x, z, u, n, n_s = model.x, model.z, model.u, len(model.axes), model.n_states
     x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
-    target = ca.SX.sym("target", model.signals[follow].expr.numel())
+    heat, target = model.heat, ca.SX.sym("target", model.signals[follow].expr.numel())
     now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, ca.DM(model.p_nominal))
-    # For each unknown: the value to expand about, and a value inside the range of operation.
-    known = _Values(
-        ca.vertcat(x, z, target, x_1, z_1, u_1),
-        np.concatenate(
-            [model.rest, 0 * model.z_scale, np.zeros(target.numel()), model.rest, 0 * model.z_scale, 0 * model.u_scale]
-        ),
-        np.concatenate(
-            [model.x_scale, model.z_scale, np.zeros(target.numel()), model.x_scale, model.z_scale, model.u_scale]
-        ),
-    )
-    followed, balance, rates = (
-        ca.substitute(e, now, end) for e in (model.signals[follow].expr, model.balance, model.rates)
+    known = _Values.of(
+        (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (target, np.zeros(target.numel()), np.zeros(target.numel())),
+        (x_1, model.rest, model.x_scale), (z_1, 0 * model.z_scale, model.z_scale), (u_1, 0 * model.u_scale, model.u_scale),
+        (heat, np.zeros(heat.numel()), np.ones(heat.numel())),
+    )  # fmt: skip
+    followed, balance, rates, produced = (
+        ca.substitute(e, now, end)
+        for e in (model.signals[follow].expr, model.balance, model.rates_of_heat, model.heat_of_drive)
     )
     if sample_time is None:
         motion = rates
-        advance = ca.substitute(_solve(known, rates, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
+        reached = ca.substitute(_solve(known, rates, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
     else:
-        advance = ca.substitute(
-            model.step(sample_time), ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal))
-        )
-        motion = x_1 - advance
-
-    wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion), ca.vertcat(z_1, x_1, u_1))[:n]
+        reached = ca.substitute(model.step(sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
+        motion = x_1 - reached
+    heating = heat - produced
+    wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion, heating), ca.vertcat(z_1, x_1, u_1, heat))[
+        :n
+    ]
     # The later kernels take the earlier results as given, because the controller has limited them meanwhile.
-    later = _solve(known, ca.vertcat(balance, motion), ca.vertcat(x_1, u_1))
+    later = _solve(known, ca.vertcat(balance, motion, heating), ca.vertcat(x_1, u_1, heat))
     wanted_state, memory = later[:n_s], later[n_s : x.numel()]
-    drive_of_state = ca.substitute(motion[:n_s], x_1[n_s:], memory)
-    wanted_u = _solve(known, drive_of_state, u_1) if n_s else later[x.numel() :]
+    drive_of_state = ca.vertcat(ca.substitute(motion[:n_s], x_1[n_s:], memory), heating)
+    wanted_u = _solve(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
+    advance = ca.substitute(reached, heat, produced)
     return Inverse(
         _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
         _kernel("state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
         _kernel("drive", [x, z, z_1, x_1[:n_s]], ["x", "z", "wanted", "state"], wanted_u),
+        _kernel("memory", [x, z, z_1], ["x", "z", "wanted"], memory),
         _kernel("advance", [x, z, u_1], ["x", "z", "drive"], advance),
         _kernel(
             "settle",
@@ -100,6 +100,12 @@ class _Values:
     symbols: ca.SX
     base: np.ndarray
     scale: np.ndarray
+
+    @classmethod
+    def of(cls, *rows: tuple[ca.SX, np.ndarray, np.ndarray]) -> _Values:
+        """From (symbol, base, scale) for each vector of unknowns or knowns."""
+        symbols, bases, scales = zip(*rows, strict=True)
+        return cls(ca.vertcat(*symbols), np.concatenate(bases), np.concatenate(scales))
 
     def at(self, expression: ca.SX, fraction: float) -> np.ndarray:
         """`expression` at base + fraction * scale."""

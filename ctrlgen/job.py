@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from ctrlgen import report
+import numpy as np
+
+from ctrlgen import figures, report
 from ctrlgen.comparison import Comparison, compare, find_compilers
-from ctrlgen.files import whole_folder
+from ctrlgen.devices import Device
+from ctrlgen.errors import SolverError
+from ctrlgen.files import whole_folder, write_text
 from ctrlgen.firmware import CFolder, generate
 from ctrlgen.measures import Expected, expectations
 from ctrlgen.model import build_model
 from ctrlgen.scenario import Scenario, load_scenario
 from ctrlgen.solution import Solution, solve
+from ctrlgen.units import from_si
+from ctrlgen.workspace import Ball, Workspace
 
 Progress = Callable[[str], None]
 STAGES = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
@@ -43,7 +51,12 @@ def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) 
     """Loads and solves. Raises InputError, Unreachable, SolverError."""
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     progress("symbolic model")
-    return solve(scenario, build_model(scenario.device), progress)
+    solution = solve(scenario, build_model(scenario.device), progress)
+    if scenario.file.outcome == "unreachable":
+        raise SolverError(
+            f"{scenario.path}: outcome = 'unreachable', but the path can be followed; remove that line or move the path"
+        )
+    return solution
 
 
 def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
@@ -77,7 +90,7 @@ def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Pr
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         c = generate(solution.scenario, solution.model, draft, solution)
-    return CFolder(Path(out), c.online, c.player, c.operations, c.worst_operations)
+    return replace(c, path=Path(out))
 
 
 def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) -> Outcome:
@@ -89,3 +102,58 @@ def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) ->
         c = generate(solution.scenario, solution.model, Path(scratch), solution)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
     return Outcome(solution, c, comparison, ())
+
+
+@dataclass(frozen=True)
+class WorkspaceSummary:
+    """What `map_workspace` found; `ranges` per base pose (channels, 2), SI."""
+
+    workspace: Workspace
+    bases: list[np.ndarray]
+    ranges: list[np.ndarray]
+    translations: Ball
+    everything: Ball
+
+
+def map_workspace(device: Device, heights: list[float], out: Path) -> WorkspaceSummary:
+    """Ranges of each degree of freedom alone at some heights [m], slices, and the largest balls; workspace.json and a figure."""
+    model = build_model(device)
+    workspace, signal = Workspace(model), model.signals["pose"]
+    lengths = tuple(i for i, unit in enumerate(signal.units) if unit == "um")
+    bases = []
+    for height in heights:
+        base = np.zeros(len(signal.channels))
+        base[lengths[-1]] = height
+        bases.append(base)
+    ranges = [workspace.ranges(base) for base in bases]
+    middle = bases[len(bases) // 2]
+    balls = workspace.ball(middle, lengths), workspace.ball(middle, tuple(range(len(signal.channels))))
+    found = WorkspaceSummary(workspace, bases, ranges, *balls)
+    with whole_folder(out) as draft:
+        with figures.plt.rc_context(figures.STYLE):
+            write_text(draft / "workspace.svg", figures.svg(figures.draw_workspace(workspace, bases, balls[0])))
+        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(found), indent=1) + "\n")
+    return found
+
+
+def _workspace_numbers(found: WorkspaceSummary) -> dict[str, Any]:
+    """Plain numbers in the reader's units."""
+    signal = found.workspace.model.signals["pose"]
+    named = list(zip(signal.channels, signal.units, strict=True))
+
+    def row(values: np.ndarray) -> dict[str, Any]:
+        return {f"{c} [{u}]": np.asarray(from_si(values[i], u)).tolist() for i, (c, u) in enumerate(named)}
+
+    return {
+        "device": found.workspace.model.name,
+        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(found.bases, found.ranges, strict=True)],
+        "largest_ball": [
+            {
+                "channels": [signal.channels[i] for i in ball.channels],
+                "centre": row(ball.centre),
+                "radius_in_typical_sizes": ball.radius,
+            }
+            for ball in (found.translations, found.everything)
+        ],
+        "typical_sizes": row(np.array(signal.scale)),
+    }

@@ -9,11 +9,10 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.errors import Fault, InputError
-from ctrlgen.scenario import FILE
 from ctrlgen.solution import Solution
 from ctrlgen.units import from_si, parse
 
-_NAME = re.compile(r"^(\w+)\.(\w+)(?:\.(min|max|rms)|\[(\d+)\])?$")
+_NAME = re.compile(r"^(\w+)\.(\w+)(?:\.(min|max|rms|abs)|\[(\d+)\])?$")
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ def force_parts(solution: Solution) -> dict[str, np.ndarray]:
 def measure(solution: Solution, name: str) -> tuple[float, str]:
     """The value of `name` in SI and the reader's unit. Raises InputError for a name that does not exist.
 
-    SIGNAL.CHANNEL.min|max|rms or SIGNAL.CHANNEL[sample]: signals of the model, `force_linear` and
+    SIGNAL.CHANNEL.min|max|rms|abs (abs: the largest size) or SIGNAL.CHANNEL[sample]: signals of the model, `force_linear` and
     `force_nonlinear`, and `error` (followed minus commanded). margin.LIMIT: the smallest distance to a limit.
     """
     m, match = solution.model, _NAME.match(name)
@@ -76,7 +75,9 @@ def measure(solution: Solution, name: str) -> tuple[float, str]:
         if int(index) >= len(column):
             raise ValueError(f"{name!r}: there are {len(column)} samples")
         return float(column[int(index)]), unit
-    value = {"min": np.min, "max": np.max, "rms": lambda c: np.sqrt(np.mean(c**2))}[how](column)
+    value = {"min": np.min, "max": np.max, "rms": lambda c: np.sqrt(np.mean(c**2)), "abs": lambda c: np.abs(c).max()}[
+        how
+    ](column)
     return float(value), unit
 
 
@@ -87,12 +88,14 @@ def expectations(solution: Solution) -> tuple[Expected, ...]:
         try:
             measured, unit = measure(solution, expect.value)
             low, high = (parse(text, unit) for text in expect.range)
+            if low > high:
+                raise ValueError(f"range {list(expect.range)} is reversed; write the smaller bound first")
         except ValueError as error:
             faults.append(Fault(f"expect[{k}]", str(error)))
             continue
         results.append(Expected(expect.value, measured, low, high, unit.replace("delta_degC", "K"), expect.source))
     if faults:
-        raise InputError(solution.scenario.folder / FILE, faults)
+        raise InputError(solution.scenario.path, faults)
     return tuple(results)
 
 

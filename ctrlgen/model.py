@@ -20,7 +20,7 @@ import numpy as np
 from ctrlgen.devices import Device, Limit, Links, Signal
 from ctrlgen.effect import Effect, Place
 from ctrlgen.errors import Fault, InputError
-from ctrlgen.units import same_dimension
+from ctrlgen.units import base_unit, same_dimension, show
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,8 @@ class Model:
     """The physics of one device, symbolic.
 
     `x` (n_x,), `z` (n_axes,), `u` (n_axes,), `p` (n_free,): symbols. The first `n_states` of x are the actuators'
-    (temperatures), the others effects' memories. `rates` dx/dt (n_x,) and `balance` 0 = g(x, z, u) (n_axes,).
+    (temperatures), the others effects' memories. `rates_of_heat` dx/dt (n_x,) in terms of the `heat` that
+    `heat_of_drive` (u) produces, and `balance` 0 = g(x, z, u) (n_axes,).
     `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
     is one, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
     """
@@ -42,7 +43,10 @@ class Model:
     p: ca.SX
     p_nominal: np.ndarray
     x_names: tuple[str, ...]
-    rates: ca.SX
+    x_units: tuple[str, ...]
+    heat: ca.SX
+    heat_of_drive: ca.SX
+    rates_of_heat: ca.SX
     balance: ca.SX
     signals: dict[str, Signal]
     force_parts: dict[str, ca.SX]
@@ -52,6 +56,11 @@ class Model:
     z_scale: np.ndarray
     u_scale: np.ndarray
     force_scale: float
+
+    @cached_property
+    def rates(self) -> ca.SX:
+        """dx/dt (n_x,) as a function of x, z, u and p."""
+        return ca.substitute(self.rates_of_heat, self.heat, self.heat_of_drive)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -88,18 +97,19 @@ class Model:
             ["x", "z", "u", "p"], ["rates", "balance"],
         )  # fmt: skip
 
-    def step(self, sample_time: float) -> ca.SX:
+    def step(self, sample_time: float, rates: ca.SX | None = None) -> ca.SX:
         """x after one `sample_time` [s] with u and z held: x + h phi_1(h A) f, A = df/dx, phi_1(M) = M^-1 (e^M - 1).
 
         Exact for first-order lags. Where states act on one another phi_1 is summed to order 12,
         enough for |h A| <= 1. Raises InputError beyond that, asking for a shorter sample time.
         """
-        A = ca.jacobian(self.rates, self.x)
+        rates = self.rates if rates is None else rates
+        A = ca.jacobian(rates, self.x)
         h = sample_time
         if A.sparsity().is_diag():
             rate = ca.diag(A)
             gain = ca.vertcat(*(_phi_1(rate[i], h) for i in range(self.x.numel())))
-            return self.x + gain * self.rates
+            return self.x + gain * rates
         norm = float(
             ca.norm_inf(ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal))
         )
@@ -113,7 +123,7 @@ class Model:
                     )
                 ],
             )
-        term = total = h * self.rates
+        term = total = h * rates
         for order in range(2, 13):
             term = h / order * ca.mtimes(A, term)
             total += term
@@ -174,13 +184,44 @@ def build_model(device: Device, free: Sequence[str] = ()) -> Model:
     unknown = [path for path in free if path not in nominal]
     if unknown:
         raise InputError(device.name, [Fault(path, "is not a parameter of this device") for path in unknown])
+    counts = [path for path in free if nominal[path].whole]
+    if counts:
+        raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
     symbols = {path: ca.SX.sym(path) for path in free}
     p = device.values(symbols)
     links = device.links(p)
     chain = _Chain(device, links, p)
-    return chain.model(
-        ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1), np.array([nominal[path].si for path in free])
+    model = chain.model(
+        ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1), np.array([nominal[f].si for f in free])
     )
+    read = {symbol.name() for symbol in ca.symvar(ca.veccat(model.rates, model.balance, model.signals["reading"].expr))}
+    idle = [path for path in free if path not in read]
+    if idle:
+        what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
+        raise InputError(device.name, [Fault(path, what) for path in idle])
+    _check_stiffness(model)
+    return model
+
+
+def _check_stiffness(model: Model) -> None:
+    """Refuses a device whose restoring force does not rise over the whole stroke: its displacement would have no one value."""
+    slope = ca.Function("slope", [model.x, model.z, model.u, model.p], [ca.diag(ca.jacobian(model.balance, model.z))])
+    low, high = model.z_bounds
+    if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
+        return
+    for share in np.linspace(0, 1, 65):
+        z = low + share * (high - low)
+        value = slope(model.rest, z, 0, model.p_nominal).full().ravel()
+        bad = np.flatnonzero(~(value < 0))
+        if bad.size:
+            axis, where = model.axes[bad[0]], show(z[bad[0]], "um")
+            what = f"the restoring force of {axis} does not rise at {where}; soften less, or lower the stroke"
+            raise InputError(model.name, [Fault("stiffness", what)])
+
+
+def _numbers(values: Sequence[float | ca.SX], p: ca.SX, p_nominal: np.ndarray) -> np.ndarray:
+    """Values that may hold free parameters, at their nominal ones."""
+    return ca.Function("rest", [p], [ca.vertcat(*map(ca.SX, values), ca.SX(0, 1))])(p_nominal).full().ravel()
 
 
 class _Chain:
@@ -191,13 +232,15 @@ class _Chain:
         self.z = ca.SX.sym("d", len(links.axes))
         self.effects = [(effect, p.effect[k], k) for k, effect in enumerate(device.effect)]
         self.members: list[tuple[Effect, SimpleNamespace, int, dict[str, ca.SX]]] = []
-        names, scales = [], []
+        names, scales, units_ = [], [], []
         faults = []
         for effect, values, k in self.effects:
             channels, units = self._channels(effect.place)
             chosen = (
                 range(len(channels)) if effect.at == "all" else [i for i, c in enumerate(channels) if c == effect.at]
             )
+            if effect.place is Place.HEAT and links.heat_signal is None:
+                faults.append(Fault(f"effect[{k}].kind", f"{effect.kind} acts on heat, and this device has none"))
             if not chosen:
                 faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(channels)}, all"))
             for i in chosen:
@@ -214,18 +257,21 @@ class _Chain:
                 self.members.append((effect, values, i, states))
                 names += [symbol.name() for symbol in states.values()]
                 scales += [state.scale for state in effect.states]
+                units_ += [state.unit for state in effect.states]
         if faults:
             raise InputError(device.name, faults)
         self.memory = ca.vertcat(*(symbol for *_, states in self.members for symbol in states.values()))
-        self.memory_names, self.memory_scales = tuple(names), scales
+        self.memory_names, self.memory_scales, self.memory_units = tuple(names), scales, tuple(units_)
         self.memory_rates: dict[int, ca.SX] = {}
 
     def _channels(self, place: Place) -> tuple[tuple[str, ...], tuple[str, ...]]:
         if place in (Place.POSE, Place.SENSOR):
             return self.links.components, self.links.pose_units
-        unit = {Place.DRIVE: self.links.drive.units[0], Place.FORCE: self.links.force_unit, Place.DISPLACEMENT: "um"}[
-            place
-        ]
+        links = self.links
+        unit = {
+            Place.DRIVE: links.drive.units[0], Place.HEAT: links.heat_signal[1] if links.heat_signal else "1",
+            Place.FORCE: links.force_unit, Place.DISPLACEMENT: "um",
+        }[place]  # fmt: skip
         return self.links.axes, (unit,) * len(self.links.axes)
 
     def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
@@ -248,6 +294,9 @@ class _Chain:
         u, z = links.drive.expr, self.z
         x = ca.SX(0, 1) if links.state is None else links.state.expr
         drive = self._with_terms(Place.DRIVE, u)
+        produced = links.heat(drive)
+        heat = ca.SX.sym("heat", n)  # an unknown of its own, so that the inverse need not take squares apart
+        arriving = self._with_terms(Place.HEAT, heat)
         pushed = links.force(drive, x, z)
         balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z)
         displacement = self._with_terms(Place.DISPLACEMENT, z)
@@ -259,13 +308,18 @@ class _Chain:
         travel = (links.displacement_scale,) * n
         signals = {
             "drive": links.drive,
-            **{signal.name: signal for signal in links.extra(drive, x, z)},
             **({} if links.state is None else {"state": links.state}),
             "force": Signal("force", "actuator force", axes, units, "F_", pushed, sizes),
             "displacement": Signal("displacement", "stage displacement", axes, ("um",) * n, "d_", displacement, travel),
             "pose": Signal("pose", "platform pose", *posed, "", pose, links.pose_scale),
             "reading": Signal("reading", "sensor reading", *posed, "reading_", reading, links.pose_scale),
         }
+        if links.heat_signal is not None:
+            label, unit, column, size = links.heat_signal
+            power = Signal(
+                "power", label, axes, (unit,) * n, column, ca.substitute(arriving, heat, produced), (size,) * n
+            )
+            signals = {"drive": signals.pop("drive"), "power": power, **signals}
         state_names = () if links.state is None else tuple(f"{links.state.name}_{axis}" for axis in axes)
         state_scale = () if links.state is None else links.state.scale
         return Model(
@@ -278,12 +332,17 @@ class _Chain:
             p=p,
             p_nominal=p_nominal,
             x_names=state_names + self.memory_names,
-            rates=ca.vertcat(links.rates(x, drive), memory_rates),
+            x_units=tuple(base_unit(u) for u in (*(links.state.units if links.state else ()), *self.memory_units)),
+            heat=heat,
+            heat_of_drive=produced,
+            rates_of_heat=ca.vertcat(links.rates(x, arriving), memory_rates),
             balance=balance,
             signals=signals,
             force_parts=links.resistance_parts(z),
-            limits=tuple(links.limits(SimpleNamespace(drive=u, state=x, force=pushed, displacement=z))),
-            rest=np.concatenate([np.array([float(v) for v in links.rest]), np.zeros(len(self.memory_scales))]),
+            limits=tuple(
+                links.limits(SimpleNamespace(drive=u, state=x, force=pushed, displacement=z, carried=displacement))
+            ),
+            rest=np.concatenate([_numbers(links.rest, p, p_nominal), np.zeros(len(self.memory_scales))]),
             x_scale=np.array([*state_scale, *self.memory_scales]),
             z_scale=np.full(n, links.displacement_scale),
             u_scale=np.array(links.drive.scale),

@@ -77,10 +77,6 @@ class Path_(Section):
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         raise NotImplementedError
 
-    def count(self, folder: Path) -> int | None:
-        """Number of samples where the path itself fixes it."""
-        return None
-
 
 class Circle(Path_):
     """centre + (diameter/2) (cos w t, sin w t) in `plane`, `turns` whole turns; starts on the first channel's side."""
@@ -227,6 +223,8 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
             )
             continue
         index = frame.channels.index(name)
+        if index in [known for known, _, _ in columns]:
+            faults.append(Fault("line 1", f"column {name!r} stands twice; keep one"))
         try:
             parse(f"0 {unit}", frame.units[index])
         except ValueError:

@@ -116,7 +116,7 @@ class Programme:
                 "sb": "yes",
                 "tol": 1e-10,
                 "mu_strategy": "adaptive",
-                "max_iter": 300,
+                "max_iter": 120,
                 "nlp_scaling_method": "none",
             },
         }
@@ -149,7 +149,7 @@ class Programme:
         )
         keep = slice(0, self.wanted)
         x, z, u, s, before = x[keep], z[keep], u[keep], s[keep], before[keep]
-        result = trace(m, np.arange(len(x)) * (self.scenario.sample_time or 1.0), x, z, u)
+        result = trace(m, np.arange(len(x)) * (self.scenario.sample_time or 0.0), x, z, u)
         if not static:
             reached = trace(m, result.time, x, z, before)
             result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})

@@ -37,7 +37,8 @@ class Reference:
         m, rng = self.model, np.random.default_rng(20)
         low, high = m.z_bounds
         z = rng.uniform(low, high, size=(RANDOM_TARGETS // 2, len(m.axes)))
-        ratio = self.controller.composite_ratio.map(len(z))(z.T).full().ravel()
+        cold = np.tile(m.rest[:, None], (1, len(z)))
+        ratio = self.controller.composite_ratio.map(len(z))(cold, 0 * z.T, z.T).full().ravel()
         z = z / np.maximum(ratio, 1.0)[:, None]
         x, u = np.tile(m.rest, (len(z), 1)), np.zeros_like(z)
         signal = self.scenario.file.follow

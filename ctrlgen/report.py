@@ -34,7 +34,9 @@ def write_trajectory(solution: Solution, path: Path) -> None:
         *CSV_SIGNALS,
         *(["drive"] if solution.model.signals["drive"].columns != solution.model.signals["power"].columns else []),
     ]
-    header, columns = ["time [s]"], [solution.trace.time[:, None]]
+    static = solution.scenario.sample_time is None
+    header = ["sample" if static else "time [s]"]
+    columns = [(np.arange(len(solution.command)) if static else solution.trace.time)[:, None]]
     for role in roles:
         signal = solution.model.signals[role]
         header += signal.columns
@@ -97,8 +99,9 @@ def _margin(m: Margin, solution: Solution) -> dict[str, Any]:
     distance = m.distance if unit == "degC" else float(from_si(m.distance, unit))
     return {
         "limit": m.limit.name, "label": m.limit.label, "unit": unit, "channel": m.channel, "sample": m.sample,
-        "time_s": float(solution.trace.time[m.sample]), "value": float(from_si(m.value, unit)), "bound": float(from_si(m.bound, unit)),
-        "margin": distance, "share_left": m.share,
+        "time_s": float(solution.trace.time[m.sample]) if solution.scenario.sample_time else None, 
+        "value": float(from_si(m.value, unit)), "bound": float(from_si(m.bound, unit)),
+        "margin": distance, "margin_unit": "K" if unit == "degC" else unit, "share_left": m.share,
     }  # fmt: skip
 
 

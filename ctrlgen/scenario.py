@@ -23,7 +23,7 @@ FILE = "scenario.toml"
 
 
 class Expectation(Section):
-    """One value that must come out: `value` names it (see `ctrlgen.report.measures`), `range` in its unit."""
+    """One value that must come out: `value` names it (see `ctrlgen.measures.measure`), `range` in its unit."""
 
     value: str
     range: tuple[str, str]
@@ -67,7 +67,7 @@ class Scenario:
     """A scenario ready to solve. `file` is what was written; `name` the folder's name as a C identifier; `digest` of file and device."""
 
     name: str
-    folder: Path
+    path: Path
     file: ScenarioFile
     device: Device
     digest: dict[str, str]
@@ -88,20 +88,23 @@ class Scenario:
         frame = Frame(signal.channels, signal.units)
         path = self.file.path
         if isinstance(path, Poses):
-            path = path.model_copy(update={"folder": self.folder})
+            path = path.model_copy(update={"folder": self.path.parent})
         n = self.file.points or 0
         if self.file.sample_rate and self.file.duration:
             n = round(self.file.sample_rate.si * self.file.duration.si)
             if not 2 <= n <= 1_000_000:
-                raise InputError(
-                    self.folder / FILE, [Fault("duration", f"gives {n} samples; 2 to 1000000 are possible")]
-                )
+                raise InputError(self.path, [Fault("duration", f"gives {n} samples; 2 to 1000000 are possible")])
         try:
-            return path.samples(frame, n)
+            samples = path.samples(frame, n)
         except InputError as error:
             if error.source != "path":
                 raise
-            raise InputError(self.folder / FILE, [Fault(f"path.{f.where}", f.what) for f in error.faults]) from None
+            raise InputError(self.path, [Fault(f"path.{f.where}", f.what) for f in error.faults]) from None
+        if self.sample_time and len(samples) < 2:
+            raise InputError(
+                self.path, [Fault("path", "motion in time needs 2 samples or more; for one pose leave out sample_rate")]
+            )
+        return samples
 
 
 def load_scenario(path: Path | str) -> Scenario:
@@ -116,7 +119,7 @@ def load_scenario(path: Path | str) -> Scenario:
         texts["poses"] = read_text(file_path.parent / file.path.file)
     digest = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
-    return Scenario(_identifier(name), file_path.parent, file, device, digest)
+    return Scenario(_identifier(name), file_path, file, device, digest)
 
 
 def _identifier(name: str) -> str:

@@ -17,44 +17,93 @@ REACHED = 1e-5  # shortfall, in typical sizes (1 um, or 1 um at the platform's r
 
 
 def unreachable(
-    scenario: Scenario, model: Model, command: np.ndarray, result: Result, short: np.ndarray, rows: Sequence[Limit]
+    scenario: Scenario, model: Model, command: np.ndarray, wanted: Result, nearest: Result | None, rows: Sequence[Limit]
 ) -> Unreachable:
-    """An error that says which samples, which actuators, by how much, and what is nearest."""
+    """An error that says which samples, which actuators, by how much, and what is nearest.
+
+    `wanted` is the solution without the limits `rows`, which are broken on it; `nearest` the one that keeps
+    everything, None where IPOPT found none.
+    """
     signal = model.signals[scenario.file.follow]
-    samples = tuple(int(k) for k in np.flatnonzero(short > REACHED))
-    worst = int(np.argmax(short))
-    nearest = result.trace.signals[scenario.file.follow]
+    excess = _excess(model, wanted, rows)
+    short = np.linalg.norm((nearest or wanted).shortfall, axis=1)
+    size = short if nearest else np.max([e.max(axis=1) for e in excess.values()], axis=0)
+    samples = tuple(int(k) for k in np.flatnonzero(size > (REACHED if nearest else 0.0)))
+    worst = int(np.argmax(size))
+    where = f"the worst is sample {worst}: {_point(signal, command[worst])}"
+    lines = [f"cannot follow {len(samples)} of {len(command)} samples ({_intervals(samples)}); {where}"]
+    strokes = _stroke_causes(scenario, model, command, wanted)
+    heats = _drive_causes(model, wanted, samples) if scenario.sample_time and not strokes and not rows else []
+    limits = [_limit_cause(limit, table, len(command)) for limit, table in excess.items()]
+    lines += strokes + heats + limits or ["  the limits of several actuators together"]
+    reached = None if nearest is None else nearest.trace.signals[scenario.file.follow]
+    if reached is None:
+        lines.append("  no nearest trajectory was found; shrink the path until every limit above is kept")
+    else:
+        lines.append(f"  nearest reachable there: {_point(signal, reached[worst])}")
+    advice = []
+    if any("only pushes" in line for line in strokes):
+        advice.append(
+            "add a common motion that every actuator can push toward (for a hexapod: height), or shrink the path"
+        )
+    if any("stroke ends" in line for line in strokes) or limits:
+        advice.append("shrink the path or move it toward home")
+    if heats:
+        advice.append("slow the path down")
+    lines.append("  " + "; ".join(advice or ["shrink the path or move it"]))
+    return Unreachable("\n".join(lines), Shortfall(samples, worst, command, command if reached is None else reached))
+
+
+def _intervals(samples: Sequence[int]) -> str:
+    """'3-5, 9': runs of samples, the first few."""
+    runs: list[list[int]] = []
+    for k in samples:
+        if runs and k == runs[-1][1] + 1:
+            runs[-1][1] = k
+        else:
+            runs.append([k, k])
+    shown = [f"{a}" if a == b else f"{a}-{b}" for a, b in runs[:6]]
+    return ", ".join(shown) + (f", ... {len(runs) - 6} more runs" if len(runs) > 6 else "")
+
+
+def _stroke_causes(scenario: Scenario, model: Model, command: np.ndarray, wanted: Result) -> list[str]:
+    """Actuators that would have to leave their displacement range."""
     kernel = Controller(model, scenario.file.follow, None).static.displacement
-    needed = kernel.map(len(command))(result.x.T, result.z.T, command.T).full().T
+    needed = kernel.map(len(command))(wanted.x.T, wanted.z.T, command.T).full().T
     low, high = model.z_bounds
-    lines = [
-        f"cannot follow {len(samples)} of {len(command)} samples; the worst is sample {worst}: {_point(signal, command[worst])}"
-    ]
     causes = []
     for i, axis in enumerate(model.axes):
-        bad = np.flatnonzero((needed[:, i] < low[i] - 1e-12) | (needed[:, i] > high[i] + 1e-12))
-        if bad.size:
-            k = int(bad[np.argmax(np.maximum(low[i] - needed[bad, i], needed[bad, i] - high[i]))])
-            value = needed[k, i]
-            why = "the actuator only pushes" if value < low[i] else "its stroke ends there"
-            bound = low[i] if value < low[i] else high[i]
-            causes.append(
-                f"  actuator {axis}: needs {show(value, 'um')}, {show(abs(value - bound), 'um')} beyond {show(bound, 'um')} ({why}), "
-                f"worst at sample {k}, in {bad.size} of {len(command)}"
-            )
-    if not causes:
-        causes += _dynamic_causes(model, result, samples) + [
-            f"  {limit.label} is at its limit of {show(limit.upper or 0.0, limit.unit)}" for limit in rows
-        ]
-    lines += causes or ["  the limits of several actuators together"]
-    lines.append(f"  nearest reachable there: {_point(signal, nearest[worst])}")
-    lines.append(
-        "  move or shrink the path (a hexapod that only pushes needs height first: raise delta_z), or slow it down"
-    )
-    return Unreachable("\n".join(lines), Shortfall(samples, worst, command, nearest))
+        beyond = np.maximum(low[i] - needed[:, i], needed[:, i] - high[i])
+        bad = np.flatnonzero(beyond > 1e-12)
+        if not bad.size:
+            continue
+        k = int(np.argmax(beyond))
+        value = needed[k, i]
+        why = "the actuator only pushes" if value < low[i] else "its stroke ends there"
+        bound = low[i] if value < low[i] else high[i]
+        amount = f"needs {show(value, 'um')}, {show(abs(value - bound), 'um')} beyond {show(bound, 'um')} ({why})"
+        causes.append(f"  actuator {axis}: {amount}, worst at sample {k}, in {bad.size} of {len(command)}")
+    return causes
 
 
-def _dynamic_causes(model: Model, result: Result, samples: Sequence[int]) -> list[str]:
+def _excess(model: Model, wanted: Result, rows: Sequence[Limit]) -> dict[Limit, np.ndarray]:
+    """(n, channels) by which the relaxed solution exceeds each limit of `rows`, SI."""
+    n = len(wanted.u)
+    values = model.evaluate_limits.map(n)(wanted.x.T, wanted.z.T, wanted.u.T, np.tile(model.p_nominal[:, None], (1, n)))
+    tables = dict(zip(model.limits, values, strict=True))
+    return {limit: np.maximum(tables[limit].full().T - limit.upper, 0.0) for limit in rows if limit.upper is not None}
+
+
+def _limit_cause(limit: Limit, excess: np.ndarray, count: int) -> str:
+    """Which channel breaks a limit, by how much and when."""
+    k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
+    value = show((limit.upper or 0.0) + excess[k, i], limit.unit)
+    bad = int(np.count_nonzero(excess.max(axis=1) > 0))
+    amount = f"would be {value}, {show(excess[k, i], limit.unit)} above {show(limit.upper or 0.0, limit.unit)}"
+    return f"  {limit.label} at {limit.channels[i]}: {amount}, worst at sample {k}, in {bad} of {count}"
+
+
+def _drive_causes(model: Model, result: Result, samples: Sequence[int]) -> list[str]:
     """Actuators whose drive or state sits on a bound around the samples that fall short."""
     around = sorted({max(k + shift, 0) for k in samples for shift in (-1, 0)})
     causes = []

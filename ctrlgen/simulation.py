@@ -61,6 +61,8 @@ def simulate(model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | 
         raise SolverError(
             "no stage displacement balances the actuator force; check the drive and the stiffness"
         ) from error
+    if not np.all(np.isfinite(states)):
+        raise SolverError("the simulated state is not a number; check the drive against the device's limits")
     states = np.hstack([ca.vertcat(start_x, start_z).full(), states]).T
     drives = np.vstack([u, u[-1:]])
     n = model.x.numel()

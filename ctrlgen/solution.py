@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ctrlgen.errors import SolverError
 from ctrlgen.model import Limit, Model
 from ctrlgen.programme import Programme, Result
 from ctrlgen.scenario import Scenario
@@ -61,27 +62,25 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
     command = scenario.command(model)
     programme = Programme(model, scenario, command)
     rows: list[Limit] = []
+    relaxed: Result | None = None
     while True:
         progress(f"IPOPT, {len(command)} samples" + (f", with {', '.join(r.label for r in rows)}" if rows else ""))
-        result = programme.run(rows)
-        short = np.linalg.norm(result.shortfall, axis=1)
-        if short.max() > REACHED:
-            raise unreachable(scenario, model, command, result, short, rows)
+        try:
+            result = programme.run(rows)
+        except SolverError:
+            if relaxed is None:
+                raise
+            raise unreachable(scenario, model, command, relaxed, None, rows) from None
+        if np.linalg.norm(result.shortfall, axis=1).max() > REACHED:
+            raise unreachable(scenario, model, command, relaxed or result, result, rows)
         margins = _margins(model, result)
         broken = [
             m.limit for m in margins if m.distance < -KEPT * max(abs(m.bound), abs(m.value)) and m.limit not in rows
         ]
         if not broken:
-            return Solution(
-                scenario,
-                model,
-                command,
-                result.trace,
-                result.u,
-                tuple(margins),
-                result.iterations,
-                tuple(r.name for r in rows),
-            )
+            added = tuple(limit.name for limit in rows)
+            return Solution(scenario, model, command, result.trace, result.u, tuple(margins), result.iterations, added)
+        relaxed = relaxed or result
         rows += broken
 
 

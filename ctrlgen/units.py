@@ -1,4 +1,4 @@
-"""Text with units at the border, SI numbers inside. Nothing else in ctrlgen converts a unit.
+"""Text with units at the border, SI numbers inside.
 
 A `Quantity` keeps what was written, so that a file can be written back and a report can
 show the reader's own unit. Conversion is pint's.
@@ -21,7 +21,10 @@ _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?i
 
 @cache
 def _registry() -> pint.UnitRegistry:
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=None)
+    registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=None, on_redefinition="ignore")
+    registry.define("radian = [angle] = rad")  # so that 60 rpm is no 60 Hz and 5 is no angle
+    registry._build_cache()  # degrees and milliradians were resolved to the old radian
+    return registry
 
 
 @cache
@@ -53,6 +56,14 @@ def from_si(value: Any, unit: str) -> Any:
     return (value - offset) / scale
 
 
+def base_unit(unit: str) -> str:
+    """The SI unit of numbers that a reader sees in `unit`: 'um' -> 'm', 'degC' -> 'K', 'W' -> 'W'."""
+    for plain in ("m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"):
+        if same_dimension(unit, plain):
+            return plain
+    return f"{_registry().Quantity(1.0, _unit(unit)).to_base_units().units:~}"
+
+
 def same_dimension(unit: str, other: str) -> bool:
     """Whether two unit texts measure the same kind of quantity."""
     return bool(_unit(unit).dimensionality == _unit(other).dimensionality)
@@ -62,17 +73,21 @@ def same_dimension(unit: str, other: str) -> bool:
 class Quantity:
     """A number with its unit: `si` in SI, `text` as written, `source` where it comes from.
 
-    `sd` is the standard deviation in SI, None where nobody stated one.
+    `sd` is the standard deviation in SI, None where nobody stated one. `whole` marks a count.
     """
 
     si: float
     text: str
     source: str | None = None
     sd: float | None = None
+    whole: bool = False
 
 
 def parse(text: object, unit: str) -> float:
-    """'130 GPa' with unit 'Pa' gives 1.3e11. Raises ValueError saying what to write instead."""
+    """'130 GPa' with unit 'Pa' gives 1.3e11. Raises ValueError saying what to write instead.
+
+    Angles count as a dimension of their own: a plain number is no angle, and rpm is no Hz.
+    """
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
         raise ValueError(f'write a number with its unit, such as "1 {unit}", not {text!r}')
     if isinstance(text, str):
@@ -85,7 +100,8 @@ def parse(text: object, unit: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{text!r} is not a finite number")
     _unit(written)
-    if not same_dimension(written, unit):
+    absolute = unit in ("degC", "degF", "K")
+    if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
         if written == "":
             raise ValueError(f'{text!r} has no unit; write for example "{value:g} {unit}"')
         hint = f'"{value:g} {unit}"' if unit != "1" else f'"{value:g}" without a unit'
@@ -95,7 +111,9 @@ def parse(text: object, unit: str) -> float:
     return to_si(value, written)
 
 
-def _reader(unit: str, low: float | None, high: float | None, low_open: bool) -> Callable[[Any], Quantity]:
+def _reader(
+    unit: str, low: float | None, high: float | None, low_open: bool, whole: bool = False
+) -> Callable[[Any], Quantity]:
     def bounds_text() -> str:
         side = ">" if low_open else ">="
         parts = [] if low is None else [f"{side} {from_si(low, unit):g} {unit}"]
@@ -113,6 +131,8 @@ def _reader(unit: str, low: float | None, high: float | None, low_open: bool) ->
         si = parse(table["value"], unit)
         if (low is not None and (si < low or (low_open and si == low))) or (high is not None and si > high):
             raise ValueError(f"{table['value']!r} is impossible here; it must be {bounds_text()}")
+        if whole and si != round(si):
+            raise ValueError(f"{table['value']!r} is not a whole number, and this is a count")
         sd = None
         if "sd" in table:
             sd = parse(table["sd"], unit if unit != "degC" else "delta_degC")
@@ -121,17 +141,19 @@ def _reader(unit: str, low: float | None, high: float | None, low_open: bool) ->
         source = table.get("source")
         if source is not None and not isinstance(source, str):
             raise ValueError(f"source = {source!r} must be text")
-        return Quantity(si, str(table["value"]), source, sd)
+        return Quantity(si, str(table["value"]), source, sd, whole)
 
     return read
 
 
-def quantity(unit: str, *, low: float | None = None, high: float | None = None, positive: bool = False) -> Any:
+def quantity(
+    unit: str, *, low: float | None = None, high: float | None = None, positive: bool = False, whole: bool = False
+) -> Any:
     """The pydantic type of a number in `unit`, with bounds given in SI.
 
-    `positive` means strictly above zero.
+    `positive` means strictly above zero, `whole` a count.
     """
-    read = _reader(unit, 0.0 if positive else low, high, positive)
+    read = _reader(unit, 0.0 if positive else low, high, positive, whole)
     return Annotated[Quantity, BeforeValidator(read), PlainSerializer(lambda q: q.text)]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from conftest import DEVICE, SCENARIOS
 
-COMMANDS = ("run", "solve", "generate", "compare", "check", "bode")
+COMMANDS = ("run", "solve", "generate", "compare", "check", "bode", "workspace")
 
 
 def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -124,23 +124,47 @@ def test_unreachable_says_which_actuator_by_how_much_and_what_is_nearest(tmp_pat
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("after", [0.05, 0.6, 1.4, 2.2, 3.0])
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_an_interruption_leaves_nothing_behind(tmp_path, stop):
+def test_an_interruption_at_any_moment_leaves_nothing_behind(tmp_path, stop, after):
+    """As a terminal does it: the signal goes to the whole process group, compilers included."""
     out = tmp_path / "out"
     process = subprocess.Popen(
         [sys.executable, "-m", "ctrlgen", "run", str(SCENARIOS / "spiral"), "--out", str(out)],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    deadline = time.monotonic() + 60
-    while not list(tmp_path.iterdir()):  # until the work has begun
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    time.sleep(0.8)
-    process.send_signal(stop)
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    while not Path(f"/proc/{process.pid}/cmdline").read_bytes().count(b"ctrlgen"):
+        time.sleep(0.005)
+    time.sleep(0.1 + after)
+    os.killpg(process.pid, stop)
     _, message = process.communicate(timeout=60)
-    assert process.returncode == 130 and "nothing was written" in message and "Traceback" not in message
+    assert "Traceback" not in message
+    assert process.returncode == 130 and "nothing was written" in message
     assert list(tmp_path.iterdir()) == []
+
+
+def test_titles_with_brackets_are_printed_as_they_are(scenario, tmp_path):
+    text = (scenario / "scenario.toml").read_text().replace('title = "t"', 'title = "scan [/raster] 20 [um] */ x"')
+    (scenario / "scenario.toml").write_text(text)
+    done = ctrlgen("run", scenario, "--out", tmp_path / "o[red]2")
+    assert done.returncode == 0, done.stderr
+    assert "scan [/raster] 20 [um] */ x" in done.stdout and "o[red]2/report.html" in done.stdout
+
+
+def test_files_added_to_a_result_are_not_deleted(scenario, tmp_path):
+    out = tmp_path / "out"
+    assert ctrlgen("solve", scenario, "--out", out).returncode == 0
+    (out / "mynotes.txt").write_text("precious")
+    refused(ctrlgen("solve", scenario, "--out", out), "mynotes.txt", "did not make")
+    assert (out / "mynotes.txt").read_text() == "precious"
+
+
+def test_a_compiler_that_says_nothing_is_reported_with_its_command(scenario, tmp_path):
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    (tools / "gcc").write_text('#!/bin/sh\n[ "$1" = --version ] && echo fake && exit 0\nexit 1\n')
+    (tools / "gcc").chmod(0o755)
+    refused(ctrlgen("run", scenario, "--out", tmp_path / "out", PATH=f"{tools}:/bin/nowhere"), "gcc", "status 1")
 
 
 def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path):
@@ -153,6 +177,7 @@ def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path)
 def test_check_tells_what_a_file_describes():
     assert "6 actuators" in ctrlgen("check", DEVICE).stdout
     assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20").stdout
+    assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20" / "scenario.toml").stdout
 
 
 @pytest.mark.parametrize("suffix", ["svg", "png"])

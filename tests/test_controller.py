@@ -123,9 +123,10 @@ def test_not_a_number_switches_the_heaters_off_and_the_state_cools(controller):
 def test_the_safe_box_is_safe_and_not_much_smaller_than_it_could_be(model, controller, rng):
     edge = controller.safe_displacement
     inside = rng.uniform(0, edge, size=(2000, 6))
-    assert controller.composite_ratio.map(2000)(inside.T).full().max() <= 1
+    cold = np.tile(model.rest[:, None], (1, 2000))
+    assert controller.composite_ratio.map(2000)(cold, 0 * inside.T, inside.T).full().max() <= 1
     corners = np.array(np.meshgrid(*[[0, 1.001 * edge]] * 6)).reshape(6, -1)
-    assert controller.composite_ratio.map(64)(corners).full().max() > 1
+    assert controller.composite_ratio.map(64)(cold[:, :64], 0 * corners, corners).full().max() > 1
 
 
 def test_limits_that_the_stroke_implies_are_not_computed_online(controller):

@@ -76,9 +76,14 @@ def test_does_something_when_on(effect, rng, model):
 @every_effect
 def test_does_not_depend_on_the_choice_of_units(effect, rng):
     """Rescale kg, m, s, K (and W for a drive, as its own unit) at random: the term must scale like its place."""
-    place_unit = {Place.DRIVE: "W", Place.FORCE: "N", Place.DISPLACEMENT: "m", Place.POSE: "m", Place.SENSOR: "m"}[
-        effect.place
-    ]
+    place_unit = {
+        Place.DRIVE: "V",
+        Place.HEAT: "W",
+        Place.FORCE: "N",
+        Place.DISPLACEMENT: "m",
+        Place.POSE: "m",
+        Place.SENSOR: "m",
+    }[effect.place]
     numbers = {p.name: to_si(rng.uniform(0.2, 0.8) * p.bounds[1], p.unit) for p in effect.params}
     value, others = rng.uniform(0.5, 2, 2)
     displacement, temperature = rng.uniform(0.5, 2, 2)
@@ -99,10 +104,10 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
         rates = instance.rates(s, p)
         return float(instance.term(s, p)), [float(rates[state.name]) for state in effect.states]
 
-    one = dict.fromkeys(("kg", "m", "s", "K"), 1.0)
+    one = dict.fromkeys(("kg", "m", "s", "K", "A"), 1.0)
     term, rates = law(one)
     for _ in range(5):
-        scale = dict(zip(one, 10 ** rng.uniform(-2, 2, 4), strict=True))
+        scale = dict(zip(one, 10 ** rng.uniform(-2, 2, 5), strict=True))
         scaled_term, scaled_rates = law(scale)
         assert scaled_term == pytest.approx(term * dimension_factor(place_unit, scale), rel=1e-9)
         for state, rate, scaled in zip(effect.states, rates, scaled_rates, strict=True):
@@ -115,7 +120,7 @@ def dimension_factor(unit: str, scale: dict[str, float]) -> float:
 
     registry = pint.get_application_registry()
     powers = registry.Unit("" if unit == "1" else unit).dimensionality
-    names = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[temperature]": "K"}
+    names = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[temperature]": "K", "[current]": "A"}
     return float(np.prod([scale[names[dimension]] ** power for dimension, power in powers.items()]))
 
 

@@ -48,7 +48,7 @@ def test_a_step_of_coupled_states_equals_the_matrix_exponential(model):
     from dataclasses import replace
 
     A = np.diag(np.full(6, -200.0)) + np.diag(np.full(5, 80.0), 1)
-    coupled = replace(model, rates=ca.mtimes(ca.DM(A), model.x) + 1000 * model.u)
+    coupled = replace(model, rates_of_heat=ca.mtimes(ca.DM(A), model.x) + 1000 * model.u)
     x, u, h = np.linspace(1, 2, 6), np.linspace(0, 1, 6), 2e-3
     exact = expm(h * A) @ x + np.linalg.solve(A, (expm(h * A) - np.eye(6)) @ (1000 * u))
     value = ca.Function("step", [coupled.x, coupled.u], [coupled.step(h)])(x, u).full().ravel()
@@ -126,6 +126,55 @@ def test_a_voltage_drive_heats_with_its_square(device):
     assert settled.signals["state"][-1] == pytest.approx(295.15 + 550 * 36 / 150, rel=1e-12)
     assert model.u_bounds[1] == pytest.approx(np.sqrt(150.0))
     assert model.signals["drive"].units == ("V",) * 6
+
+
+def test_heat_crosstalk_is_in_watts_whatever_the_drive():
+    """Six heaters at 6 V: each receives its own 36/150 W and a share of the five others'."""
+    import tomllib
+
+    from conftest import DEVICE
+
+    from ctrlgen.devices import Device
+    from ctrlgen.files import validate
+
+    file = tomllib.loads(DEVICE.read_text())
+    file["actuator"]["drive"] = "voltage"
+    file["effect"] = [{"kind": "heat_crosstalk", "at": "all", "share": "0.02"}]
+    model = build_model(validate(Device.library["mems_hexapod"], file, "in volts"))
+    settled = simulate(model, np.full((200, 6), 6.0), 1e-3)
+    assert settled.signals["power"][-1] == pytest.approx(36 / 150 * 1.1, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("path", "says"),
+    [
+        ("actuator.beams", "count"),
+        ("stage.stroke", "no equation"),
+        ("actuator.power_limit", "no equation"),
+        ("hexapod.stress_limit", "no equation"),
+    ],
+)
+def test_what_is_no_parameter_of_the_motion_cannot_be_free(device, path, says):
+    with pytest.raises(InputError, match=says):
+        build_model(device, free=[path])
+
+
+def test_the_ambient_temperature_can_be_free_and_the_rest_follows_it(device):
+    model = build_model(device, free=["actuator.ambient"])
+    assert model.rest == pytest.approx(295.15)
+
+
+def test_a_controller_of_a_model_with_free_parameters_uses_their_nominal_values(device, model):
+    from ctrlgen import Controller
+
+    freed = Controller(build_model(device, free=["hexapod.height"]), "pose", 1e-3)
+    plain = Controller(model, "pose", 1e-3)
+    assert np.array_equal(freed.step(freed.rest(), POSE).drive, plain.step(plain.rest(), POSE).drive)
+
+
+def test_a_device_that_softens_to_nothing_is_refused():
+    with pytest.raises(InputError, match="does not rise"):
+        build_model(effect_device({"kind": "stiffening", "at": "1X", "k3": "-1e-6 N/um^3"}))
 
 
 def test_two_effects_of_one_kind_keep_their_own_states():

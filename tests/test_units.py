@@ -39,6 +39,10 @@ def test_text_with_a_unit_becomes_an_si_number(text, unit, si):
         (["1 m"], "m", "write a number"),
         ("1 N/mm", "N*m", "wrong unit"),
         ("", "m", "does not start with a number"),
+        (5, "deg", "no unit"),
+        ("0.28 deg", "1", "wrong unit"),
+        ("60 rpm", "Hz", "wrong unit"),
+        ("22 delta_degC", "degC", "wrong unit"),
     ],
 )
 def test_what_is_not_a_quantity_is_refused_with_the_remedy(text, unit, says):

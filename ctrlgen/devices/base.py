@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import casadi as ca
 from pydantic import BaseModel, ConfigDict, Field
@@ -42,7 +42,7 @@ class Signal:
         return tuple(f"{self.column}{c} [{u}]" for c, u in zip(self.channels, self.units, strict=True))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Limit:
     """lower <= expr <= upper, channel by channel; SI. None where a side is free.
 
@@ -63,10 +63,10 @@ class Limit:
 class Links:
     """The physics of one device as a chain of symbolic maps; `ctrlgen.model` joins them.
 
-    drive u -> state x by `rates` -> `force` on the axis == `resistance` of the displacement d -> `pose`. Each
-    map takes and gives SX column vectors in SI. A device whose actuators remember nothing has no `state` (and
-    `rates` of nothing); `force_unit` says in what the balance is: N, or m where displacement itself is commanded.
-    `extra` are signals worth reporting that follow from (drive, state, d), such as a heater's power.
+    drive u -> `heat` -> state x by `rates` -> `force` on the axis == `resistance` of the displacement d -> `pose`.
+    Each map takes and gives SX column vectors in SI. A device whose actuators remember nothing has no `state` and
+    no heat; `force_unit` says in what the balance is: N, or m where displacement itself is commanded.
+    `heat_signal` is (label, unit, column prefix, typical size) of what the drive becomes before it acts.
     """
 
     axes: tuple[str, ...]
@@ -78,13 +78,14 @@ class Links:
     rest: tuple[float, ...]
     displacement_scale: float
     force_scale: float
-    rates: Callable[[ca.SX, ca.SX], ca.SX]
     force: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     resistance: Callable[[ca.SX], ca.SX]
     pose: Callable[[ca.SX], ca.SX]
     limits: Callable[[SimpleNamespace], Sequence[Limit]]
     force_unit: str = "N"
-    extra: Callable[[ca.SX, ca.SX, ca.SX], Sequence[Signal]] = lambda u, x, d: ()
+    rates: Callable[[ca.SX, ca.SX], ca.SX] = lambda x, heat: ca.SX(0, 1)
+    heat: Callable[[ca.SX], ca.SX] = lambda u: u
+    heat_signal: tuple[str, str, str, float] | None = None
     resistance_parts: Callable[[ca.SX], dict[str, ca.SX]] = lambda d: {}
 
 
@@ -146,6 +147,3 @@ def _namespace(node: Any, prefix: str, free: dict[str, ca.SX]) -> Any:
     if isinstance(node, tuple):
         return tuple(_namespace(member, f"{prefix}[{i}]", free) for i, member in enumerate(node))
     return node
-
-
-__all__ = ["Device", "Limit", "Links", "Literal", "Section", "Signal"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import casadi as ca
 from pydantic import Field, model_validator
@@ -14,13 +14,14 @@ from ctrlgen.units import quantity
 
 Length = quantity("um", positive=True)
 Angle = quantity("deg")
-Positive = quantity("1", positive=True)
+Count = quantity("1", positive=True, whole=True)
+Axis = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
 
 
 class Actuator(Section):
     """Bent-beam thermal actuator, S1 Table 1, with its heater."""
 
-    beams: quantity("1", low=1)
+    beams: quantity("1", low=1, whole=True)
     beam_length: Length
     beam_width: Length
     beam_gap: Length
@@ -63,7 +64,7 @@ class Stage(Section):
     lever_long: Length
     lever_width: Length
     notch_radius: Length
-    notches: Positive
+    notches: Count
     notch: Notch
     half_stage_stiffness: quantity("N/um", positive=True)
     plate_half_length: Length
@@ -99,7 +100,7 @@ class MemsHexapod(Device):
     """
 
     kind: Literal["mems_hexapod"]
-    axes: tuple[str, str, str, str, str, str]
+    axes: tuple[Axis, Axis, Axis, Axis, Axis, Axis]
     push: tuple[Literal[-1, 1], ...] = Field(min_length=6, max_length=6)
     actuator: Actuator
     stage: Stage
@@ -108,6 +109,8 @@ class MemsHexapod(Device):
     @model_validator(mode="after")
     def _lengths_fit(self) -> MemsHexapod:
         h, s, a = self.hexapod, self.stage, self.actuator
+        if len(set(self.axes)) != 6:
+            raise ValueError("axes: two actuators have the same name; name each once")
         if s.lever_short.si >= s.lever_long.si:
             raise ValueError("stage.lever_short must be below stage.lever_long: the lever multiplies travel")
         if s.stroke.si >= s.lever_long.si:
@@ -147,11 +150,11 @@ class MemsHexapod(Device):
             return u**2 / a.heater_resistance if voltage else u
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
-            d = signal.displacement
+            d, carried = signal.displacement, signal.carried  # with and without what effects add on the way
             ends = ("base_bottom", "base_top", "platform_bottom", "platform_top")
             wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ends)
             return [
-                Limit("drive", drive.label, self.axes, drive.units[0], signal.drive, 0.0, drive_limit),
+                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, drive_limit),
                 Limit(
                     "temperature", state.label, self.axes, "degC", signal.state,
                     self.actuator.ambient.si, self.actuator.temperature_limit.si,
@@ -163,7 +166,7 @@ class MemsHexapod(Device):
                     None, self.stage.notch_rotation_limit.si,
                 ),
                 Limit(
-                    "wire_stress", "wire flexure stress", wires, "MPa", hexapod.wire_stress(d, loads, h),
+                    "wire_stress", "wire flexure stress", wires, "MPa", hexapod.wire_stress(carried, loads, h),
                     None, self.hexapod.stress_limit.si,
                 ),
             ]  # fmt: skip
@@ -178,16 +181,15 @@ class MemsHexapod(Device):
             rest=(a.ambient,) * 6,
             displacement_scale=1e-5,
             force_scale=0.05,
-            rates=lambda T, u: thermal_actuator.temperature_rate(T, heat(u), a),
+            heat=heat,
+            heat_signal=("heater power", "W", "P_", power_limit),
+            rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
             force=lambda u, T, d: thermal_actuator.force(T, a),
             resistance=lambda d: xy_stage.force(d, s, a),
             resistance_parts=lambda d: {
                 "linear": xy_stage.linear_force(d, s, a),
                 "nonlinear": xy_stage.nonlinear_force(d, s),
             },
-            extra=lambda u, T, d: [
-                Signal("power", "heater power", self.axes, ("W",) * 6, "P_", heat(u), (power_limit,) * 6)
-            ],
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
         )

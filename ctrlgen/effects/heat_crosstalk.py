@@ -6,12 +6,12 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class HeatCrosstalk(Effect):
-    """Delta u_i = kappa sum_{j != i} u_j: a share of the other heaters' power arrives here.
+    """Delta P_i = kappa sum_{j != i} P_j: a share of the other heaters' power arrives here.
 
     Holds in steady state and for changes slower than the chip's own thermal time constant.
     """
 
-    place = Place.DRIVE
+    place = Place.HEAT
     source = "definition"
     params = (Param("share", "1", (0.0, 0.1), "power arriving per power of another heater", off=0.0),)
 

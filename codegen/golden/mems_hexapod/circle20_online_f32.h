@@ -5,20 +5,21 @@
  *
  * target[6]  platform pose: theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m], delta_y [m], delta_z [m]
  * drive[6]   heater power: 1X [W], 1Y [W], 2X [W], 2Y [W], 3X [W], 3Y [W]
- * displacement[6]: stage displacement [m] that the drive will reach
+ * displacement[6]: stage displacement [m] that the drive will reach (after an INPUT status: the present one)
  * state[6]   actuator temperature then: 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K]
  *
  * Limits kept:
- *   0 W <= heater power <= 1 W
+ *   0 W <= commanded heater power <= 1 W
  *   22 degC <= actuator temperature <= 550 degC
  *   0 N <= actuator force
  *   0 um <= stage displacement <= 55 um
  *   notch rotation <= 5 deg
  *   wire flexure stress <= 550 MPa
  *
- * Arithmetic operations per call: 264 within limits, 5610 at most. Arithmetic: float.
+ * Arithmetic operations of the physics per call: 264 within limits, 5610 at most
+ * (comparisons and the bookkeeping of limits not counted). Arithmetic: float.
  * Physics: S1: Mech. Mach. Theory 80 (2014) 246-264, doi 10.1016/j.mechmachtheory.2014.05.004
- * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4, scenario b450b4cc90d85534 (sha256). Do not edit.
+ * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4, scenario 6b3b4ab03afed2d5 (sha256). Do not edit.
  */
 #ifndef CIRCLE20_ONLINE_F32_H
 #define CIRCLE20_ONLINE_F32_H
@@ -29,13 +30,13 @@ extern "C" {
 
 /* Status: 0, or a sum of these. The drive is admissible in every case. */
 #define CIRCLE20_ONLINE_F32_DISPLACEMENT 1 /* beyond the displacement range: its end was taken */
-#define CIRCLE20_ONLINE_F32_COMPOSITE 2    /* actuator force, notch rotation, wire flexure stress: displacement shrunk toward home */
+#define CIRCLE20_ONLINE_F32_COMPOSITE 2    /* wire flexure stress: displacement shrunk toward home */
 #define CIRCLE20_ONLINE_F32_STATE 4        /* actuator temperature held at its limit */
 #define CIRCLE20_ONLINE_F32_DRIVE 8        /* heater power at its limit: as far toward the target as it reaches in one sample */
 #define CIRCLE20_ONLINE_F32_INPUT 16       /* NaN, infinite, absurd or missing input: drives at their lower limit */
 
 typedef struct {
-    float x[6]; /* temperature_1X, temperature_1Y, temperature_2X, temperature_2Y, temperature_3X, temperature_3Y */
+    float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     float z[6]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */
 } circle20_online_f32_state;
 

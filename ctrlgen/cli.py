@@ -1,0 +1,305 @@
+"""Command line: parse, call, print. Decides nothing."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ctrlgen import job, report
+from ctrlgen.devices import load_device
+from ctrlgen.errors import CtrlgenError, Fault, InputError, Unreachable
+from ctrlgen.files import read_toml
+from ctrlgen.measures import in_unit
+from ctrlgen.model import build_model
+from ctrlgen.paths import Frame
+from ctrlgen.scenario import load_scenario
+from ctrlgen.units import from_si, parse, show
+
+app = typer.Typer(
+    name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
+    help="Describe a flexure nanopositioner once; solve its trajectories, generate its C, and prove that the C is right.\n\n"
+    "Start with:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
+)  # fmt: skip
+out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
+err = Console(stderr=True, highlight=False)
+
+ScenarioPath = Annotated[
+    Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)
+]
+DevicePath = Annotated[Path, typer.Argument(help="A device file (device.toml).", show_default=False)]
+OutFolder = Annotated[
+    Path,
+    typer.Option(
+        "--out", help="Result folder; replaced whole when the work is done, never half written.", show_default=False
+    ),
+]
+
+
+@app.command()
+def run(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+    """Solve a scenario, generate its C, compare the C with the model, and report.
+
+    Leaves in --out: report.html (open this first), summary.json, trajectory.csv, figures/, and c/ with its
+    CMake file and test. The exit status is 1 when anything is out of tolerance or unreachable.
+
+    Example:  ctrlgen run scenarios/circle20 --out out/circle20
+    """
+    with _progress(job.STAGES) as advance:
+        outcome = job.run(scenario, out_folder, advance)
+    _print_solution(outcome)
+    _print_comparison(outcome)
+    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+    _exit(outcome)
+
+
+@app.command()
+def solve(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+    """Solve a scenario for its drives (IPOPT) and report the margin to every limit; no C.
+
+    Example:  ctrlgen solve scenarios/raster --out out/raster
+    """
+    with _progress(2) as advance:
+        outcome = job.solve_into(scenario, out_folder, advance)
+    _print_solution(outcome)
+    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+    _exit(outcome)
+
+
+@app.command()
+def generate(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+    """Write the C of a scenario: online controller and player, double and float; needs no compiler.
+
+    Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
+    """
+    with _progress(2) as advance:
+        c = job.generate_into(scenario, out_folder, advance)
+    for name in [*c.online.values(), *c.player.values()]:
+        out.print(f"{out_folder / name}.c", soft_wrap=True, markup=False)
+    out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
+
+
+@app.command()
+def compare(scenario: ScenarioPath) -> None:
+    """Generate the C, build it with every compiler present, and compare it with the model; keeps nothing.
+
+    Example:  ctrlgen compare scenarios/circle20
+    """
+    with _progress(job.STAGES - 1) as advance:
+        outcome = job.compare_only(scenario, advance)
+    _print_comparison(outcome)
+    _exit(outcome)
+
+
+@app.command()
+def check(
+    file: Annotated[
+        Path, typer.Argument(help="A device file, a scenario file or a scenario folder.", show_default=False)
+    ],
+) -> None:
+    """Read a device or scenario and list every fault, or say what it describes. Nothing is computed.
+
+    Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
+    """
+    if file.is_dir() or "kind" not in read_toml(file):
+        scenario = load_scenario(file)
+        count = len(scenario.command(build_model(scenario.device)))
+        out.print(f"{scenario.file.title}: {count} samples, device {scenario.device.name}", markup=False)
+        return
+    device = load_device(file)
+    model = build_model(device)
+    numbers = list(device.quantities())
+    unsourced = [path for path, q in numbers if q.source is None]
+    out.print(
+        f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators",
+        markup=False,
+    )
+    for limit in model.limits:
+        low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
+        out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
+
+
+@app.command()
+def bode(
+    device: DevicePath,
+    picture: Annotated[Path, typer.Option("--out", help="The picture to write, .svg or .png.", show_default=False)],
+    at: Annotated[str, typer.Option(help="Pose to linearise at: channel=value, separated by commas.")] = "delta_z=20um",
+) -> None:
+    """Draw the frequency response from every drive to the pose, linearised at a pose.
+
+    Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --out bode.svg --at delta_x=5um,delta_z=20um
+    """
+    from ctrlgen.bode import draw_bode  # python-control takes most of a second to import
+
+    model = build_model(load_device(device))
+    signal_ = model.signals["pose"]
+    pairs = [part.partition("=") for part in at.split(",") if part.strip()]
+    if any(not value for _, _, value in pairs):
+        raise InputError(
+            "--at", [Fault(at, "write channel=value, separated by commas, such as delta_x=5um,delta_z=20um")]
+        )
+    pose = Frame(signal_.channels, signal_.units).point(
+        {name.strip(): value.strip() for name, _, value in pairs}, "--at"
+    )
+    if picture.suffix not in (".svg", ".png"):
+        raise InputError("--out", [Fault(str(picture), "must end in .svg or .png")])
+    draw_bode(model, pose, picture)
+    out.print(str(picture), soft_wrap=True, markup=False)
+
+
+@app.command()
+def workspace(
+    device: DevicePath,
+    out_folder: OutFolder,
+    height: Annotated[
+        list[str] | None,
+        typer.Option(help="Height (last translation) of a slice; repeat for more.", show_default="10, 20 and 30 um"),
+    ] = None,
+) -> None:
+    """Map the poses a device can hold under all its limits: ranges, slices, the largest ball inside.
+
+    Leaves workspace.svg and workspace.json in --out.
+
+    Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --height "20 um"
+    """
+    height = height or ["10 um", "20 um", "30 um"]
+    try:
+        heights = [parse(text, "um") for text in height]
+    except ValueError as error:
+        raise InputError("--height", [Fault("value", str(error))]) from None
+    found = job.map_workspace(load_device(device), heights, out_folder)
+    signal_ = found.workspace.model.signals["pose"]
+    table = _table(("alone", "left"), *((f"at {text}", "right") for text in height))
+    for i, (channel, unit) in enumerate(zip(signal_.channels, signal_.units, strict=True)):
+        table.add_row(
+            f"{channel} [{unit}]", *(" ... ".join(f"{v:.4g}" for v in from_si(r[i], unit)) for r in found.ranges)
+        )
+    out.print(table)
+    for what, ball in (("translations", found.translations), ("translations and rotations", found.everything)):
+        centre = ", ".join(
+            f"{c} {from_si(v, u):.3g} {u}" for c, v, u in zip(signal_.channels, ball.centre, signal_.units, strict=True)
+            if abs(v) > 1e-3 * signal_.scale[signal_.channels.index(c)]
+        )  # fmt: skip
+        out.print(f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {centre}", soft_wrap=True)
+    sizes = ", ".join(f"{show(v, u, 3)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
+    out.print(f"typical sizes: {sizes}")
+    out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
+
+
+def _print_solution(outcome: job.Outcome) -> None:
+    """Title, tracking error, margins and expectations."""
+    solution = outcome.solution
+    scenario = solution.scenario
+    rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
+    out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
+    out.print(
+        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, IPOPT {solution.iterations} iterations",
+        soft_wrap=True,
+    )
+    table = _table(
+        ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
+    )
+    for margin in solution.margins:
+        unit, tightest = margin.limit.unit, margin is solution.tightest
+        share = "" if margin.share is None else f"{100 * margin.share:.1f} %"
+        where = f"{margin.channel}, " + (
+            f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
+        )
+        row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
+        table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
+    out.print(table)
+    if outcome.expected:
+        good = sum(e.passed for e in outcome.expected)
+        out.print(f"expected: {good} of {len(outcome.expected)} values in range")
+    for e in outcome.expected:
+        if not e.passed:
+            measured, low, high = (f"{in_unit(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
+            out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
+
+
+def _print_comparison(outcome: job.Outcome) -> None:
+    """One line per arithmetic and comparison."""
+    if outcome.comparison is None or outcome.c is None:
+        return
+    comparison, c = outcome.comparison, outcome.c
+    tools = ", ".join(comparison.compilers)
+    cost = f"{c.operations} operations a sample, {c.worst_operations} at most"
+    out.print(f"[bold]generated C[/bold], built strictly with {tools}; {cost}", soft_wrap=True)
+    for missing in comparison.missing:
+        out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
+    table = _table(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
+    for row in report.worst_rows(comparison):
+        if row["passed"] and row["what"].endswith("CasADi"):
+            continue
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        verdict = (
+            "[green]ok[/green]" if row["passed"] else f"[red]OUT from sample {row['first']} ({row['build']})[/red]"
+        )
+        table.add_row(
+            row["real"],
+            f"{row['what']}, {row['signal']}",
+            f"{row['worst']:.2g}{unit}",
+            f"{row['limit']:.2g}{unit}",
+            verdict,
+        )
+    out.print(table)
+    good = sum(row.passed for row in comparison.rows)
+    out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+
+
+def _table(*columns: tuple[str, Literal["left", "right"]]) -> Table:
+    """A plain table with a last column for remarks."""
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for name, justify in (*columns, ("", "left")):
+        table.add_column(name, justify=justify, no_wrap=True)
+    return table
+
+
+def _exit(outcome: job.Outcome) -> None:
+    if not outcome.passed:
+        out.print("[red]out of tolerance[/red]")
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _progress(stages: int) -> Iterator[Any]:
+    """A progress bar on standard error; each call moves it on and names what comes next."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=err, transient=True) as bar:
+        task = bar.add_task("reading", total=stages)
+        yield lambda what: bar.update(task, advance=1, description=what)
+
+
+def execute() -> int:
+    """Parses and runs the command line; the exit status, with one clear message for everything that can go wrong."""
+    try:
+        status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
+        return status if isinstance(status, int) else 0
+    except Unreachable as error:
+        err.print("[bold red]unreachable[/bold red]: ", end="")
+        err.print(str(error), markup=False, soft_wrap=True)
+        return 1
+    except CtrlgenError as error:
+        err.print("[bold red]error[/bold red]: ", end="")
+        err.print(str(error), markup=False, soft_wrap=True)
+        return 1
+    except typer.Abort:
+        return 130
+    except OSError as error:
+        err.print(f"error: {error.strerror}: {error.filename}", markup=False, soft_wrap=True)
+        return 1
+    except Exception as error:
+        if not hasattr(error, "format_message"):
+            raise
+        context = getattr(error, "ctx", None)
+        err.print(f"error: {error.format_message()}", markup=False, soft_wrap=True)
+        err.print(f"try: {context.command_path if context else 'ctrlgen'} --help", markup=False)
+        return 2

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ctrlgen import InputError
+from ctrlgen.controller import Controller
+from ctrlgen.workspace import Workspace
+
+UM = 1e-6
+
+
+@pytest.fixture(scope="module")
+def workspace(model):
+    return Workspace(model)
+
+
+def at(dz: float) -> np.ndarray:
+    return np.array([0, 0, 0, 0, 0, dz * UM])
+
+
+def test_without_stress_the_workspace_is_the_strokes_seen_through_the_jacobian(workspace, model):
+    """Low down only the pushing directions bind: pure translation needs d = R(psi)' delta + the lift's share >= 0."""
+    lift = Controller(model, "pose", None).static.displacement(model.rest, 0, at(10)).full().ravel()
+    ranges = workspace.ranges(at(10))
+    turns = np.deg2rad([0, -120, 120])
+    x_needs = np.array([[np.cos(t), -np.sin(t)] for t in turns]).ravel()  # d per unit of delta_x on (1X, 1Y, 2X, ...)
+    expected = max(lift[i] / -x_needs[i] for i in range(6) if x_needs[i] < -1e-9 and lift[i] / -x_needs[i] == min(
+        lift[k] / -x_needs[k] for k in range(6) if x_needs[k] < -1e-9))  # fmt: skip
+    assert ranges[3, 1] == pytest.approx(expected, rel=1e-9)
+
+
+def test_its_boundary_is_where_the_controller_begins_to_report(workspace, model, rng):
+    controller = Controller(model, "pose", None)
+    directions = rng.normal(size=(40, 6)) * np.array(model.signals["pose"].scale)
+    far = workspace.reach(at(20), directions)
+    for way, direction in zip(far, directions, strict=True):
+        assert controller.step(controller.rest(), at(20) + 0.9999 * way * direction).status == 0
+        assert controller.step(controller.rest(), at(20) + 1.0001 * way * direction).status != 0
+
+
+def test_the_outline_is_convex(workspace):
+    edge = workspace.outline(at(25), 3, 4)
+    side = np.roll(edge, -1, axis=0) - edge
+    turn = side[:, 0] * np.roll(side, -1, axis=0)[:, 1] - side[:, 1] * np.roll(side, -1, axis=0)[:, 0]
+    assert turn.min() > -1e-16  # m^2: rounding of sides of micrometres
+
+
+@pytest.mark.parametrize("channels", [(3, 4, 5), (0, 1, 2, 3, 4, 5)])
+def test_the_largest_ball_is_inside_and_touches_on_all_sides(workspace, model, channels, rng):
+    ball = workspace.ball(at(20), channels)
+    scale = np.zeros(6)
+    scale[list(channels)] = np.array(model.signals["pose"].scale)[list(channels)]
+    directions = rng.normal(size=(20000, 6)) * (scale > 0)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    assert workspace.excess(ball.centre + 0.999 * ball.radius * directions * scale).max() <= 0
+    reached = workspace.reach(ball.centre, directions[:2000] * scale)
+    assert reached.min() == pytest.approx(
+        ball.radius, rel=0.02 if len(channels) == 3 else 0.3
+    )  # random directions seldom hit
+    for shift in np.vstack([np.eye(6), -np.eye(6)])[:, list(channels)]:  # no centre nearby is better
+        moved = ball.centre.copy()
+        moved[list(channels)] += 0.05 * ball.radius * shift * scale[list(channels)]
+        assert workspace.excess(moved + 1.002 * ball.radius * directions * scale).max() > 0
+
+
+def test_a_base_that_cannot_be_held_is_refused(workspace):
+    with pytest.raises(InputError, match="cannot be held"):
+        workspace.ranges(np.array([0, 0, 0, 10 * UM, 0, 0]))
+
+
+def test_table_3_lies_inside_and_the_unreachable_pose_outside(workspace):
+    for k in range(6):
+        pose = at(30)
+        if k:
+            pose[(None, 3, 4, 0, 1, 2)[k]] = (None, -10 * UM, -10 * UM, -4e-3, -4e-3, -4e-3)[k]
+        assert workspace.holds(pose)
+    assert not workspace.holds(np.array([0, 0, 0, 10 * UM, 0, 0]))
