@@ -10,36 +10,45 @@ from types import FrameType
 INTERRUPTED = 130
 
 
-class _Interruption:
-    """Remembers that a signal came, because a library may turn it into an error of its own on the way."""
+class Interruption:
+    """Remembers that a signal came, because a library may swallow it or turn it into an error of its own."""
 
     seen = False
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
+        """The signal handler."""
         self.seen = True
         raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt if a signal came, however long ago."""
+        if self.seen:
+            raise KeyboardInterrupt
 
 
 def main() -> None:
     """Runs the command line and exits with its status."""
-    interruption = _Interruption()
+    interruption = Interruption()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, interruption)
     try:
         from ctrlgen.cli import execute
 
-        status = execute()
+        status = execute(interruption.check)
     except KeyboardInterrupt:
         status = INTERRUPTED
     except Exception:
         if not interruption.seen:
             raise
         status = INTERRUPTED
-    if interruption.seen:
+    if interruption.seen and status != 0:
         status = INTERRUPTED
         print("interrupted; nothing was written", file=sys.stderr)
     sys.stdout.flush()
-    os._exit(status) if interruption.seen else sys.exit(status)
+    sys.stderr.flush()
+    if interruption.seen:
+        os._exit(status)  # threads of a library may still wait for what was interrupted
+    sys.exit(status)
 
 
 if __name__ == "__main__":

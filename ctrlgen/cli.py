@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -31,6 +32,7 @@ app = typer.Typer(
 )  # fmt: skip
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
+CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # see `execute`
 
 ScenarioPath = Annotated[
     Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)
@@ -272,15 +274,25 @@ def _exit(outcome: job.Outcome) -> None:
 @contextmanager
 def _progress(stages: int) -> Iterator[Any]:
     """A progress bar on standard error; each call moves it on and names what comes next."""
+    check = CHECK.get()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=err, transient=True) as bar:
         task = bar.add_task("reading", total=stages)
-        yield lambda what: bar.update(task, advance=1, description=what)
+
+        def advance(what: str) -> None:
+            check()
+            bar.update(task, advance=1, description=what)
+
+        yield advance
 
 
-def execute() -> int:
-    """Parses and runs the command line; the exit status, with one clear message for everything that can go wrong."""
+def execute(check: Callable[[], None] = lambda: None) -> int:
+    """Parses and runs the command line; the exit status, with one clear message for everything that can go wrong.
+
+    `check` is called before each stage of long work and raises KeyboardInterrupt when that should end.
+    """
     try:
+        CHECK.set(check)
         status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
         return status if isinstance(status, int) else 0
     except Unreachable as error:

@@ -37,9 +37,9 @@ LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometr
 ANGLE = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}  # rad: 1e-8 rad moves the platform's rim by 0.02 nm
 RELATIVE = 1e-12  # double C against CasADi: 4500 roundings
 EXCESS = {
-    Real.DOUBLE: 1e-9,
+    Real.DOUBLE: 1e-7,
     Real.FLOAT: 1e-5,
-}  # of a limit's bound: roundings; the slack below which a limit is not reported
+}  # of a limit's bound: what the shrinks leave of a memory; float rounding
 ROUNDINGS = 16  # float C against CasADi: roundings of the largest value that the chain may pile up
 
 
@@ -161,7 +161,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
         unit = {"um": "nm", "degC": "K"}.get(unit, unit)
         rows.append(_row(build, what, signal.label, unit, np.asarray(difference)[:, channels], limit))
 
-    def against_casadi(what: str, answer: np.ndarray, reference: np.ndarray) -> None:
+    def against_casadi(what: str, answer: np.ndarray, reference: np.ndarray, wider: float = 1.0) -> None:
         rows.append(_row(build, what, "status", "1", answer[:, :1] - reference[:, :1], 0.0))
         if real is Real.FLOAT:  # where a limited drive is bisected, float may turn the other way, as good an answer
             plain = (reference[:, 0].astype(int) & Status.DRIVE) == 0
@@ -171,6 +171,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
             limit = RELATIVE * size if real is Real.DOUBLE else _float_limit(m, role, size, ref)
             if role == "displacement" and real is Real.FLOAT:
                 limit = max(limit, LENGTH[real])
+            limit *= wider if real is Real.FLOAT else 1.0
             add(what, role, answer[:, columns] - reference[:, columns], limit)
 
     moving = ref.scenario.sample_time is not None
@@ -181,7 +182,9 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
     )
     against_casadi("scenario, online C - CasADi", followed, ref.followed)
     settled = _run(program, "settle", ref.random, width)
-    against_casadi("random targets, online C - CasADi", settled, ref.settled)
+    # Far targets are large numbers that cancel on the way to a displacement: their roundings count, not the result's.
+    far = ref.cancelling / m.z_bounds[1].max()
+    against_casadi("random targets, online C - CasADi", settled, ref.settled, max(1.0, float(far)))
     rows.append(_shipped_test(build, program))
     for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
         channels = [i for i, u in enumerate(m.signals[ref.scenario.file.follow].units) if u == unit]
@@ -282,7 +285,10 @@ def _excess(model: Model, drives: np.ndarray, sample_time: float, x_0: np.ndarra
     )
     columns = []
     for limit, value in zip(model.limits, values, strict=True):
-        v, size = value.full().T, max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(value.full()).max()
+        v, size = (
+            value.full().T,
+            max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(value.full()).max() or 1.0,
+        )
         over = np.zeros(len(u)) if limit.upper is None else v.max(axis=1) - limit.upper
         under = np.zeros(len(u)) if limit.lower is None else limit.lower - v.min(axis=1)
         columns.append(np.maximum(np.maximum(over, under), 0.0) / size)

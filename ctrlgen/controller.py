@@ -17,7 +17,7 @@ from ctrlgen.inverse import Inverse, invert
 from ctrlgen.model import Limit, Model, build_model
 
 SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for
-MEMORY_SHRINKS = 4  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
+MEMORY_SHRINKS = 8  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
 BISECTIONS = 12  # of the way to a target that the drives cannot reach in one sample: 1/4096 of it
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from ctrlgen.controller import Controller
@@ -31,6 +32,15 @@ class Reference:
         self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets()
         self.chased = self._answers(self.hostile, self.controller.rest())
+
+    @property
+    def cancelling(self) -> float:
+        """The largest sum [m] of sizes that cancel to a displacement on the way from a random target."""
+        kernel, rest = self.controller.static.displacement, self.model.rest
+        target = ca.MX.sym("target", self.random.shape[1])
+        slope = ca.jacobian(kernel(rest, 0 * self.model.z_scale, target), target)
+        size = np.abs(ca.Function("slope", [target], [slope])(0).full())
+        return float(np.max(np.abs(self.random) @ size.T))
 
     def _random_targets(self) -> np.ndarray:
         """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""
