@@ -45,6 +45,10 @@ CASES = {
         WITH_EFFECTS,
         '[path]\nkind = "poses"\npoints = [{ delta_z = "22 um" }, { delta_z = "28 um" }]\n',
     ),
+    "driven in volts, heaters warming each other": (
+        ('drive = "power"', 'drive = "voltage"\n\n[[effect]]\nkind = "heat_crosstalk"\nat = "1X"\nshare = "0.02"\n'),
+        'sample_rate = "1 kHz"\nduration = "0.3 s"\n' + CIRCLE.format(10),
+    ),
     "driven in volts": (VOLTS, 'sample_rate = "1 kHz"\nduration = "0.5 s"\n' + CIRCLE.format(18)),
     "samples longer than the time constant": (("", ""), 'sample_rate = "20 Hz"\nduration = "5 s"\n' + CIRCLE.format(8)),
     "samples much shorter than the time constant": (
