@@ -241,7 +241,7 @@ def c23(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
     """delta_y/F_y with the rotation locked, C.23: 1/{E b [0.0040 - 0.0727 q + 0.3417 q^2]}. Schotborgh et al.
 
     Not the compliance of the other authors: theirs is this one plus R^2 alpha_z/M_z. The fit loses its meaning near
-    its minimum: at t/R = 0.05 it is twice the locked compliance of finite elements, from t/R = 0.2 on within 11 %.
+    its minimum: at t/R = 0.05 it is twice the locked compliance of finite elements, from t/R = 0.2 on within 10 %.
     """
     q = (t / (2 * R)) ** 0.5
     return 1 / (E * b * (0.0040 - 0.0727 * q + 0.3417 * q**2))
@@ -250,7 +250,9 @@ def c23(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
 def c24(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
     """delta_x/F_x, C.24: 1/{E b [0.0010 + 0.4256 q + 0.0824 q^2]}. Schotborgh et al.
 
-    Softer than the others by 20 % (t/R = 0.05) to 80 % (0.8): it counts in the stretch of the links beside the notch.
+    Softer than the others by 20 % (t/R = 0.05) to 80 % (0.8): it counts in the
+    stretch of the links. Finite elements read on the outer faces of links of length R agree within 2 % up to t/R = 0.2,
+    within 11 % at 0.8.
     """
     q = (t / (2 * R)) ** 0.5
     return 1 / (E * b * (0.0010 + 0.4256 * q + 0.0824 * q**2))

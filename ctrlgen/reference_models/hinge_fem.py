@@ -19,7 +19,7 @@ from skfem.helpers import ddot, sym_grad, trace
 class Reading(Enum):
     """Between which places of the hinge, x = -R and x = +R, the relative motion is read.
 
-    This alone changes delta_x/F_x by 14 % at t/R = 0.05 and by 65 % at 0.8.
+    This alone changes delta_x/F_x: SECTION exceeds CENTRE by 6 % at t/R = 0.05 and by 32 % at 0.8, BLOCKS by more.
     """
 
     CENTRE = "centre-line points of the end sections, mean rotation of the sections, elastic blocks beyond"
@@ -32,12 +32,12 @@ class Reading(Enum):
 class Notch:
     """The solid in units of R: `ratio` = t/R, Poisson's ratio, `block` length of link at each end over R.
 
-    The blocks are as high as the hinge's ends, t + 2 R.
+    The blocks are as high as the hinge's ends, t + 2 R. Longer ones change the CENTRE reading by less than 0.4 %.
     """
 
     ratio: float
     nu: float
-    block: float = 1.0
+    block: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Grid:
 
     along: int = 56
     across: int = 12
-    block: int = 10
+    block: int = 14
 
     def finer(self, factor: int = 2) -> Grid:
         """`factor` times the elements in each direction."""
