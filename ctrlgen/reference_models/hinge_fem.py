@@ -88,7 +88,7 @@ def compliance(notch: Notch, reading: Reading = Reading.CENTRE, grid: Grid | Non
 
 
 def mesh(notch: Notch, grid: Grid) -> skfem.MeshQuad2:
-    """Columns between the two arcs, one element side on each end section, then the blocks."""
+    """Columns of elements between the two arcs, then the blocks; both end sections are mesh lines."""
     near = np.sqrt(notch.ratio)  # the bending lives within sqrt(t R) of the neck
     angles = near * np.sinh(np.linspace(-1, 1, grid.along + 1) * np.arcsinh(np.pi / 2 / near))
     columns = list(angles)

@@ -78,19 +78,30 @@ def draw_hinge_errors(data: HingeErrors, compliance: str) -> str:
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(6.8, 3.8))
         styles = [(colour, line) for line in ("-", "--") for colour in COLOURS]
-        for (group, errors), (colour, line) in zip(data.errors[compliance].items(), styles, strict=False):
-            equation = table.named(compliance, group)
-            percent = 100 * errors
-            axes.plot(
-                data.ratios, percent, line, color=colour, lw=1, label=f"{group.replace('_', ' ')}, {equation.number}"
-            )
-            if equation.errors is not None:
-                inside = np.array([equation.holds(float(ratio)) for ratio in data.ratios])
-                axes.plot(data.ratios, np.where(inside, percent, np.nan), color=colour, lw=3.5, alpha=0.6)
+        for (groups, errors), (colour, line) in zip(_distinct(data.errors[compliance]), styles, strict=False):
+            equations = [table.named(compliance, group) for group in groups]
+            label = " = ".join(f"{e.number} {e.group.replace('_', ' ')}" for e in equations)
+            axes.plot(data.ratios, 100 * errors, line, color=colour, lw=1, label=label)
+            if equations[0].errors is not None:
+                inside = np.array([equations[0].holds(float(ratio)) for ratio in data.ratios])
+                axes.plot(data.ratios, np.where(inside, 100 * errors, np.nan), color=colour, lw=3.5, alpha=0.6)
         axes.axhline(0, color="#666666", lw=0.8)
         axes.set_ylim(-40, 40)
         axes.set_xlabel("t/R")
         axes.set_ylabel(f"{LABELS[compliance]} against finite elements [%]")
         axes.set_title(f"S3 {FIGURES[compliance]}; thick: range of S3 Table 3", fontsize=8)
-        axes.legend(fontsize=7, ncols=2)
+        axes.legend(fontsize=7, ncols=1 if compliance == table.DELTA_X else 2)
         return svg(figure)
+
+
+def _distinct(errors: dict[str, np.ndarray]) -> list[tuple[list[str], np.ndarray]]:
+    """Groups whose equations are the same formula in other letters share one curve."""
+    curves: list[tuple[list[str], np.ndarray]] = []
+    for group, values in errors.items():
+        for groups, known in curves:
+            if np.allclose(values, known, rtol=0, atol=1e-9, equal_nan=True):
+                groups.append(group)
+                break
+        else:
+            curves.append(([group], values))
+    return curves
