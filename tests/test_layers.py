@@ -10,14 +10,16 @@ from conftest import ROOT
 PACKAGE = ROOT / "ctrlgen"
 LAYERS = [
     "_version errors units",
-    "files",
-    "physics.screw", "physics.flexure", "physics.thermal_actuator", "physics.xy_stage physics.hexapod",
+    "files", "reference_models reference_models.hinge_fem", "measuring_chain",
+    "physics.screw", "physics.flexure", "physics.circular_hinge", "physics.circular_hinge_table",
+    "physics.thermal_actuator", "physics.xy_stage physics.hexapod",
     "effect", "effects",
-    "devices.base", "devices.mems_hexapod", "devices",
+    "devices.base", "devices.hinge", "devices.mems_hexapod", "devices",
     "model", "simulation inverse", "controller linearisation",
     "paths", "scenario", "workspace", "programme", "shortfall", "solution",
     "cprint", "firmware", "reference", "comparison",
     "measures", "figures", "bode report",
+    "reproduce reproduce.row", "reproduce.hinge_errors", "reproduce.s2",
     "job", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}

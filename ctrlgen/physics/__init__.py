@@ -2,6 +2,7 @@
 
 Order of reading: `screw` and `flexure` (the algebra and the elements), then the parts of the
 NIST MEMS hexapod from the heater to the platform: `thermal_actuator`, `xy_stage`, `hexapod`.
+`circular_hinge` has the equations of S2, `circular_hinge_table` where each holds.
 Arguments named `a`, `s`, `h` are namespaces of SI numbers or CasADi symbols with the names of
 the device file's sections.
 """

@@ -1,0 +1,92 @@
+"""A flexure hinge as a section of any device file, such as
+
+hinge = { kind = "circular", R = "1.1 mm", t = "0.84 mm", equation = "auto" }
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from ctrlgen.devices.base import Section
+from ctrlgen.physics import circular_hinge_table as table
+from ctrlgen.physics.screw import Matrix, Scalar
+from ctrlgen.units import quantity
+
+Length = quantity("mm", positive=True)
+Group = Literal[
+    "auto",
+    "paros_weisbord",
+    "paros_weisbord_simplified",
+    "smith",
+    "zhang_fasse",
+    "wu_zhou",
+    "tseytlin",
+    "lobontiu",
+    "schotborgh",
+    "composed",
+]
+
+
+class HingeEquations(Section):
+    """Whose equation gives each compliance, as in S3 Table 2."""
+
+    alpha_z_per_M_z: Group = "auto"
+    delta_y_per_F_y: Group = "auto"
+    delta_x_per_F_x: Group = "auto"
+
+
+class Hinge(Section):
+    """A right circular hinge. Width and material may be its own or come from the device.
+
+    `equation` names one group of authors, one per compliance, or "auto". `outside` = "warn" admits equations beyond
+    their t/R range. `shear_factor` 0 leaves shear out of delta_y/F_y; without it each group's own is taken.
+    """
+
+    kind: Literal["circular"]
+    R: Length
+    t: Length
+    equation: Group | HingeEquations = "auto"
+    outside: Literal["refuse", "warn"] = "refuse"
+    shear_factor: quantity("1", low=0.0, high=2.0) | None = None
+    b: Length | None = Field(default=None, description="width")
+    young: quantity("GPa", positive=True) | None = None
+    poisson: quantity("1", low=0.0, high=0.5) | None = None
+
+    @model_validator(mode="after")
+    def _equations_hold(self) -> Hinge:
+        for compliance, group in self.equations.items():
+            table.choose(compliance, self.ratio, group, self.outside)
+        return self
+
+    @property
+    def ratio(self) -> float:
+        """t/R, which selects the equations."""
+        return self.t.si / self.R.si
+
+    @property
+    def equations(self) -> dict[str, str]:
+        """The group asked for, per compliance."""
+        if isinstance(self.equation, str):
+            return dict.fromkeys(table.PLANAR, self.equation)
+        return {key: getattr(self.equation, key) for key in table.PLANAR}
+
+    def geometry(
+        self, p: SimpleNamespace, b: Scalar | None = None, E: Scalar | None = None, nu: Scalar | None = None
+    ) -> table.Geometry:
+        """The hinge's numbers or symbols `p`, completed by the device's width `b` and material `E`, `nu`, SI."""
+        own = {"b": p.b, "young": p.young, "poisson": p.poisson}
+        given = {"b": b, "young": E, "poisson": nu}
+        whole = {key: given[key] if value is None else value for key, value in own.items()}
+        missing = [key for key, value in whole.items() if value is None]
+        if missing:
+            raise ValueError(f"hinge: {missing[0]} is missing; give it in the hinge or in the device")
+        return table.Geometry(p.R, p.t, whole["b"], whole["young"], whole["poisson"], p.shear_factor, at=self.ratio)
+
+    def planar(
+        self, p: SimpleNamespace, b: Scalar | None = None, E: Scalar | None = None, nu: Scalar | None = None
+    ) -> Matrix:
+        """Compliance (delta_x, delta_y, alpha_z) per (F_x, F_y, M_z) at the hinge's end, shape (3, 3), SI."""
+        return table.planar(self.geometry(p, b, E, nu), self.equations, self.outside)

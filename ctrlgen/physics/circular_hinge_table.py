@@ -1,0 +1,270 @@
+"""Which circular-hinge equation holds where: S3 Table 3, and one function that gives a compliance with its source.
+
+The t/R ranges are those in which S3 found an equation within about 5 % of finite elements.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import casadi as ca
+
+from ctrlgen.physics import circular_hinge as c
+from ctrlgen.physics.flexure import shear_ratio
+from ctrlgen.physics.screw import Matrix, Scalar
+
+ALPHA, DELTA_Y, DELTA_X, LOCKED = "alpha_z_per_M_z", "delta_y_per_F_y", "delta_x_per_F_x", "delta_y_per_F_y_locked"
+PLANAR = (ALPHA, DELTA_Y, DELTA_X)
+UNITS = {ALPHA: "rad/(N*m)", DELTA_Y: "m/N", DELTA_X: "m/N", LOCKED: "m/N"}
+RECTANGLE = 6 / 5  # shear factor of a rectangular section
+LARGEST, SMALLEST = 0.8, 0.05  # t/R of the comparison in S3
+
+Range = tuple[float, float]
+Outside = Literal["refuse", "warn"]
+
+
+class HingeRangeError(ValueError):
+    """An equation was asked for outside the t/R in which it holds."""
+
+
+class HingeRangeWarning(UserWarning):
+    """An equation is used outside the t/R in which it is known to hold."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Radius, neck, width [m], Young's modulus [Pa], Poisson's ratio; numbers or CasADi symbols.
+
+    `at` is the numeric t/R that selects an equation where R or t is a symbol.
+    """
+
+    R: Scalar
+    t: Scalar
+    b: Scalar
+    E: Scalar
+    nu: Scalar
+    shear_factor: Scalar | None = None
+    at: float | None = None
+
+    @property
+    def G(self) -> Scalar:
+        """Shear modulus E/[2 (1 + nu)]."""
+        return self.E * shear_ratio(self.nu)
+
+    @property
+    def ratio(self) -> float:
+        """The numeric t/R."""
+        if self.at is not None:
+            return self.at
+        if isinstance(self.R, ca.SX) or isinstance(self.t, ca.SX):
+            raise ValueError("R or t is a symbol; give `at`, the number t/R at which the equation is chosen")
+        return float(self.t) / float(self.R)
+
+    def shear(self, own: float) -> Scalar:
+        """The shear factor asked for, else the equation's `own`."""
+        return own if self.shear_factor is None else self.shear_factor
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One compliance by one group of authors: its law, its number in S2, its t/R range and the range's source.
+
+    `errors` are S3 Table 3's smallest, largest and mean difference to finite elements within the range, percent.
+    `within` None: no range is recommended.
+    """
+
+    compliance: str
+    group: str
+    number: str
+    authors: str
+    law: Callable[[Geometry], Scalar]
+    within: Range | None
+    range_source: str = "S3 Table 3"
+    errors: tuple[float, float, float] | None = None
+    open_end: bool = False  # the range's upper end is excluded
+
+    def holds(self, ratio: float) -> bool:
+        """Whether `ratio` = t/R lies in the range; the last bit of a quotient does not decide."""
+        if self.within is None:
+            return False
+        low, high = self.within
+        below = ratio < high * (1 - 1e-12) if self.open_end else ratio <= high * (1 + 1e-12)
+        return low * (1 - 1e-12) <= ratio and below
+
+    @property
+    def range_text(self) -> str:
+        """Such as '0.05 <= t/R < 0.1 (S3 Table 3)'."""
+        if self.within is None:
+            return f"no t/R ({self.range_source})"
+        return f"{self.within[0]:g} <= t/R {'<' if self.open_end else '<='} {self.within[1]:g} ({self.range_source})"
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """A compliance with its pedigree. `value` in SI; `note` says what to know when `holds` is False."""
+
+    value: Scalar
+    equation: Equation
+    holds: bool
+    note: str = ""
+
+    @property
+    def source(self) -> str:
+        """Such as 'S2 C.22, Schotborgh et al. (2005)'."""
+        return f"S2 {self.equation.number}, {self.equation.authors}"
+
+    @property
+    def within(self) -> Range | None:
+        """The equation's t/R range."""
+        return self.equation.within
+
+
+def _tseytlin(g: Geometry) -> Scalar:
+    if g.ratio > c.TSEYTLIN_END * (1 + 1e-12):
+        raise HingeRangeError(
+            f"C.15-C.17 (Tseytlin) end at t/R = {c.TSEYTLIN_END}, this hinge has {g.ratio:.4g}; "
+            f'use equation = "schotborgh" or "auto"'
+        )
+    branch = c.c15 if g.ratio <= c.TSEYTLIN_THIN else c.c16 if g.ratio <= c.TSEYTLIN_THICK else c.c17
+    return branch(g.R, g.t, g.b, g.E, g.nu)
+
+
+def _plain(law: Callable[..., Scalar]) -> Callable[[Geometry], Scalar]:
+    return lambda g: law(g.R, g.t, g.b, g.E)
+
+
+def _with_shear(bending: Callable[..., Scalar], shear: Callable[..., Scalar]) -> Callable[[Geometry], Scalar]:
+    # C.4, C.8 and C.14 are printed with the factor 1.
+    return lambda g: bending(g.R, g.t, g.b, g.E) + g.shear(1.0) * shear(g.R, g.t, g.b, g.G)
+
+
+def _lobontiu_y(g: Geometry) -> Scalar:
+    return c.c19(g.R, g.t, g.b, g.E) + c.c21(g.R, g.t, g.b, g.E, g.G, g.shear(RECTANGLE))
+
+
+def _composed_y(g: Geometry) -> Scalar:
+    bending = c.c2(g.R, g.t, g.b, g.E, alpha=c.c22(g.R, g.t, g.b, g.E))
+    return bending + c.c21(g.R, g.t, g.b, g.E, g.G, g.shear(RECTANGLE))
+
+
+OWN = "our finite elements, S3 gives none"
+_PW, _WU, _LO, _SC = (
+    "Paros and Weisbord (1965)",
+    "Wu and Zhou (2002)",
+    "Lobontiu (2003)",
+    "Schotborgh et al. (2005)",
+)
+EQUATIONS = (
+    Equation(ALPHA, "paros_weisbord", "C.1", _PW, _plain(c.c1), (0.05, 0.1), errors=(1.8, 5.0, 3.5), open_end=True),
+    Equation(ALPHA, "paros_weisbord_simplified", "C.5", _PW, _plain(c.c5), (0.05, 0.2), errors=(1.2, 4.9, 3.1)),
+    Equation(ALPHA, "lobontiu", "C.18", _LO, _plain(c.c18), (0.05, 0.1), errors=(1.8, 5.0, 3.5), open_end=True),
+    Equation(ALPHA, "wu_zhou", "C.11", _WU, _plain(c.c11), (0.05, 0.1), errors=(1.8, 5.0, 3.5), open_end=True),
+    Equation(ALPHA, "tseytlin", "C.15-C.17", "Tseytlin (2002)", _tseytlin, (0.4, 0.6), errors=(0.7, 4.5, 2.5)),
+    Equation(ALPHA, "smith", "C.9", "Smith et al. (1987)", _plain(c.c9), (0.2, 0.65), errors=(0.8, 3.7, 2.4)),
+    Equation(ALPHA, "schotborgh", "C.22", _SC, _plain(c.c22), (0.05, 0.65), errors=(0.03, 2.5, 1.2)),
+    Equation(ALPHA, "zhang_fasse", "C.10", "Zhang and Fasse (2001)", _plain(c.c10), (0.05, 0.8), OWN),
+    Equation(DELTA_Y, "paros_weisbord", "C.2 + C.4", _PW, _with_shear(c.c2, c.c4), (0.05, 0.1), errors=(2, 4, 3.1)),
+    Equation(
+        DELTA_Y, "paros_weisbord_simplified", "C.6 + C.8", _PW, _with_shear(c.c6, c.c8), (0.05, 0.1), errors=(3, 5.6, 4.3)
+    ),
+    Equation(DELTA_Y, "lobontiu", "C.19 + C.21", _LO, _lobontiu_y, (0.05, 0.1), errors=(2, 3.9, 2.9)),
+    Equation(DELTA_Y, "wu_zhou", "C.12 + C.14", _WU, _with_shear(c.c12, c.c14), (0.05, 0.1), errors=(2, 4, 3.1)),
+    Equation(DELTA_Y, "composed", "C.2 with C.22, + C.21", f"{_PW}, {_SC}, {_LO}", _composed_y, (0.05, 0.8), OWN),
+    Equation(DELTA_X, "paros_weisbord", "C.3", _PW, _plain(c.c3), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
+    Equation(DELTA_X, "paros_weisbord_simplified", "C.7", _PW, _plain(c.c7), None, "S3 Table 3: not recommended"),
+    Equation(DELTA_X, "lobontiu", "C.20", _LO, _plain(c.c20), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
+    Equation(DELTA_X, "wu_zhou", "C.13", _WU, _plain(c.c13), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
+    Equation(DELTA_X, "schotborgh", "C.24", _SC, _plain(c.c24), None, "not in S3 Table 3; counts in the links' stretch"),
+    Equation(LOCKED, "schotborgh", "C.23", _SC, _plain(c.c23), (0.2, 0.8), OWN),
+)  # fmt: skip
+BY_NAME = {(e.compliance, e.group): e for e in EQUATIONS}
+GROUPS = tuple(dict.fromkeys(e.group for e in EQUATIONS))
+
+
+def best(compliance: str, ratio: float) -> Equation:
+    """The equation for this t/R with the smallest mean error in S3 Table 3.
+
+    Where the table recommends nothing that is printed: below t/R = 0.05 the closed forms, which finite elements
+    approach; above, the neighbouring range's best, and for delta_y/F_y C.2 with the better alpha_z/M_z in it (within
+    2.7 % of our finite elements). None of these `holds` by S3. Above t/R = 0.8 nobody has compared: refused.
+    """
+    if compliance not in PLANAR:
+        raise ValueError(f'there is no choice for {compliance}; name the equation, "schotborgh"')
+    fitting = [e for e in EQUATIONS if e.compliance == compliance and e.errors is not None and e.holds(ratio)]
+    if fitting:
+        return min(fitting, key=lambda e: e.errors[2])
+    if ratio > LARGEST * (1 + 1e-12):
+        raise HingeRangeError(
+            f"no equation for {compliance} is known to hold at t/R = {ratio:.4g}; the comparison ends at {LARGEST}: "
+            f"make the neck thinner or the radius larger"
+        )
+    if ratio < SMALLEST or compliance == DELTA_X:
+        return BY_NAME[compliance, "paros_weisbord"]
+    return BY_NAME[compliance, "schotborgh" if compliance == ALPHA else "composed"]
+
+
+def named(compliance: str, group: str) -> Equation:
+    """The equation of one group of authors. Raises ValueError naming those who give this compliance."""
+    if (compliance, group) in BY_NAME:
+        return BY_NAME[compliance, group]
+    known = ", ".join(e.group for e in EQUATIONS if e.compliance == compliance)
+    asked_locked = compliance == DELTA_Y and (LOCKED, group) in BY_NAME
+    locked = f" (C.23 has the rotation locked: {LOCKED})" if asked_locked else ""
+    raise ValueError(f"{group!r} gives no {compliance}{locked}; known here: auto, {known}")
+
+
+def choose(compliance: str, ratio: float, equation: str = "auto", outside: Outside = "refuse") -> Equation:
+    """`equation` by name, or the best for this t/R. Raises HingeRangeError where a named one does not hold."""
+    if not ratio > 0:
+        raise ValueError(f"t/R = {ratio:.4g} must be positive")
+    if equation == "auto":
+        return best(compliance, ratio)
+    found = named(compliance, equation)
+    if outside == "refuse" and not found.holds(ratio):
+        raise HingeRangeError(
+            f"{found.number} ({found.authors}) for {compliance} holds at {found.range_text}, this hinge has "
+            f't/R = {ratio:.4g}; use equation = "auto", or outside = "warn" to use it all the same'
+        )
+    return found
+
+
+def compliance(name: str, geometry: Geometry, equation: str = "auto", outside: Outside = "refuse") -> Compliance:
+    """One compliance of the hinge, `name` of PLANAR or LOCKED, with its range and source.
+
+    A named equation outside its range raises, or warns when `outside` is "warn"; "auto" always warns there.
+    """
+    found = choose(name, geometry.ratio, equation, outside)
+    listed = found.holds(geometry.ratio) and (equation != "auto" or found.errors is not None)
+    note = ""
+    if not listed:
+        note = (
+            f"{name} at t/R = {geometry.ratio:.4g} by {found.number} ({found.authors}), "
+            + ("the nearest; S3 Table 3 recommends no printed equation here" if equation == "auto" else "outside its range")
+            + f": {found.range_text}"
+        )  # fmt: skip
+        warnings.warn(note, HingeRangeWarning, stacklevel=2)
+    return Compliance(found.law(geometry), found, listed, note)
+
+
+def planar(geometry: Geometry, equation: str | Mapping[str, str] = "auto", outside: Outside = "refuse") -> Matrix:
+    """Compliance (delta_x, delta_y, alpha_z) per (F_x, F_y, M_z) at the hinge's end (R, 0), shape (3, 3).
+
+    `equation` is one name for all three or a name for each of PLANAR. Refused when it is not positive definite,
+    that is when delta_y/F_y <= R^2 alpha_z/M_z: the two then come from theories that contradict each other.
+    """
+    asked = {key: equation if isinstance(equation, str) else equation.get(key, "auto") for key in PLANAR}
+    found = {key: compliance(key, geometry, asked[key], outside) for key in PLANAR}
+    alpha, y, x = (found[key].value for key in PLANAR)
+    couple = geometry.R * alpha
+    locked: Any = y - geometry.R * couple
+    # C.6 is R^2 C.5 but for shear; rounding must not decide whether a compliance is positive.
+    if not isinstance(locked, ca.SX) and float(locked) <= 1e-12 * float(y):
+        raise ValueError(
+            f"delta_y/F_y by {found[DELTA_Y].source} is below R^2 alpha_z/M_z by {found[ALPHA].source} at "
+            f"t/R = {geometry.ratio:.4g}: the hinge would be indefinite (push it and it yields energy); "
+            f'use equation = "auto" or include shear'
+        )
+    return ca.vertcat(ca.horzcat(x, 0, 0), ca.horzcat(0, y, couple), ca.horzcat(0, couple, alpha))

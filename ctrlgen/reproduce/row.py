@@ -1,0 +1,61 @@
+"""One printed number beside ours, and the rule that decides whether it is reproduced."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from decimal import Decimal
+from enum import Enum
+
+
+class Status(Enum):
+    """What became of a printed number."""
+
+    REPRODUCED = "reproduced"
+    DIFFERS = "differs"
+    NOT_COMPUTABLE = "not computable"
+
+
+@dataclass(frozen=True)
+class Row:
+    """`source` such as 'S3', `where` such as 'Table 4, case 1, C_oFin (1,2)', `printed` the text as printed, `unit`.
+
+    `ours` is None where it cannot be computed. `tolerance` is half a unit of the last printed digit
+    unless another is stated with a `reason`. A row that differs or cannot be computed needs a `reason`.
+    """
+
+    source: str
+    where: str
+    printed: str
+    unit: str
+    ours: float | None
+    reason: str = ""
+    tolerance: float | None = None
+
+    @property
+    def value(self) -> float:
+        """The printed number."""
+        return float(Decimal(self.printed.replace("−", "-")))
+
+    @property
+    def allowed(self) -> float:
+        """How far ours may be from the print and count as the same."""
+        return half_unit(self.printed) if self.tolerance is None else self.tolerance
+
+    @property
+    def difference(self) -> float | None:
+        """Ours minus printed."""
+        return None if self.ours is None else self.ours - self.value
+
+    @property
+    def status(self) -> Status:
+        """Reproduced within what the print can tell; not a number never is."""
+        if self.ours is None:
+            return Status.NOT_COMPUTABLE
+        close = math.isfinite(self.ours) and abs(self.ours - self.value) <= self.allowed * (1 + 1e-9)
+        return Status.REPRODUCED if close else Status.DIFFERS
+
+
+def half_unit(printed: str) -> float:
+    """Half a unit of the last printed digit: '9.12e-2' -> 5e-5, '301.0' -> 0.05, '12' -> 0.5."""
+    return 0.5 * 10.0 ** int(Decimal(printed.replace("−", "-")).as_tuple().exponent)

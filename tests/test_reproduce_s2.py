@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from ctrlgen.physics import circular_hinge_table as table
+from ctrlgen.reproduce.row import Row, Status
+from ctrlgen.reproduce.s2 import PRINTED_ERRORS, rows
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, Row]:
+    pytest.importorskip("skfem")
+    listed = rows()
+    by_place = {f"{row.source} {row.where}": row for row in listed}
+    assert len(by_place) == len(listed)  # each number once
+    return by_place
+
+
+def test_what_is_not_reproduced_has_a_reason(found):
+    silent = [place for place, row in found.items() if row.status is not Status.REPRODUCED and not row.reason]
+    assert not silent
+
+
+def test_every_computable_number_of_s2_is_reproduced_but_two(found):
+    s2 = [row for row in found.values() if row.source == "S2" and row.ours is not None]
+    differing = {row.where for row in s2 if row.status is Status.DIFFERS}
+    assert differing == {"A.5.1.1, eq. (A.2), 3338", "below C.15, coefficient, Tseytlin"}
+    assert len(s2) >= 30
+
+
+def test_the_hinge_errors_of_s3_table_3_agree_where_the_reading_does_not_matter(found):
+    bending = [row for place, row in found.items() if "delta_y_per_F_y" in place and row.ours is not None]
+    assert len(bending) == 12 and Counter(row.status for row in bending)[Status.REPRODUCED] >= 8
+    assert max(abs(row.difference) for row in bending) < 0.15
+
+
+def test_the_printed_texts_are_the_numbers_the_selection_uses():
+    listed = {(e.compliance, e.group): e.errors for e in table.EQUATIONS if e.errors}
+    assert {key: tuple(map(float, text.split())) for key, text in PRINTED_ERRORS.items()} == listed
