@@ -12,12 +12,14 @@ LAYERS = [
     "_version errors units",
     "files",
     "physics.screw", "physics.flexure", "physics.thermal_actuator", "physics.xy_stage physics.hexapod",
+    "physics.rrr_hinge physics.piezo_stack", "physics.rrr_stage",
     "effect", "effects",
-    "devices.base", "devices.mems_hexapod", "devices",
+    "devices.base", "devices.mems_hexapod devices.rrr_stage", "devices",
     "model", "simulation inverse", "controller linearisation",
     "paths", "scenario", "programme", "shortfall", "solution",
     "cprint", "firmware", "reference", "comparison",
     "measures", "figures", "bode report",
+    "reproduce.row", "reproduce.s3_tables", "reproduce.s3_lengths", "reproduce.s3", "reproduce",
     "job", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}

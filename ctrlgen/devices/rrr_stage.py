@@ -93,9 +93,7 @@ class RrrStage(Device):
         k = stage(self, p)
         K_in, J = k.input_stiffness, k.complete_J
         limit, stroke = self.piezo.voltage_limit.si, self.piezo.stroke.si
-        drive = Signal(
-            "voltage", "amplifier input", self.axes, ("V",) * 3, "u_", ca.SX.sym("u", 3), (limit,) * 3
-        )
+        drive = Signal("voltage", "amplifier input", self.axes, ("V",) * 3, "u_", ca.SX.sym("u", 3), (limit,) * 3)
         state = Signal("stack_voltage", "stack voltage", self.axes, ("V",) * 3, "V_", ca.SX.sym("V", 3), (limit,) * 3)
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
@@ -169,20 +167,20 @@ def stage(device: RrrStage, p: SimpleNamespace | None = None) -> Kinetostatics:
     return rrr_stage.kinetostatics(hinge_compliances(device, p), g)
 
 
-def output_per_voltage(device: RrrStage) -> np.ndarray:
+def output_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
     """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]: J (C_in^-1 + k_p)^-1 F_b/V_max."""
-    p = device.values()
+    p = device.values() if p is None else p
     k = stage(device, p)
     stiffness = k.input_stiffness + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
     return ca.DM(ca.solve(stiffness.T, k.complete_J.T).T * piezo_stack.blocked_force(1.0, p.piezo)).full()
 
 
-def workspace(device: RrrStage) -> dict[str, list[float]]:
+def workspace(device: RrrStage, p: SimpleNamespace | None = None) -> dict[str, list[float]]:
     """Half ranges of (dx, dy, dalpha) [m, m, rad] over stack voltages from 0 to their limit.
 
     'alone': the other two stay at the centre; 'together': over the whole workspace.
     """
-    M, u = ca.DM(output_per_voltage(device)), device.piezo.voltage_limit.si
+    M, u = ca.DM(output_per_voltage(device, p)), device.piezo.voltage_limit.si
     ranges: dict[str, Any] = {"alone": rrr_stage.reach_alone(M, u), "together": rrr_stage.reach_together(M, u)}
     return {name: [float(value) for value in values] for name, values in ranges.items()}
 

@@ -39,11 +39,7 @@ def transverse_lobontiu(t: Scalar, R: Scalar, b: Scalar, E: Scalar) -> Scalar:
     """Lobontiu: Delta-y/F_y [m/N], bending only. Source: S2 eq. (C.19)."""
     q = t * (4 * R + t)
     polynomial = (
-        -80 * R**4
-        + 24 * R**3 * t
-        + 8 * (3 + 2 * ca.pi) * R**2 * t**2
-        + 4 * (1 + 2 * ca.pi) * R * t**3
-        + ca.pi * t**4
+        -80 * R**4 + 24 * R**3 * t + 8 * (3 + 2 * ca.pi) * R**2 * t**2 + 4 * (1 + 2 * ca.pi) * R * t**3 + ca.pi * t**4
     )
     brace = (
         2 * (2 + ca.pi) * R

@@ -82,26 +82,32 @@ def _printed() -> np.ndarray:
     return np.array([*(getattr(p.lengths, name) for name in LENGTHS), p.frame_angle])
 
 
+def _evaluated(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    misfit, jacobian = _misfit()(x)
+    return misfit.full().ravel(), jacobian.full()
+
+
 def _fitted(x: np.ndarray, columns: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Levenberg-Marquardt over `columns` of x; the best x and its misfit."""
     damping, scale = 1e-3, np.abs(x[columns]) + 1e-3
-    r, J = (block.full() for block in _misfit()(x))
+    r, J = _evaluated(x)
     for _ in range(STEPS):
         A = J[:, columns] * scale
         H = A.T @ A
-        step = np.linalg.solve(H + damping * np.diag(np.diag(H) + 1e-12), -A.T @ r).ravel() * scale
+        step = np.linalg.solve(H + damping * np.diag(np.diag(H) + 1e-12), -A.T @ r) * scale
         trial = x.copy()
         trial[columns] += step
-        r_1, J_1 = (block.full() for block in _misfit()(trial))
-        if np.isfinite(r_1).all() and float(r_1.T @ r_1) < float(r.T @ r):
+        r_1, J_1 = _evaluated(trial)
+        if np.isfinite(r_1).all() and r_1 @ r_1 < r @ r:
             x, r, J, damping = trial, r_1, J_1, damping / 10
         else:
             damping *= 10
         if np.abs(step / scale).max() < 1e-12:
             break
-    return x, r.ravel()
+    return x, r
 
 
+@cache
 def fit(*freed: str) -> Fit:
     """The best fit with the lengths `freed` and the frame angle unknown, from several starts."""
     columns = [LENGTHS.index(name) for name in freed]
