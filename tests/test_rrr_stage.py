@@ -12,7 +12,7 @@ import pytest
 import rrr_direct as direct
 from conftest import SCENARIOS
 
-from ctrlgen import InputError, build_model, load_device
+from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices import rrr_stage as device_module
 from ctrlgen.physics import piezo_stack, rrr_hinge, rrr_stage
 from ctrlgen.reproduce import s3, s3_lengths, s3_tables
@@ -380,3 +380,19 @@ def test_the_workspace_is_as_far_as_the_voltages_reach(case: int) -> None:
         volts = limit / 2 + np.linalg.solve(M, alone * np.eye(3)[k])
         assert np.isclose(np.abs(volts - limit / 2).max(), limit / 2, rtol=1e-12)  # one stack just at its end
         assert alone <= ranges["together"][k] * (1 + 1e-12)
+
+
+def test_a_circle_is_solved_with_voltages_that_the_static_map_gives(tmp_path: Any) -> None:
+    path = tmp_path / "scenario.toml"
+    path.write_text(
+        f'''title = "circle"\ndevice = "{SCENARIOS / "devices" / "rrr_case2.toml"}"
+        sample_rate = "100 Hz"\nduration = "1 s"\n[path]\nkind = "circle"\ndiameter = "20 um"
+        plane = ["delta_x", "delta_y"]\ncentre = {{ theta_z = "-2 mrad" }}\n'''
+    )
+    scenario = load_scenario(path)
+    trace = solve(scenario, build_model(scenario.device)).trace
+    M = device_module.output_per_voltage(s3_lengths.printed_device(2))
+    volts, pose = trace.signals["state"], trace.signals["pose"]
+    assert np.abs(pose - volts @ M.T)[:, :2].max() < 1e-11 and np.abs(pose - volts @ M.T)[:, 2].max() < 1e-9
+    assert volts.min() > 0 and volts.max() < 150
+    assert np.isclose(np.hypot(pose[:, 0], pose[:, 1]), 10e-6, rtol=1e-6).all()

@@ -88,11 +88,14 @@ class RrrStage(Device):
         """Equations of `ctrlgen.physics` with this device's numbers.
 
         The stack's own stiffness counts as the stage's, so that its force depends on the voltage alone:
-        F_b V/V_max = (C_in^-1 + k_p) d.
+        F_b V/V_max = (C_in^-1 + k_p) d. The voltage limit keeps it below F_b. Stacks are taken as preloaded: that
+        none pulls on its input is not checked.
         """
         k = stage(self, p)
         K_in, J = k.input_stiffness, k.complete_J
         limit, stroke = self.piezo.voltage_limit.si, self.piezo.stroke.si
+        # The least that any voltages give: an input is pushed back a little when the others push.
+        lowest = float(np.minimum(input_per_voltage(self), 0).sum(axis=1).min()) * limit
         drive = Signal("voltage", "amplifier input", self.axes, ("V",) * 3, "u_", ca.SX.sym("u", 3), (limit,) * 3)
         state = Signal("stack_voltage", "stack voltage", self.axes, ("V",) * 3, "V_", ca.SX.sym("V", 3), (limit,) * 3)
 
@@ -100,8 +103,8 @@ class RrrStage(Device):
             return [
                 Limit("drive", drive.label, self.axes, "V", signal.drive, 0.0, limit),
                 Limit("stack_voltage", state.label, self.axes, "V", signal.state, 0.0, limit),
-                Limit("force", "blocked force", self.axes, "N", signal.force, 0.0, self.piezo.blocking_force.si),
-                Limit("stroke", "input displacement", self.axes, "um", signal.displacement, None, stroke),
+                Limit("force", "blocked force", self.axes, "N", signal.force, 0.0, None),
+                Limit("stroke", "input displacement", self.axes, "um", signal.displacement, lowest, stroke),
             ]
 
         return Links(
@@ -167,12 +170,16 @@ def stage(device: RrrStage, p: SimpleNamespace | None = None) -> Kinetostatics:
     return rrr_stage.kinetostatics(hinge_compliances(device, p), g)
 
 
-def output_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
-    """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]: J (C_in^-1 + k_p)^-1 F_b/V_max."""
+def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
+    """Input displacement per stack voltage at rest, (3, 3) [m/V]: (C_in^-1 + k_p)^-1 F_b/V_max."""
     p = device.values() if p is None else p
-    k = stage(device, p)
-    stiffness = k.input_stiffness + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
-    return ca.DM(ca.solve(stiffness.T, k.complete_J.T).T * piezo_stack.blocked_force(1.0, p.piezo)).full()
+    K = stage(device, p).input_stiffness + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
+    return ca.DM(ca.inv(K) * piezo_stack.blocked_force(1.0, p.piezo)).full()
+
+
+def output_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
+    """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]."""
+    return ca.DM(stage(device, p).complete_J).full() @ input_per_voltage(device, p)
 
 
 def workspace(device: RrrStage, p: SimpleNamespace | None = None) -> dict[str, list[float]]:
