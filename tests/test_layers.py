@@ -13,13 +13,15 @@ LAYERS = [
     "files", "reference_models reference_models.hinge_fem", "measuring_chain",
     "physics.screw", "physics.flexure", "physics.circular_hinge", "physics.circular_hinge_table",
     "physics.thermal_actuator", "physics.xy_stage physics.hexapod",
+    "physics.rrr_hinge physics.piezo_stack", "physics.rrr_stage",
     "effect", "effects",
-    "devices.base", "devices.hinge", "devices.mems_hexapod", "devices",
+    "devices.base", "devices.hinge", "devices.mems_hexapod devices.rrr_stage", "devices",
     "model", "simulation inverse", "controller linearisation",
     "paths", "scenario", "workspace", "programme", "shortfall", "solution",
     "cprint", "firmware", "reference", "comparison",
     "measures", "figures", "bode report",
-    "reproduce reproduce.row", "reproduce.hinge_errors", "reproduce.s2",
+    "reproduce reproduce.row", "reproduce.hinge_errors reproduce.s3_tables", "reproduce.s3_lengths",
+    "reproduce.s2 reproduce.s3",
     "job", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}

@@ -1,0 +1,200 @@
+"""A planar 3-RRR compliant stage on three piezo stacks. Source: S3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+from pydantic import model_validator
+
+from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.physics import piezo_stack, rrr_hinge, rrr_stage
+from ctrlgen.physics.rrr_stage import Kinetostatics
+from ctrlgen.physics.screw import Matrix
+from ctrlgen.units import quantity
+
+Length = quantity("mm", positive=True)
+
+
+class Lengths(Section):
+    """Link lengths of S3 Fig. 6(b)."""
+
+    l1: Length
+    l2: Length
+    l3: quantity("mm", low=0.0)
+    l4: Length
+    l5: quantity("mm", low=0.0)
+    l6: quantity("mm", low=0.0)
+
+
+class Material(Section):
+    """Material and width of the sheet the stage is cut from."""
+
+    young: quantity("GPa", positive=True)
+    poisson: quantity("1", low=0.0, high=0.5)
+    width: Length
+
+
+class Hinge(Section):
+    """One circular notch and the equation chosen for each of its compliances.
+
+    `shear_factor` 0 leaves shear out of Delta-y/F_y.
+    """
+
+    thickness: Length
+    radius: Length
+    rotation: Literal["paros_weisbord_full", "schotborgh"]
+    transverse: Literal["paros_weisbord_simplified", "lobontiu"]
+    axial: Literal["paros_weisbord_simplified", "paros_weisbord_full"]
+    shear_factor: quantity("1", low=0.0)
+
+
+class Piezo(Section):
+    """The stack behind each input and its amplifier."""
+
+    stroke: quantity("um", positive=True)
+    blocking_force: quantity("N", positive=True)
+    voltage_limit: quantity("V", positive=True)
+    time_constant: quantity("ms", positive=True)
+
+
+class RrrStage(Device):
+    """Stack voltage -> force on the input == stiffness of the input -> output displacement.
+
+    `frame_angle` turns the output frame from that of Link 1.
+    """
+
+    kind: Literal["rrr_stage"]
+    axes: tuple[str, str, str]
+    frame_angle: quantity("deg")
+    lengths: Lengths
+    material: Material
+    hinge1: Hinge
+    hinge2: Hinge
+    hinge3: Hinge
+    piezo: Piezo
+
+    @model_validator(mode="after")
+    def _hinges_store_energy(self) -> RrrStage:
+        refused = indefinite(hinge_compliances(self, self.values()))
+        if refused:
+            raise ValueError("; ".join(refused))
+        return self
+
+    def links(self, p: SimpleNamespace) -> Links:
+        """Equations of `ctrlgen.physics` with this device's numbers.
+
+        The stack's own stiffness counts as the stage's, so that its force depends on the voltage alone:
+        F_b V/V_max = (C_in^-1 + k_p) d. The voltage limit keeps it below F_b. Stacks are taken as preloaded: that
+        none pulls on its input is not checked.
+        """
+        k = stage(self, p)
+        K_in, J = k.input_stiffness, k.complete_J
+        limit, stroke = self.piezo.voltage_limit.si, self.piezo.stroke.si
+        # The least that any voltages give: an input is pushed back a little when the others push.
+        lowest = float(np.minimum(input_per_voltage(self), 0).sum(axis=1).min()) * limit
+        drive = Signal("voltage", "amplifier input", self.axes, ("V",) * 3, "u_", ca.SX.sym("u", 3), (limit,) * 3)
+        state = Signal("stack_voltage", "stack voltage", self.axes, ("V",) * 3, "V_", ca.SX.sym("V", 3), (limit,) * 3)
+
+        def limits(signal: SimpleNamespace) -> list[Limit]:
+            return [
+                Limit("drive", drive.label, self.axes, "V", signal.drive, 0.0, limit),
+                Limit("stack_voltage", state.label, self.axes, "V", signal.state, 0.0, limit),
+                Limit("force", "blocked force", self.axes, "N", signal.force, 0.0, None),
+                Limit("stroke", "input displacement", self.axes, "um", signal.displacement, lowest, stroke),
+            ]
+
+        return Links(
+            axes=self.axes,
+            components=("delta_x", "delta_y", "theta_z"),
+            pose_units=("um", "um", "urad"),
+            pose_scale=(1e-5, 1e-5, 1e-3),
+            drive=drive,
+            state=state,
+            rest=(0.0,) * 3,
+            displacement_scale=stroke,
+            force_scale=self.piezo.blocking_force.si,
+            rates=lambda V, u: piezo_stack.voltage_rate(V, u, p.piezo),
+            force=lambda u, V, d: piezo_stack.blocked_force(V, p.piezo),
+            resistance=lambda d: ca.mtimes(K_in, d) + piezo_stack.stiffness(p.piezo) * d,
+            resistance_parts=lambda d: {
+                "hinges": ca.mtimes(K_in, d),
+                "stacks": piezo_stack.stiffness(p.piezo) * d,
+            },
+            pose=lambda d: ca.mtimes(J, d),
+            limits=limits,
+        )
+
+
+def hinge_compliances(device: RrrStage, p: SimpleNamespace) -> list[Matrix]:
+    """[C] of hinges 1, 2, 3 by the equations that `device` names and the values `p`, each (3, 3)."""
+    m, matrices = p.material, []
+    for choice, h in ((device.hinge1, p.hinge1), (device.hinge2, p.hinge2), (device.hinge3, p.hinge3)):
+        size = (h.thickness, h.radius, m.width, m.young)
+        y = rrr_hinge.TRANSVERSE[choice.transverse](*size) + h.shear_factor * rrr_hinge.shear(*size, m.poisson)
+        matrices.append(
+            rrr_hinge.hinge_compliance(
+                rrr_hinge.AXIAL[choice.axial](*size), y, rrr_hinge.ROTATION[choice.rotation](*size), h.radius
+            )
+        )
+    return matrices
+
+
+def indefinite(hinges: Sequence[Matrix]) -> list[str]:
+    """One sentence for each hinge of which some load would take energy out, by its name."""
+    faults = []
+    for number, matrix in enumerate(hinges, start=1):
+        C = ca.DM(matrix).full()
+        scale = np.sqrt(np.abs(np.diag(C)))
+        scaled = C / np.outer(scale, scale)  # to order 1, so that the eigenvalue does not depend on the unit of length
+        if not (np.isfinite(C).all() and np.diag(C).min() > 0 and np.linalg.eigvalsh(scaled).min() > 0):
+            faults.append(
+                f"hinge{number} has a compliance that is not positive definite: Delta-y/F_y = {C[1, 1]:.4g} m/N, "
+                f"at least {C[1, 2] ** 2 / C[2, 2]:.4g} m/N follows from its rotation; "
+                "add shear (shear_factor), or take rotation and transverse from one source"
+            )
+    return faults
+
+
+def stage(device: RrrStage, p: SimpleNamespace | None = None) -> Kinetostatics:
+    """The matrices of S3 appendix B with the values `p`, by default the device's own."""
+    p = device.values() if p is None else p
+    g = SimpleNamespace(
+        **vars(p.lengths), R1=p.hinge1.radius, R2=p.hinge2.radius, R3=p.hinge3.radius, frame_angle=p.frame_angle
+    )
+    return rrr_stage.kinetostatics(hinge_compliances(device, p), g)
+
+
+def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
+    """Input displacement per stack voltage at rest, (3, 3) [m/V]: (C_in^-1 + k_p)^-1 F_b/V_max."""
+    p = device.values() if p is None else p
+    K = stage(device, p).input_stiffness + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
+    return ca.DM(ca.inv(K) * piezo_stack.blocked_force(1.0, p.piezo)).full()
+
+
+def output_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
+    """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]."""
+    return ca.DM(stage(device, p).complete_J).full() @ input_per_voltage(device, p)
+
+
+def workspace(device: RrrStage, p: SimpleNamespace | None = None) -> dict[str, list[float]]:
+    """Half ranges of (dx, dy, dalpha) [m, m, rad] over stack voltages from 0 to their limit.
+
+    'alone': the other two stay at the centre; 'together': over the whole workspace.
+    """
+    M, u = ca.DM(output_per_voltage(device, p)), device.piezo.voltage_limit.si
+    ranges: dict[str, Any] = {"alone": rrr_stage.reach_alone(M, u), "together": rrr_stage.reach_together(M, u)}
+    return {name: [float(value) for value in values] for name, values in ranges.items()}
+
+
+def matrices(device: RrrStage) -> dict[str, np.ndarray]:
+    """The matrices the paper prints, as (3, 3) arrays in SI, by their symbol, and those of the whole model."""
+    k = stage(device)
+    named = {
+        "C_oFo": k.C_oFo, "C_oFin": k.C_oFin, "C_inFo": k.C_inFo, "C_inFin": k.C_inFin, "J": k.J,
+        "C_in": k.input_compliance, "K_in": k.input_stiffness, "J_complete": k.complete_J,
+    }  # fmt: skip
+    return {name: ca.DM(matrix).full() for name, matrix in named.items()}
