@@ -27,7 +27,7 @@ from ctrlgen.model import Model
 from ctrlgen.reference import Reference
 from ctrlgen.simulation import simulate, trace
 from ctrlgen.solution import Solution
-from ctrlgen.units import from_si
+from ctrlgen.units import from_si, same_dimension
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O2")
 COMPILERS = ("gcc", "clang")
@@ -158,7 +158,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
     def add(what: str, role: str, difference: np.ndarray, limit: float, channels: slice = slice(None)) -> None:
         signal = m.signals[role]
         unit = signal.units[channels][0]
-        unit = {"um": "nm", "degC": "K"}.get(unit, unit)
+        unit = {"um": "nm", "degC": "K", "urad": "rad"}.get(unit, unit)
         rows.append(_row(build, what, signal.label, unit, np.asarray(difference)[:, channels], limit))
 
     def against_casadi(what: str, answer: np.ndarray, reference: np.ndarray, wider: float = 1.0) -> None:
@@ -187,7 +187,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
     against_casadi("random targets, online C - CasADi", settled, ref.settled, max(1.0, float(far)))
     rows.append(_shipped_test(build, program))
     for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
-        channels = [i for i, u in enumerate(m.signals[ref.scenario.file.follow].units) if u == unit]
+        channels = [i for i, u in enumerate(m.signals[ref.scenario.file.follow].units) if same_dimension(u, unit)]
         plain = np.flatnonzero(ref.settled[: len(ref.random) // 2, 0] == 0)
         if channels and plain.size:
             reached = _equilibria(ref, settled[plain])
@@ -224,7 +224,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
             x = np.hstack([state, ref.solution.trace.x[:, m.n_states :]])
             reached = trace(m, np.zeros(len(z)), x, z, drives).signals[role]
         for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
-            channels = [i for i, u in enumerate(m.signals[role].units) if u == unit]
+            channels = [i for i, u in enumerate(m.signals[role].units) if same_dimension(u, unit)]
             if channels:
                 add(f"{what} -> model - command", role, reached - ref.path, limit, slice(channels[0], channels[-1] + 1))
     if ref.scenario.sample_time:

@@ -40,7 +40,8 @@ def svg(figure: Figure) -> str:
 def draw_all(solution: Solution) -> dict[str, str]:
     """Every figure that this solution has something to show in: name -> SVG text."""
     drawings: dict[str, Callable[[Solution], Figure]] = {"margins": draw_margins}
-    signals = {"forces": "force", "temperatures": "state", "drives": "drive"}
+    state = solution.model.signals.get("state")
+    signals = {"forces": "force", f"{state.name if state else 'state'}s": "state", "drives": "drive"}
     with plt.rc_context(STYLE):
         figures = {}
         if solution.scenario.file.follow == "pose" and solution.scenario.sample_time:
@@ -48,6 +49,8 @@ def draw_all(solution: Solution) -> dict[str, str]:
         if solution.scenario.file.follow == "displacement":
             figures["stage_force"] = svg(draw_stage_force(solution))
         for name, role in signals.items():
+            if role not in solution.model.signals:
+                continue
             figures[name] = svg(draw_signal(solution, role))
         for name, draw in drawings.items():
             figures[name] = svg(draw(solution))

@@ -59,7 +59,7 @@ def measure(solution: Solution, name: str) -> tuple[float, str]:
         return found[0].distance, "delta_degC" if unit == "degC" else unit
     followed = solution.scenario.file.follow
     tables = {
-        ("temperature" if role == "state" else role): (signal, solution.trace.signals[role])
+        (signal.name if role == "state" else role): (signal, solution.trace.signals[role])
         for role, signal in m.signals.items()
     }
     tables |= {f"force_{part}": (m.signals["force"], table) for part, table in force_parts(solution).items()}

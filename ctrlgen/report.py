@@ -30,10 +30,10 @@ def write_trajectory(solution: Solution, path: Path) -> None:
     Row k holds the state at time k and the power that acts from there to the next row. A device driven
     in volts has its voltage columns last.
     """
-    roles = [
-        *CSV_SIGNALS,
-        *(["drive"] if solution.model.signals["drive"].columns != solution.model.signals["power"].columns else []),
-    ]
+    signals = solution.model.signals
+    roles = [role for role in CSV_SIGNALS if role in signals]
+    if signals["drive"].columns not in [signals[role].columns for role in roles]:
+        roles.append("drive")
     static = solution.scenario.sample_time is None
     header = ["sample" if static else "time [s]"]
     columns = [(np.arange(len(solution.command)) if static else solution.trace.time)[:, None]]

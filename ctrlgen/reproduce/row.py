@@ -35,7 +35,7 @@ class Row:
     @property
     def value(self) -> float:
         """The printed number."""
-        return float(Decimal(self.printed.replace("−", "-")))
+        return float(Decimal(self.printed.replace("\N{MINUS SIGN}", "-")))
 
     @property
     def allowed(self) -> float:
@@ -58,4 +58,4 @@ class Row:
 
 def half_unit(printed: str) -> float:
     """Half a unit of the last printed digit: '9.12e-2' -> 5e-5, '301.0' -> 0.05, '12' -> 0.5."""
-    return 0.5 * 10.0 ** int(Decimal(printed.replace("−", "-")).as_tuple().exponent)
+    return 0.5 * 10.0 ** int(Decimal(printed.replace("\N{MINUS SIGN}", "-")).as_tuple().exponent)
