@@ -11,13 +11,15 @@ PACKAGE = ROOT / "ctrlgen"
 LAYERS = [
     "_version errors units",
     "files",
-    "physics.screw", "physics.flexure", "physics.thermal_actuator", "physics.xy_stage physics.hexapod",
+    "physics.screw", "physics.flexure", "physics.thermal_actuator", "physics.xy_stage physics.hexapod physics.meso_hexapod",
     "effect", "effects",
-    "devices.base", "devices.mems_hexapod", "devices",
+    "devices.base", "devices.mems_hexapod devices.meso_hexapod", "devices",
+    "calibration pose_errors",
     "model", "simulation inverse", "controller linearisation",
     "paths", "scenario", "programme", "shortfall", "solution",
     "cprint", "firmware", "reference", "comparison",
     "measures", "figures", "bode report",
+    "reproduce", "reproduce.row reproduce.rounding", "reproduce.s0_data", "reproduce.s0 reproduce.s0_figures",
     "job", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}
