@@ -263,6 +263,8 @@ def test_poses_and_jacobian_are_read_in_si(data) -> None:
         np.array([0.0998, -0.00081, 0.0004, 0, 0, 0]) * DEG + np.array([0, 0, 0, -1.15, 0.712, -0.58]) * UM, rel=1e-14
     )
     assert data.J_cube[0, 0] == pytest.approx(-1.51, rel=1e-14) and data.J_cube[5, 5] == 0.12492
+    assert data.J_c[3, 1] == pytest.approx(0.27470 + 31.57 * -0.00089, rel=1e-14)  # eq. (15) by hand, in mm
+    assert data.J_c[4, 1] == pytest.approx(-0.12952 - 31.57 * 0.00155, rel=1e-14)
     assert np.abs(data.inputs @ data.J_c.T - data.commanded).max() < 1e-15  # U_j = J_c^-1 T_j
 
 
