@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -194,6 +195,59 @@ def workspace(
     sizes = ", ".join(f"{show(v, u, 3)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
     out.print(f"typical sizes: {sizes}")
     out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
+
+
+@app.command()
+def reproduce(
+    source: Annotated[
+        list[str] | None, typer.Argument(help="S0, S1, S2, S3; all by default.", show_default=False)
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print the rows as a JSON list instead of a table.")] = False,
+    page: Annotated[
+        Path | None, typer.Option("--out", help="Also write a page with the figures (.html).", show_default=False)
+    ] = None,
+    differing: Annotated[bool, typer.Option("--differing", help="Show only rows that are not reproduced.")] = False,
+) -> None:
+    """Compare every number the papers print with the program's own: printed, ours, difference, status and why.
+
+    Example:  ctrlgen reproduce S3 --differing
+    """
+    from ctrlgen.reproduce import all as everything  # scientific work of seconds; other commands need none of it
+    from ctrlgen.reproduce.row import Status
+
+    chosen = [name.upper() for name in source or everything.SOURCES]
+    unknown = [name for name in chosen if name not in everything.SOURCES]
+    if unknown:
+        raise InputError(
+            "reproduce", [Fault(name, f"is not a source; known: {', '.join(everything.SOURCES)}") for name in unknown]
+        )
+    if page is not None and page.suffix != ".html":
+        raise InputError("--out", [Fault(str(page), "must end in .html")])
+    with _progress(len(chosen)) as advance:
+        rows = []
+        for name in chosen:
+            advance(f"{name}, {everything.TITLES[name]}")
+            rows += everything.reproduce([name])
+    if page is not None:
+        everything.write_page(rows, page)
+    if json_:
+        print(json.dumps(everything.as_json(rows), indent=1))
+        return
+    colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
+    table = _table(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
+    for row in rows:
+        if differing and row.status is Status.REPRODUCED:
+            continue
+        ours = "" if row.ours is None else f"{row.ours:.6g}"
+        status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
+        table.add_row(
+            row.source, escape(row.where), escape(f"{row.printed} {row.unit}"), ours, status, escape(row.reason)
+        )
+    out.print(table)
+    counts = everything.counts(rows)
+    for name in chosen:
+        numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in Status)
+        out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)
 
 
 def _print_solution(outcome: job.Outcome) -> None:

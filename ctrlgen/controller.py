@@ -28,7 +28,7 @@ class Status(IntFlag):
     COMPOSITE = 2  # a limit on stress or rotation: the displacement was shrunk toward home
     STATE = 4  # the actuator state (temperature) was held at its limit
     DRIVE = 8  # the drive was held at its limit: the target comes later than commanded
-    INPUT = 16  # not a number or absurdly large: drives at their lower limit, target ignored
+    INPUT = 16  # not a number or absurdly large: drives at zero, target ignored
 
 
 @dataclass(frozen=True)
@@ -108,6 +108,11 @@ class Controller:
         return 1e5 * np.array(self.model.signals[self.follow].scale)
 
     @cached_property
+    def safe_drive(self) -> np.ndarray:
+        """The drive without a usable target: zero, or what is nearest to it in range. A heater off cools passively."""
+        return np.clip(0.0, *self.nominal.u_bounds)
+
+    @cached_property
     def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What displacement, actuator state and drive may miss a limit by unreported; the drive's is theirs, carried through."""
         m, n = self.nominal, self.nominal.n_states
@@ -134,8 +139,8 @@ class Controller:
         n = m.n_states
         x, z = state
         if not np.all(np.abs(target) <= self.input_limits):  # false for NaN too
-            x_next = _row(k.advance(x, z, u_low))
-            return Step(Status.INPUT, z, x[:n], u_low, (x_next, _row(k.settle(x_next, z, u_low))))
+            x_next = _row(k.advance(x, z, self.safe_drive))
+            return Step(Status.INPUT, z, x[:n], self.safe_drive, (x_next, _row(k.settle(x_next, z, self.safe_drive))))
 
         def acting(wanted: np.ndarray) -> tuple[np.ndarray, bool]:
             return _clamp(_row(k.state(x, z, wanted)), x_low[:n], x_high[:n], s_slack)
@@ -149,7 +154,7 @@ class Controller:
         held, hit = acting(wanted)
         if hit:
             status |= Status.STATE
-            wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, u_low))
+            wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, self.safe_drive))
         if self.guarded_limits and np.max(wanted) > self.safe_displacement:
             first = ratio = float(self.composite_ratio(x, z, wanted))
             for _ in range(self.shrinks):

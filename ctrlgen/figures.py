@@ -46,7 +46,7 @@ def draw_all(solution: Solution) -> dict[str, str]:
         figures = {}
         if solution.scenario.file.follow == "pose" and solution.scenario.sample_time:
             figures["path"] = svg(draw_path(solution))
-        if solution.scenario.file.follow == "displacement":
+        if solution.scenario.file.follow == "displacement" and "linear" in solution.model.force_parts:
             figures["stage_force"] = svg(draw_stage_force(solution))
         for name, role in signals.items():
             if role not in solution.model.signals:

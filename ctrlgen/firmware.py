@@ -120,8 +120,9 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
             parts = {
                 part: printed(getattr(inverse, part), f"wanted_{part}", f"{name}_{part}")
                 for part in ("displacement", "state", "drive", "advance")
+                if getattr(inverse, part).size1_out(0)
             }
-            uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive"))
+            uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive") if part in parts)
             modes.append({"name": name, "z": z, "uses_state": uses_state, **parts})
     balance = printed(controller.static.settle, "balance_displacement")
     ratio = None
@@ -132,8 +133,8 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
     z_slack, s_slack, u_slack = slack.slacks
     drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
     last = modes[-1]
-    step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", "advance"))
-    once_more = last["state"].operations + last["drive"].operations
+    step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", "advance") if part in last)
+    once_more = sum(last[part].operations for part in ("state", "drive") if part in last)
     worst_cost = (
         step_cost
         + 2 * balance.operations
@@ -159,6 +160,7 @@ def _online_context(scenario: Scenario, controller: Controller, real: Real, pref
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack, 
         "s_low": x_low[: model.n_states], "s_high": x_high[: model.n_states], "s_slack": s_slack,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
+        "u_safe": controller.safe_drive,
     }  # fmt: skip
 
 

@@ -35,6 +35,8 @@ class Expected:
 def force_parts(solution: Solution) -> dict[str, np.ndarray]:
     """The parts of the stage force over the samples, name -> (n, axes) [N]."""
     m = solution.model
+    if not m.force_parts:
+        return {}
     f = ca.Function("parts", [m.z, m.p], list(m.force_parts.values())).map(len(solution.trace.z))
     parts = f(solution.trace.z.T, np.tile(m.p_nominal[:, None], (1, len(solution.trace.z))))
     parts = parts if isinstance(parts, tuple) else (parts,)

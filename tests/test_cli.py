@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 from conftest import DEVICE, SCENARIOS
 
-COMMANDS = ("run", "solve", "generate", "compare", "check", "bode", "workspace")
+COMMANDS = ("run", "solve", "generate", "compare", "check", "bode", "workspace", "reproduce")
 
 
 def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -176,6 +177,15 @@ def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path)
         file.write('\n[[expect]]\nvalue = "force.1X.max"\nrange = ["1 N", "2 N"]\n')
     done = ctrlgen("solve", scenario, "--out", tmp_path / "out")
     assert done.returncode == 1 and "force.1X.max" in done.stdout and "out of tolerance" in done.stdout
+
+
+def test_reproduce_prints_rows_as_a_table_and_as_json(tmp_path):
+    done = ctrlgen("reproduce", "S1", "--out", tmp_path / "page.html")
+    assert done.returncode == 0 and "eq. (5) (1,4)" in done.stdout and "reciprocity" in done.stdout
+    assert (tmp_path / "page.html").read_text().count("<tr>") > 30
+    rows = json.loads(ctrlgen("reproduce", "S1", "--json").stdout)
+    assert {"source", "where", "printed", "ours", "difference", "unit", "status", "reason"} == set(rows[0])
+    refused(ctrlgen("reproduce", "S9"), "S9", "S0, S1, S2, S3")
 
 
 def test_check_tells_what_a_file_describes():

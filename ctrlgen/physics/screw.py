@@ -40,6 +40,18 @@ def rotation_to(axis: Matrix) -> Matrix:
     return ca.horzcat(axis, y, ca.cross(axis, y))
 
 
+def rotation_vector(theta: Matrix) -> Matrix:
+    """R = I + (sin a/a) S + (1 - cos a)/a^2 S^2, a = |theta| [rad], S = [theta x], shape (3, 3).
+
+    The turn by a about theta (Rodrigues). a^2 carries 1e-30, so that value and derivative stand at theta = 0;
+    1 - cos a = 2 sin^2(a/2) does not cancel.
+    """
+    S = ca.skew(theta)
+    a = ca.sqrt(ca.sumsqr(theta) + 1e-30)
+    half = ca.sin(a / 2) / a
+    return ca.DM.eye(3) + ca.sin(a) / a * S + 2 * half**2 * ca.mtimes(S, S)
+
+
 def adjoint(rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:
     """[Ad] = [[R, 0], [D R, R]], D the cross-product matrix of `position`, shape (6, 6).
 

@@ -1,0 +1,151 @@
+"""The meso-scale hexapod on three planar stages: strut ends, constraint, kinematic Jacobian, cube and platform.
+
+Source: S0 sections 2 and 4. The global frame stands at the geometrical centre of the platform at home.
+Actuator order, S0 eq. (6): U = (1x, 2x, 2y, 3x, 3y, 1y) [m]; pose order: the twist (theta, delta) [rad, m].
+
+Damaged in print: eq. (8) is the negative of the cross-product matrix, which the minus of eq. (7) would then undo,
+and its entry (3, 2) reads -A_y for -A_x; here [a x] b = a x b. Eq. (9) exchanges the two inputs of stage 3 against
+eq. (4). The numbers of eq. (10) and (15) are lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.physics.screw import Matrix, Scalar, adjoint, rotation_vector, rotation_z
+
+STAGE_OF_STRUT = (0, 1, 1, 2, 2, 0)  # S0 eq. (4): struts 1 and 6 on stage 1, 2 and 3 on stage 2, 4 and 5 on stage 3
+STAGE_OF_ACTUATOR = (0, 1, 1, 2, 2, 0)  # S0 eq. (6)
+TOLERANCE = 1e-15  # [m] of strut length; rounding of eq. (2) in float64 is 1e-16
+ITERATIONS = 20  # Newton needs four within the workspace
+
+
+def geometry(h: Any) -> tuple[Matrix, Matrix]:
+    """A_i^0 = Z(phi_i) (r_a, 0, -t/2), B_i^0 = Z(psi_i) (r_b, 0, -H) [m], each of shape (3, 6). Source: S0 eq. (1)."""
+    A = [
+        ca.mtimes(rotation_z(angle), ca.vertcat(h.platform_radius, 0, -h.platform_thickness / 2))
+        for angle in h.platform_angles
+    ]
+    B = [ca.mtimes(rotation_z(angle), ca.vertcat(h.base_radius, 0, -h.height)) for angle in h.base_angles]
+    return ca.horzcat(*A), ca.horzcat(*B)
+
+
+def home_lengths(h: Any) -> Matrix:
+    """|A_i^0 - B_i^0| [m], shape (6, 1): the strut lengths with which home meets eq. (2). Printed L = 240 mm."""
+    A, B = geometry(h)
+    return ca.sqrt(ca.sum1((A - B) ** 2)).T
+
+
+def travel(directions: Sequence[Scalar], strut: int) -> Matrix:
+    """M_i: dB_i = M_i U, shape (3, 6). Source: S0 eq. (4).
+
+    `directions` [rad]: the angle in the base plane, from x, in which each of the six actuators moves its stage.
+    """
+    columns = [
+        ca.vertcat(ca.cos(angle), ca.sin(angle), 0) if stage == STAGE_OF_STRUT[strut] else ca.DM.zeros(3, 1)
+        for angle, stage in zip(directions, STAGE_OF_ACTUATOR, strict=True)
+    ]
+    return ca.horzcat(*columns)
+
+
+def spans(pose: Matrix, u: Matrix, h: Any, directions: Sequence[Scalar]) -> Matrix:
+    """A_i - B_i [m], shape (3, 6), with A_i = R(theta) A_i^0 + delta and B_i = B_i^0 + M_i U.
+
+    R(theta) is the exact rotation by the vector theta, of which S0 eq. (3) keeps the first order.
+    """
+    A, B = geometry(h)
+    R = rotation_vector(pose[:3])
+    return ca.horzcat(
+        *(ca.mtimes(R, A[:, i]) + pose[3:] - B[:, i] - ca.mtimes(travel(directions, i), u) for i in range(6))
+    )
+
+
+def constraint(pose: Matrix, u: Matrix, h: Any, directions: Sequence[Scalar], lengths: Matrix) -> Matrix:
+    """(A_i - B_i)' (A_i - B_i) - L_i^2 [m^2], shape (6, 1); zero where every strut keeps its length.
+
+    Source: S0 eq. (2). `lengths` (6, 1) [m].
+    """
+    return ca.sum1(spans(pose, u, h, directions) ** 2).T - lengths**2
+
+
+def jacobian_left(h: Any) -> Matrix:
+    """[J_l], rows (A_i^0 - B_i^0)' [-A_i^0 x | I], shape (6, 6) [m^2, m]. Source: S0 eq. (7), (8)."""
+    A, B = geometry(h)
+    D = A - B
+    return ca.vertcat(*(ca.mtimes(D[:, i].T, ca.horzcat(-ca.skew(A[:, i]), ca.DM.eye(3))) for i in range(6)))
+
+
+def jacobian_right(h: Any, directions: Sequence[Scalar]) -> Matrix:
+    """[J_r], rows (A_i^0 - B_i^0)' M_i, shape (6, 6) [m]. Source: S0 eq. (9) with the directions read from it."""
+    A, B = geometry(h)
+    return ca.vertcat(*(ca.mtimes((A[:, i] - B[:, i]).T, travel(directions, i)) for i in range(6)))
+
+
+def kinematic_jacobian(h: Any, directions: Sequence[Scalar]) -> Matrix:
+    """[J^k] = [J_l]^-1 [J_r], twist per actuator displacement, shape (6, 6) [rad/m, 1]. Source: S0 eq. (6), (10)."""
+    return ca.solve(jacobian_left(h), jacobian_right(h, directions))
+
+
+def commands(J: Matrix, T: Matrix) -> Matrix:
+    """U = [J]^-1 T [m], one column a pose, shape (6, n). Source: S0 eq. (11) and section 5.1, step 2."""
+    return ca.solve(J, T)
+
+
+def cube_to_platform(h: Scalar) -> Matrix:
+    """[Ad]: T = [Ad] ^cT, hence [J^c] = [Ad] [J_cube], shape (6, 6). Source: S0 eq. (15), (16).
+
+    The cube's centre stands `h` [m] below the platform's, at (0, 0, -h). The printed matrix says the same;
+    the printed t = (0, 0, h) would give it the other sign.
+    """
+    return adjoint(None, (0, 0, -h))
+
+
+def pose_from_actuators(
+    U: np.ndarray, h: Any, directions: Sequence[float], lengths: Matrix | None = None
+) -> np.ndarray:
+    """The pose at which every strut keeps its length: eq. (2) solved for (theta, delta), from home. U: (n, 6) [m].
+
+    `lengths` are those at home unless given. Of the constraint's many solutions Newton finds the one next to home.
+    Raises ValueError where it finds none.
+    """
+    pose, u, f = _symbols(h, directions, lengths)
+    return _newton(ca.Function("f", [pose, u], [f, ca.jacobian(f, pose)]), np.atleast_2d(U), "pose", "actuator inputs")
+
+
+def actuators_from_pose(
+    T: np.ndarray, h: Any, directions: Sequence[float], lengths: Matrix | None = None
+) -> np.ndarray:
+    """The actuator displacements that hold a pose: eq. (2) solved for U [m], from home. T: (n, 6) [rad, m].
+
+    The counterpart of `pose_from_actuators`. Raises ValueError where Newton finds none.
+    """
+    pose, u, f = _symbols(h, directions, lengths)
+    return _newton(ca.Function("f", [u, pose], [f, ca.jacobian(f, u)]), np.atleast_2d(T), "actuator inputs", "pose")
+
+
+def _symbols(h: Any, directions: Sequence[float], lengths: Matrix | None) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Pose, input, and the constraint as a strut's excess length [m]: (|A-B|^2 - L^2) / 2L."""
+    pose, u = ca.SX.sym("pose", 6), ca.SX.sym("u", 6)
+    L = home_lengths(h) if lengths is None else lengths
+    return pose, u, constraint(pose, u, h, directions, L) / (2 * L)
+
+
+def _newton(step: ca.Function, given: np.ndarray, wanted: str, known: str) -> np.ndarray:
+    """x with f(x, y) = 0 to TOLERANCE for every row y of `given`; `step` gives f and df/dx."""
+    found = np.zeros_like(given, dtype=float)
+    for x, y in zip(found, given, strict=True):
+        for _ in range(ITERATIONS):
+            f, slope = (value.full() for value in step(x, y))
+            if not np.isfinite(f).all() or np.abs(f).max() <= TOLERANCE:
+                break
+            try:
+                x -= np.linalg.solve(slope, f).ravel()
+            except np.linalg.LinAlgError:
+                break
+        if not np.abs(f).max() <= TOLERANCE:
+            raise ValueError(f"no {wanted} within {ITERATIONS} Newton steps of home for {known} {np.array2string(y)}")
+    return found

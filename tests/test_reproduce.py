@@ -1,0 +1,41 @@
+"""What `ctrlgen reproduce` says of the papers' numbers."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from ctrlgen.reproduce import s0, s1, s2, s3
+from ctrlgen.reproduce.row import Row, Status, half_unit
+
+
+@pytest.fixture(scope="module", params=[s0, s1, s2, s3], ids=["S0", "S1", "S2", "S3"])
+def rows(request):
+    return request.param.rows()
+
+
+def test_every_row_that_is_not_reproduced_says_why(rows):
+    assert rows
+    assert not [row.where for row in rows if row.status is not Status.REPRODUCED and not row.reason]
+
+
+def test_no_number_is_left_out_by_being_no_number(rows):
+    assert not [row.where for row in rows if row.ours is not None and not math.isfinite(row.ours)]
+
+
+def test_places_are_named_once(rows):
+    places = [row.where for row in rows]
+    assert len(set(places)) == len(places)
+
+
+@pytest.mark.parametrize(("printed", "half"), [("9.12e-2", 5e-5), ("301.0", 0.05), ("12", 0.5), ("-0.22", 0.005)])
+def test_half_a_unit_of_the_last_printed_digit(printed, half):
+    assert half_unit(printed) == pytest.approx(half)
+
+
+def test_a_row_that_is_off_differs_and_one_that_is_no_number_never_agrees():
+    assert Row("S", "w", "1.00", "1", 1.0049).status is Status.REPRODUCED
+    assert Row("S", "w", "1.00", "1", 1.0051).status is Status.DIFFERS
+    assert Row("S", "w", "1.00", "1", float("nan")).status is Status.DIFFERS
+    assert Row("S", "w", "1.00", "1", None, "lost").status is Status.NOT_COMPUTABLE
