@@ -114,20 +114,21 @@ class Spring:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """State of a frame in equilibrium: poses of all nodes and Exudyn's coordinates (for a warm start)."""
+    """State of a frame in equilibrium: Exudyn's `coordinates`, and where each node's six of them begin."""
 
-    poses: dict[int, Pose]
     coordinates: Array
-    multipliers: Array
+    first: dict[int, int]
 
     def pose(self, node: Node) -> Pose:
         """Pose of `node` in the deformed state."""
-        return self.poses[node.index]
+        k = self.first[node.index]
+        u = self.coordinates[k : k + 6]
+        return Pose(node.home.p + u[:3], _from_angles(_to_angles(node.home.R) + u[3:]))
 
     def moved(self, node: Node) -> tuple[Array, Array]:
         """Displacement (3,) [um] and rotation vector (3,) [rad] of `node` since home, global axes."""
-        now = self.poses[node.index]
-        return now.p - node.home.p, rotation_vector(now.R @ node.home.R.T)
+        k = self.first[node.index]
+        return self.coordinates[k : k + 3].copy(), rotation_vector(self.pose(node).R @ node.home.R.T)
 
 
 class Frame:
@@ -231,7 +232,7 @@ class Frame:
     def assemble(self, tolerance: float = 1e-9) -> None:
         """Close the frame; after this only `solve`. Newton stops at a residual (2-norm) of `tolerance` [N, N um]."""
         self._mbs.Assemble()
-        self._index = np.array([self._mbs.GetNodeODE2Index(node.index) for node in self._nodes])
+        self._first = {node.index: int(self._mbs.GetNodeODE2Index(node.index)) for node in self._nodes}
         s = exu.SimulationSettings()
         s.staticSolver.numberOfLoadSteps = 1
         s.staticSolver.useLoadFactor = False
@@ -262,14 +263,11 @@ class Frame:
         for (_, constraints), values in zip(self._held, [] if held is None else held, strict=held is not None):
             for constraint, value in zip(constraints, values, strict=True):
                 self._mbs.SetObjectParameter(constraint, "offset", float(value))
-        if not self._mbs.SolveStatic(self.settings):
-            raise RuntimeError("no equilibrium found from this start; approach the load in smaller steps")
-        q = np.array(data.GetODE2Coordinates(exu.ConfigurationType.Current))
-        poses = {}
-        for node, first in zip(self._nodes, self._index, strict=True):
-            u = q[first : first + 6]
-            poses[node.index] = Pose(node.home.p + u[:3], _from_angles(_to_angles(node.home.R) + u[3:]))
-        return Equilibrium(poses, q, np.array(data.GetAECoordinates(exu.ConfigurationType.Current)))
+        try:
+            self._mbs.SolveStatic(self.settings)
+        except exu.SolverError as failure:
+            raise RuntimeError("no equilibrium found from this start; approach the load in smaller steps") from failure
+        return Equilibrium(np.array(data.GetODE2Coordinates(exu.ConfigurationType.Current)), self._first)
 
     def strain(self, link: Link, state: Equilibrium) -> Array:
         """(eps, gamma_y, gamma_z, kappa_x, kappa_y, kappa_z) of `link`, (6,) [1, 1/um]."""

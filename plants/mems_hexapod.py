@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plants.frame import Array, Equilibrium, Frame
+from plants.frame import Array, Equilibrium, Frame, Node
 from plants.numbers import read
 from plants.struts import Refinement, add_struts, geometry, wire_stress
 from plants.xy_stage import Axis, Options, add_axis
@@ -78,6 +78,7 @@ class MemsHexapod:
         n, f = self.numbers, Frame()
         self.frame = f
         self.axes: list[Axis] = []
+        self.parents: list[Node | None] = []  # what each axis stands on; None: ground
         plates = []
         for home in geometry(n.hexapod).plates:
             y_home = home.at(y=n.stage.centre_offset)
@@ -85,6 +86,7 @@ class MemsHexapod:
             x_axis = add_axis(f, y_plate, x_plate, home, n, self.options)
             y_axis = add_axis(f, f.ground, y_plate, y_home.at(turn_z=np.pi / 2), n, self.options)
             self.axes += [x_axis, y_axis]
+            self.parents += [y_plate, None]
             plates.append(x_plate)
         self.plates = plates
         self.platform, self.struts = add_struts(f, plates, n, self.refinement)
@@ -116,17 +118,18 @@ class MemsHexapod:
         return wire_stress(self.frame, self.struts, state, self.numbers.hexapod.wire_diameter)
 
     def path(self, forces: Array) -> list[Equilibrium]:
-        """Equilibria along `forces` (n, 6) [N]; each starts at the two before it, carried on in a straight line."""
+        """Equilibria along `forces` (n, 6) [N], each begun where the two before it lead in a straight line.
+
+        After a corner, where the force changes its step by more than the step itself, at the last one.
+        """
         states: list[Equilibrium] = []
-        for row in forces:
-            if len(states) > 1:
-                start = 2 * states[-1].coordinates - states[-2].coordinates
-                try:
-                    states.append(self.solve(row, start))
-                    continue
-                except Exception:  # a corner: begin at the last state instead
-                    pass
-            states.append(self.solve(row, states[-1] if states else None))
+        for k, row in enumerate(forces):
+            start = states[-1].coordinates if states else None
+            if k > 1:
+                step = forces[k - 1] - forces[k - 2]
+                if np.linalg.norm(row - forces[k - 1] - step) <= np.linalg.norm(step):
+                    start = 2 * start - states[-2].coordinates
+            states.append(self.solve(row, start))
         return states
 
     def record(
@@ -149,10 +152,8 @@ class MemsHexapod:
         if (powers < 0).any():
             raise ValueError("a heater can only heat: powers must be >= 0")
         begin = np.full(6, a.ambient) if start is None else np.asarray(start, dtype=float)
-        if heat == "lag":
-            T = temperatures(powers, 1 / sample_rate, a, begin)
-        else:
-            T = a.ambient + a.thermal_resistance * powers
+        steady = a.ambient + a.thermal_resistance * powers
+        T = temperatures(powers, 1 / sample_rate, a, begin) if heat == "lag" else steady
         force = bar_force(T, a)
         pose = np.array([self.pose(state) for state in self.path(force)])
         sigma = np.repeat(noise, 3)

@@ -130,7 +130,7 @@ class Hexapod:
                 f.spring(drive, plate, (K + K.T) / 2)
         self.platform, self.struts = add_struts(f, self.plates, numbers, refinement or Refinement())
         self._load = f.load(self.platform, self.platform.home)
-        f.assemble()
+        f.assemble(1e-8)
 
     def solve(self, d: Array, force: Array | None = None, start: Equilibrium | None = None) -> Equilibrium:
         """Equilibrium for stage displacements `d` (6,) = (1X, 1Y, 2X, ...) [um], platform `force` (3,) [N]."""

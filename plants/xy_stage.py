@@ -122,9 +122,7 @@ class Axis:
     notches: list[Link]
 
 
-def add_axis(
-    f: Frame, parent: Node, plate: Node, at: Pose, numbers: SimpleNamespace, o: Options
-) -> Axis:
+def add_axis(f: Frame, parent: Node, plate: Node, at: Pose, numbers: SimpleNamespace, o: Options) -> Axis:
     """Build one axis between `parent` and `plate`; `at`: pose of the axis, x the direction of motion."""
     s, a = numbers.stage, numbers.actuator
     r, bend = s.notch_radius, bend_length(s)
