@@ -218,7 +218,8 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
     role = ref.scenario.file.follow
     for what, drives in _drive_sets(program, ref, online):
         if moving:
-            reached = simulate(m, drives, ref.scenario.sample_time, ref.solution.trace.x[0]).signals[role]
+            first = ref.solution.trace
+            reached = simulate(m, drives, ref.scenario.sample_time, first.x[0], first.z[0]).signals[role]
         else:
             z, state = followed[:, 1 + n : 1 + 2 * n], followed[:, 1 + 2 * n :]
             x = np.hstack([state, ref.solution.trace.x[:, m.n_states :]])

@@ -39,8 +39,11 @@ def balance_solver(model: Model) -> ca.Function:
     return ca.Function("balance", [z, x, u, p], [root])
 
 
-def simulate(model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | None = None) -> Trace:
-    """The model driven by `u` (n, n_axes), each row held for one `sample_time` [s]; from rest unless `x_0` is given.
+def simulate(
+    model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | None = None, z_0: np.ndarray | None = None
+) -> Trace:
+    """The model driven by `u` (n, n_axes), each row held for one `sample_time` [s]; from rest unless `x_0` is given; at the displacement
+    that balances the first drive unless `z_0` is given, which matters for actuators without memory.
 
     Sample k of the result is the state at k sample_time, before row k of `u` acts; there are n + 1
     samples, the last with the last drive. Raises SolverError where no displacement balances the force.
@@ -55,7 +58,7 @@ def simulate(model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | 
     one = ca.Function("one", [ca.vertcat(x, z), u_k], [ca.vertcat(x_next, z_next)])
     start_x = model.rest if x_0 is None else x_0
     try:
-        start_z = balance(model.z_scale, start_x, u[0], p)
+        start_z = balance(model.z_scale, start_x, u[0], p) if z_0 is None else ca.DM(z_0)
         states = one.mapaccum(steps)(ca.vertcat(start_x, start_z), u.T).full()
     except RuntimeError as error:
         raise SolverError(

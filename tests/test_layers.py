@@ -86,3 +86,13 @@ def test_no_module_knows_a_scenario_by_name(path):
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_files_are_short_enough_to_be_one_noun(path):
     assert len(path.read_text().splitlines()) <= 400
+
+
+def test_the_independent_models_import_nothing_of_ctrlgen() -> None:
+    paths = sorted((ROOT / "plants").glob("*.py"))
+    assert len(paths) > 5
+    for path in paths:
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not any(name.split(".")[0] == "ctrlgen" for name in names), path.name
