@@ -14,6 +14,7 @@ static const float S_SLACK[6] = { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0
 static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
+static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
 static void wanted_displacement(const float target[6], float result[6])
@@ -2545,7 +2546,7 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
     }
     if (is_usable(target) == 0) {
         for (i = 0; i < 6; i++) {
-            out->drive[i] = U_LOW[i];
+            out->drive[i] = U_SAFE[i];
             out->displacement[i] = state->z[i];
             out->state[i] = state->x[i];
         }
@@ -2601,7 +2602,7 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
     }
     if (is_usable(target) == 0) {
         for (i = 0; i < 6; i++) {
-            out->drive[i] = U_LOW[i];
+            out->drive[i] = U_SAFE[i];
             out->displacement[i] = state->z[i];
             out->state[i] = state->x[i];
         }

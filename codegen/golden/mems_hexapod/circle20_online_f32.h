@@ -33,7 +33,7 @@ extern "C" {
 #define CIRCLE20_ONLINE_F32_COMPOSITE 2    /* wire flexure stress: displacement shrunk toward home */
 #define CIRCLE20_ONLINE_F32_STATE 4        /* actuator temperature held at its limit */
 #define CIRCLE20_ONLINE_F32_DRIVE 8        /* heater power at its limit: as far toward the target as it reaches in one sample */
-#define CIRCLE20_ONLINE_F32_INPUT 16       /* NaN, infinite, absurd or missing input: drives at their lower limit */
+#define CIRCLE20_ONLINE_F32_INPUT 16       /* NaN, infinite, absurd or missing input: drives at zero, or nearest to it */
 
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
