@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.integrate import quad
 
 ARMS = (0.0, -2 * np.pi / 3, 2 * np.pi / 3)
 
@@ -20,25 +19,6 @@ def turned(angle: float) -> np.ndarray:
 def carried(point: np.ndarray) -> np.ndarray:
     """Displacement of a body at `point` per displacement about its origin."""
     return np.array([[1, 0, -point[1]], [0, 1, point[0]], [0, 0, 1]])
-
-
-def beam_compliance(t: float, R: float, b: float, E: float) -> tuple[float, float, float, float]:
-    """(1/EA, (x + R)^2/EI, (x + R)/EI, 1/EI) integrated over a circular notch, x from -R to R."""
-
-    def over(f: Any) -> float:
-        def integrand(a: float) -> float:
-            x, h = R * np.sin(a), t + 2 * R * (1 - np.cos(a))
-            return float(f(x, h)) * R * np.cos(a)
-
-        return float(quad(integrand, -np.pi / 2, np.pi / 2, epsabs=0, epsrel=1e-13, limit=200)[0])
-
-    I = 12 / (E * b)
-    return (
-        over(lambda x, h: 1 / (E * b * h)),
-        over(lambda x, h: I * (x + R) ** 2 / h**3),
-        over(lambda x, h: I * (x + R) / h**3),
-        over(lambda x, h: I / h**3),
-    )
 
 
 def assemble(hinges: list[np.ndarray], g: Any) -> np.ndarray:

@@ -133,7 +133,7 @@ def hinge_compliances(device: RrrStage, p: SimpleNamespace) -> list[Matrix]:
     """[C] of hinges 1, 2, 3 by the equations that `device` names and the values `p`, each (3, 3)."""
     m, matrices = p.material, []
     for choice, h in ((device.hinge1, p.hinge1), (device.hinge2, p.hinge2), (device.hinge3, p.hinge3)):
-        size = (h.thickness, h.radius, m.width, m.young)
+        size = (h.radius, h.thickness, m.width, m.young)
         y = rrr_hinge.TRANSVERSE[choice.transverse](*size) + h.shear_factor * rrr_hinge.shear(*size, m.poisson)
         matrices.append(
             rrr_hinge.hinge_compliance(

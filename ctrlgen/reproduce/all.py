@@ -3,21 +3,54 @@
 from __future__ import annotations
 
 from collections import Counter
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import matplotlib.pyplot as plt
 
+from ctrlgen.figures import STYLE, draw_path, draw_signal, draw_stage_force, svg
 from ctrlgen.files import write_text
 from ctrlgen.firmware import codegen_folder
-from ctrlgen.reproduce import s0, s0_figures, s1, s2, s3
+from ctrlgen.model import build_model
+from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s3
 from ctrlgen.reproduce.row import Row
+from ctrlgen.reproduce.s0_data import SCENARIOS
+from ctrlgen.scenario import load_scenario
+from ctrlgen.solution import solve
 
 SOURCES = {"S0": s0.rows, "S1": s1.rows, "S2": s2.rows, "S3": s3.rows}
 TITLES = {
     "S0": "meso-scale hexapod: kinematics and calibration", "S1": "MEMS hexapod: stiffness model and control",
     "S2": "hinge equations and the measuring chain", "S3": "3-RRR stage: kinetostatic model",
 }  # fmt: skip
+
+
+def _s1_figures() -> dict[str, str]:
+    """Fig. 13 from the stage sweep, Fig. 14(a) and (b) from the circle: our own solutions."""
+    drawn = {}
+    sweep, circle = (load_scenario(SCENARIOS / name) for name in ("xy_stage_force", "circle20"))
+    with plt.rc_context(STYLE):
+        drawn["Fig. 13, linear and nonlinear force"] = svg(draw_stage_force(solve(sweep, build_model(sweep.device))))
+        solution = solve(circle, build_model(circle.device))
+        drawn["Fig. 14(a), the circle"] = svg(draw_path(solution))
+        drawn["Fig. 14(b), the six forces"] = svg(draw_signal(solution, "force"))
+    return drawn
+
+
+def _s3_figures() -> dict[str, str]:
+    """Figs. 3-5, the hinge equations against finite elements; none where scikit-fem is not installed."""
+    if find_spec("skfem") is None:
+        return {}
+    data = hinge_errors.hinge_errors()
+    return {
+        f"{name}, {hinge_errors.LABELS[key]}": hinge_errors.draw_hinge_errors(data, key)
+        for key, name in hinge_errors.FIGURES.items()
+    }
+
+
+FIGURES = {"S0": s0_figures.figures, "S1": _s1_figures, "S3": _s3_figures}
 
 
 def reproduce(sources: list[str]) -> list[Row]:
@@ -44,7 +77,7 @@ def counts(rows: list[Row]) -> Counter[tuple[str, str]]:
 def write_page(rows: list[Row], path: Path) -> None:
     """One self-contained HTML page: counts, the figures redrawn from our own results, and every row."""
     sources = list(dict.fromkeys(row.source for row in rows))
-    figures = s0_figures.figures() if "S0" in sources else {}
+    figures = {source: FIGURES[source]() for source in sources if source in FIGURES}
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(codegen_folder() / "templates"), autoescape=True, undefined=jinja2.StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
