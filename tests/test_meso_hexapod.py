@@ -12,7 +12,7 @@ from conftest import ROOT, SCENARIOS
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
-from ctrlgen import build_model
+from ctrlgen import build_model, simulate
 from ctrlgen.calibration import calibrate
 from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import matrices
@@ -228,12 +228,18 @@ def test_the_adjoint_carries_the_motion_of_a_rigid_body(p) -> None:
     assert np.abs(platform - np.concatenate([theta, shift])).max() < 1e-14  # second order: 0.03 m x (4e-7)^2
 
 
-def test_the_named_matrices_are_those_of_the_device_and_it_makes_no_force_model(device, p) -> None:
+def test_the_named_matrices_are_those_of_the_device(device, p) -> None:
     named = matrices(device)
     assert set(named) == {"J_l", "J_r", "J_k", "Ad"}
     assert np.allclose(named["J_l"] @ named["J_k"], named["J_r"], rtol=0, atol=1e-15)  # rounding of 0.2 m
-    with pytest.raises(InputError, match="kinematics alone"):
-        build_model(device)
+
+
+def test_the_model_is_the_kinematic_jacobian_without_state_or_force(device, rng) -> None:
+    model = build_model(device)
+    assert model.n_states == 0 and "state" not in model.signals
+    travel = rng.uniform(-2e-4, 2e-4, 6)
+    pose = simulate(model, np.tile(travel, (2, 1)), 1e-2).signals["pose"][-1]
+    assert np.allclose(pose, matrices(device)["J_k"] @ travel, rtol=1e-12, atol=0)
 
 
 # The recordings
