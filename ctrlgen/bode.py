@@ -9,6 +9,7 @@ import control
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ctrlgen.errors import Fault, InputError
 from ctrlgen.figures import COLOURS, STYLE
 from ctrlgen.files import write_bytes
 from ctrlgen.linearisation import linearise
@@ -24,12 +25,18 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
     Raises InputError when `pose` (6,) is not an admissible equilibrium.
     """
     system = linearise(model, pose)
+    if not len(system.poles()):
+        raise InputError(
+            model.name,
+            [Fault("dynamics", "there are none: drive and pose follow each other at once at all frequencies")],
+        )
     signal, drive = model.signals["pose"], model.signals["drive"]
     slowest = -np.max(system.poles().real)
     omega = np.logspace(np.log10(slowest) - 2, np.log10(slowest) + 2, 200)
     response = control.frequency_response(system, omega)
     with plt.rc_context(STYLE):
-        figure, grid = plt.subplot_mosaic([["a", "b", "c"], ["d", "e", "f"], ["phase"] * 3], figsize=(10, 8))
+        rows = [list("abc"), list("def")][: -(-len(signal.channels) // 3)]
+        figure, grid = plt.subplot_mosaic([*rows, ["phase"] * 3], figsize=(10, 2.7 * (len(rows) + 1)))
         hertz = omega / (2 * np.pi)
         for i, channel in enumerate(signal.channels):
             panel = grid["abcdef"[i]]

@@ -14,7 +14,7 @@ import numpy as np
 from ctrlgen import figures, report
 from ctrlgen.comparison import Comparison, compare, find_compilers
 from ctrlgen.devices import Device
-from ctrlgen.errors import SolverError
+from ctrlgen.errors import Fault, InputError, SolverError
 from ctrlgen.files import whole_folder, write_text
 from ctrlgen.firmware import CFolder, generate
 from ctrlgen.measures import Expected, expectations
@@ -120,6 +120,10 @@ def map_workspace(device: Device, heights: list[float], out: Path) -> WorkspaceS
     model = build_model(device)
     workspace, signal = Workspace(model), model.signals["pose"]
     lengths = tuple(i for i, unit in enumerate(signal.units) if unit == "um")
+    if len(lengths) != 3:
+        raise InputError(
+            device.name, [Fault("workspace", "is mapped for platforms with three translations; this one has fewer")]
+        )
     bases = []
     for height in heights:
         base = np.zeros(len(signal.channels))

@@ -172,6 +172,17 @@ def test_a_compiler_that_says_nothing_is_reported_with_its_command(scenario, tmp
     refused(ctrlgen("run", scenario, "--out", tmp_path / "out", PATH=f"{tools}:/bin/nowhere"), "gcc", "status 1")
 
 
+def test_devices_without_dynamics_or_height_are_refused_where_those_are_needed(tmp_path):
+    devices = SCENARIOS / "devices"
+    refused(
+        ctrlgen("bode", devices / "meso_hexapod.toml", "--out", tmp_path / "b.svg", "--at", "delta_x=1um"),
+        "there are none",
+    )
+    refused(ctrlgen("workspace", devices / "rrr_case2.toml", "--out", tmp_path / "w"), "three translations")
+    done = ctrlgen("bode", devices / "rrr_case2.toml", "--out", tmp_path / "b.png", "--at", "theta_z=-2mrad")
+    assert done.returncode == 0, done.stderr
+
+
 def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path):
     with open(scenario / "scenario.toml", "a") as file:
         file.write('\n[[expect]]\nvalue = "force.1X.max"\nrange = ["1 N", "2 N"]\n')
