@@ -11,7 +11,6 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import linprog
 
 from ctrlgen.controller import Controller
 from ctrlgen.errors import Fault, InputError
@@ -110,6 +109,8 @@ class Workspace:
         is tried, and wherever it sticks out a plane is added. Reference: J. E. Kelley, J. SIAM 8 (1960) 703.
         Raises InputError when `inside` cannot be held.
         """
+        from scipy.optimize import linprog  # a quarter of a second to import, which no other command should wait for
+
         chosen = list(channels)
         scale = np.array(self.model.signals["pose"].scale)[chosen]
         rng = np.random.default_rng(0)
