@@ -79,7 +79,7 @@ def _stroke_causes(scenario: Scenario, model: Model, command: np.ndarray, wanted
             continue
         k = int(np.argmax(beyond))
         value = needed[k, i]
-        why = "the actuator only pushes" if value < low[i] else "its stroke ends there"
+        why = "the actuator only pushes" if value < low[i] == 0 else "its stroke ends there"
         bound = low[i] if value < low[i] else high[i]
         amount = f"needs {show(value, 'um')}, {show(abs(value - bound), 'um')} beyond {show(bound, 'um')} ({why})"
         causes.append(f"  actuator {axis}: {amount}, worst at sample {k}, in {bad.size} of {len(command)}")
@@ -105,10 +105,11 @@ def _limit_cause(limit: Limit, excess: np.ndarray, count: int) -> str:
 
 def _drive_causes(model: Model, result: Result, samples: Sequence[int]) -> list[str]:
     """Actuators whose drive or state sits on a bound around the samples that fall short."""
+    slowest = "it cannot cool faster than passively" if "power" in model.signals else "that is its minimum"
     around = sorted({max(k + shift, 0) for k in samples for shift in (-1, 0)})
     causes = []
     for values, bounds, what, low_reason in (
-        (result.u, model.u_bounds, model.signals["drive"], "it cannot cool faster than passively"),
+        (result.u, model.u_bounds, model.signals["drive"], slowest),
         (result.x[:, : model.n_states], model.x_bounds, model.signals.get("state"), "it cannot go below its rest"),
     ):
         if what is None:

@@ -181,7 +181,6 @@ EQUATIONS = (
     Equation(LOCKED, "schotborgh", "C.23", _SC, _plain(c.c23), (0.2, 0.8), OWN),
 )  # fmt: skip
 BY_NAME = {(e.compliance, e.group): e for e in EQUATIONS}
-GROUPS = tuple(dict.fromkeys(e.group for e in EQUATIONS))
 
 
 def best(compliance: str, ratio: float) -> Equation:
