@@ -7,7 +7,6 @@ inversion, solving and generated C all read it from there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from types import SimpleNamespace
@@ -17,7 +16,7 @@ import casadi as ca
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
-from ctrlgen.units import Quantity, parse, quantity, show
+from ctrlgen.units import Quantity, power_of, read_quantity, same_dimension, show, to_si, written_unit
 
 
 class Place(Enum):
@@ -33,31 +32,78 @@ class Place(Enum):
 
 @dataclass(frozen=True)
 class Param:
-    """One number of a law, with bounds in its `unit`; at `off` the whole effect vanishes."""
+    """One number of a law, with `bounds` in its `unit`; at `off` the whole effect vanishes.
+
+    In `unit` the word `channel` stands for the unit of the signal the effect acts on, and `travel` for that of the
+    stage displacement; `bounds` and `grid` then count in typical sizes of those signals, so that one law serves
+    micrometres and degrees. `grid` are the values tried when a shape is unknown and the effect is only suspected.
+    """
 
     name: str
     unit: str
     bounds: tuple[float, float]
     doc: str
     off: float | None = None
+    grid: tuple[float, ...] = ()
+
+    @property
+    def relative(self) -> bool:
+        """Whether the unit depends on where the effect acts."""
+        return "channel" in self.unit or "travel" in self.unit
 
 
 @dataclass(frozen=True)
 class State:
-    """A memory of the effect, zero at rest; `scale` is a typical size in SI."""
+    """A memory of the effect, zero at rest; `scale` is a typical size in `unit`, counted as in `Param`.
+
+    A `stepped` one changes once a sample, by `update`; a `clock` is the time since the record's common zero.
+    """
 
     name: str
     unit: str
     scale: float
+    stepped: bool = False
+    clock: bool = False
+
+    @property
+    def relative(self) -> bool:
+        """Whether the unit depends on where the effect acts."""
+        return "channel" in self.unit or "travel" in self.unit
+
+
+@dataclass(frozen=True)
+class Where:
+    """One channel an effect can act on: unit and typical size (SI) of its signal and of the stage displacement."""
+
+    channel: str
+    unit: str
+    scale: float
+    travel_unit: str
+    travel_scale: float
+
+    def unit_of(self, number: Param | State) -> str:
+        """The unit here, such as 'N/um^3'."""
+        channel, travel = (u if u.isalpha() else f"({u})" for u in (self.unit, self.travel_unit))
+        return number.unit.replace("channel", channel).replace("travel", travel)
+
+    def si(self, value: float, number: Param | State) -> float:
+        """A bound, a grid value or a scale in SI, here."""
+        if not number.relative:
+            return to_si(value, number.unit)
+        marked = number.unit.replace("channel", "candela").replace("travel", "mole")
+        sizes = self.scale ** power_of(marked, "candela") * self.travel_scale ** power_of(marked, "mole")
+        return float(to_si(value, marked) * sizes)
 
 
 class Effect:
     """Base of every effect: one subclass per file in `ctrlgen/effects/`.
 
-    `term(s, p)` is the contribution, in the unit of the place. `s` gives `value` (the signal at this
-    place and channel before any effect), `all` (the same for every channel, a vector), `index` (of
-    this channel) and the effect's own states; for axis channels also `displacement` and
-    the actuator's `state`, such as its temperature. `p` gives the parameters in SI.
+    `term(s, p)` is the contribution, in the unit of the place. `s` gives `value` (the signal at this place and
+    channel before any effect), `all` (the same for every channel, a vector), `index` (of this channel), the
+    effect's own states, `ambient` (rise of the surroundings [K]), `sample_time` [s] where it is needed and, for
+    axis channels, `displacement` (and `displacements` of all axes), `velocity` (None for a device without inertia),
+    and the actuator's `state`, such as its temperature, with its `rest`. An effect of `pairs` couples two channels:
+    `partner` is the index of the other one. `p` gives the parameters in SI.
     """
 
     library: ClassVar[dict[str, type[Effect]]] = {}
@@ -66,27 +112,41 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
-    channel_unit: ClassVar[str | None] = None  # set where a parameter has the dimension of the channel
+    needs: ClassVar[frozenset[str]] = frozenset()  # of velocity, state, heat, force, sample_time
+    pairs: ClassVar[bool] = False
+    active: ClassVar[bool] = False  # may put energy into the stage
+    domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 
-    def __init__(self, at: str, values: dict[str, Quantity]) -> None:
+    def __init__(self, at: str, values: dict[str, Quantity], of: str | None = None) -> None:
         self.at = at
         self.values = values
+        self.of = of
 
-    def __init_subclass__(cls) -> None:
+    def __init_subclass__(cls, listed: bool = True) -> None:
         if not any(p.off is not None for p in cls.params):
             raise TypeError(
                 f"{cls.__name__}: give one parameter an `off` value, so that the model without this "
                 f"effect is a special case of the model with it"
             )
         cls.kind = cls.__module__.rpartition(".")[2]
-        Effect.library[cls.kind] = cls
+        if listed:
+            Effect.library[cls.kind] = cls
+
+    @classmethod
+    def amplitude(cls) -> Param:
+        """The parameter that switches the effect off."""
+        return next(p for p in cls.params if p.off is not None)
 
     def term(self, s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
         """The contribution at this place and channel."""
         raise NotImplementedError
 
     def rates(self, s: SimpleNamespace, p: SimpleNamespace) -> dict[str, ca.SX]:
-        """Time derivative of each state."""
+        """Time derivative of each state; clocks run by themselves."""
+        return {}
+
+    def update(self, s: SimpleNamespace, p: SimpleNamespace) -> dict[str, ca.SX]:
+        """Each stepped state after the present sample, from its value before; `term` sees the new one."""
         return {}
 
     @classmethod
@@ -101,34 +161,47 @@ class Effect:
             raise ValueError(f"kind = {kind!r} is not an effect I know: {', '.join(sorted(Effect.library))}")
         chosen = Effect.library[kind]
         names = [p.name for p in chosen.params]
-        faults = [
-            f"unknown key {key!r} (has: at, {', '.join(names)})" for key in given if key not in {"kind", "at", *names}
-        ]
-        at = given.get("at")
+        keys = ["kind", "at", *(["of"] if chosen.pairs else []), *names]
+        faults = [f"unknown key {key!r} (has: {', '.join(keys[1:])})" for key in given if key not in keys]
+        at, of = given.get("at"), given.get("of")
         if not isinstance(at, str):
             faults.append(f'at is missing: name the {chosen.place.value} channel, such as at = "1X", or "all"')
+        if chosen.pairs and not isinstance(of, str):
+            faults.append(f'of is missing: name the other {chosen.place.value} channel, such as of = "1Y"')
         values = {}
         for param in chosen.params:
             if param.name not in given:
+                example = param.unit.replace("channel", "um").replace("travel", "um")
                 faults.append(
-                    f'{param.name} is missing ({param.doc}); write for example {param.name} = "{param.bounds[1]:g} {param.unit}"'
+                    f'{param.name} is missing ({param.doc}); write for example {param.name} = "{param.bounds[1]:g} {example}"'
                 )
                 continue
-            low, high = (
-                parse(f"{bound!r} {'' if param.unit == '1' else param.unit}", param.unit) for bound in param.bounds
-            )
             try:
-                values[param.name] = _read_quantity(param.unit, given[param.name])
+                values[param.name] = read_quantity(None if param.relative else param.unit, given[param.name])
             except ValueError as error:
                 faults.append(f"{param.name}: {error}")
                 continue
-            if not low <= values[param.name].si <= high:
-                faults.append(
-                    f"{param.name} = {values[param.name].text} is outside {show(low, param.unit)} ... {show(high, param.unit)}"
-                )
+            if not param.relative:
+                faults += _outside(param, values[param.name], [to_si(b, param.unit) for b in param.bounds], param.unit)
         if faults:
             raise ValueError(f"{kind}: " + "; ".join(faults))
-        return chosen(str(at), values)
+        return chosen(str(at), values, of)
+
+    def faults_at(self, where: Where) -> list[tuple[str, str]]:
+        """(parameter, what is wrong) where a relative unit or bound does not fit the channel."""
+        found = []
+        for param in self.params:
+            if not param.relative:
+                continue
+            given, unit = self.values[param.name], where.unit_of(param)
+            if not same_dimension(written_unit(given.text), unit):
+                found.append((param.name, f"{given.text!r} has the wrong unit at {where.channel}: {unit} is needed"))
+            else:
+                found += [
+                    (param.name, text)
+                    for text in _outside(param, given, [where.si(b, param) for b in param.bounds], unit)
+                ]
+        return found
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
@@ -141,6 +214,8 @@ class Effect:
         return core_schema.no_info_plain_validator_function(validate)
 
 
-def _read_quantity(unit: str, given: Any) -> Quantity:
-    read: Callable[[Any], Quantity] = quantity(unit).__metadata__[0].func
-    return read(given)
+def _outside(param: Param, given: Quantity, bounds: list[float], unit: str) -> list[str]:
+    low, high = bounds
+    if low <= given.si <= high:
+        return []
+    return [f"{param.name} = {given.text} is outside {show(low, unit)} ... {show(high, unit)}"]

@@ -3,8 +3,9 @@
     u --(drive terms)--> drive --rates--> x --force(terms)--> balance with the stage --> z
       --(displacement terms)--> pose(terms) --> reading(terms)
 
-x are the states (temperatures, then the effects' memories), z the stage displacements, held by
-the algebraic force balance 0 = g(x, z), u the drives. All SX, SI inside.
+x are the states (temperatures, the effects' memories, velocities), z the stage displacements, held by
+the algebraic force balance 0 = g(x, z), u the drives. Where the stage has inertia, g accelerates it instead.
+All SX, SI inside.
 """
 
 from __future__ import annotations
@@ -12,24 +13,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.devices import Device, Limit, Links, Signal
-from ctrlgen.effect import Effect, Place
+from ctrlgen.chain import Chain
+from ctrlgen.devices import Device, Limit, Signal
 from ctrlgen.errors import Fault, InputError
-from ctrlgen.units import base_unit, same_dimension, show
+from ctrlgen.units import show
 
 
 @dataclass(frozen=True)
 class Model:
     """The physics of one device, symbolic.
 
-    `x` (n_x,), `z` (n_axes,), `u` (n_axes,), `p` (n_free,): symbols. The first `n_states` of x are the actuators'
-    (temperatures), the others effects' memories. `rates_of_heat` dx/dt (n_x,) in terms of the `heat` that
-    `heat_of_drive` (u) produces, and `balance` 0 = g(x, z, u) (n_axes,).
+    `x` (n_x,), `z` (n_axes,), `u` (n_u,), `p` (n_free,): symbols. The first `n_states` of x are the actuators'
+    (temperatures), then come the effects' memories, then the velocities `v` (n_axes,; none without inertia: z' = v).
+    `rates_of_heat` dx/dt (n_x,) in terms of the `heat` that `heat_of_drive` (u) produces, and `balance` 0 = g(x, z, u)
+    (n_axes,). `stepped` gives, for states that change once a sample, the new value by their place in x; `clocks` are
+    the places of those that count time. `ambient` is the rise of the surroundings [K], zero unless it was asked for.
     `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
     is one, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
     """
@@ -39,9 +41,13 @@ class Model:
     x: ca.SX
     n_states: int
     z: ca.SX
+    v: ca.SX
     u: ca.SX
     p: ca.SX
     p_nominal: np.ndarray
+    ambient: ca.SX
+    stepped: dict[int, ca.SX]
+    clocks: tuple[int, ...]
     x_names: tuple[str, ...]
     x_units: tuple[str, ...]
     heat: ca.SX
@@ -61,6 +67,16 @@ class Model:
     def rates(self) -> ca.SX:
         """dx/dt (n_x,) as a function of x, z, u and p."""
         return ca.substitute(self.rates_of_heat, self.heat, self.heat_of_drive)
+
+    @property
+    def ambient_symbol(self) -> ca.SX:
+        """`ambient` as an argument of a function: the symbol, or one that nothing depends on."""
+        return self.ambient if self.ambient.is_symbolic() else ca.SX.sym("ambient")
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the displacement accelerates, rather than standing in balance."""
+        return self.v.numel() > 0
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -103,7 +119,12 @@ class Model:
         Exact for first-order lags. Where states act on one another phi_1 is summed to order 12,
         enough for |h A| <= 1. Raises InputError beyond that, asking for a shorter sample time.
         """
-        rates = self.rates if rates is None else rates
+        after = self._lag(sample_time, self.rates if rates is None else rates)
+        for i, value in self.stepped.items():
+            after[i] = value
+        return after
+
+    def _lag(self, sample_time: float, rates: ca.SX) -> ca.SX:
         A = ca.jacobian(rates, self.x)
         h = sample_time
         if A.sparsity().is_diag():
@@ -174,10 +195,13 @@ def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:
     return [(k, place[key]) for k, key in pairs if key in place]
 
 
-def build_model(device: Device, free: Sequence[str] = ()) -> Model:
+def build_model(
+    device: Device, free: Sequence[str] = (), ambient: ca.SX | None = None, sample_time: float | None = None
+) -> Model:
     """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
 
-    `free` are dotted paths as in `device.quantities()`. Raises InputError for a path or an effect's
+    `free` are dotted paths as in `device.quantities()`; `ambient` is a symbol for the rise of the surroundings [K],
+    where that is not zero; `sample_time` [s] is needed by effects that look back by samples. Raises InputError for a path or an effect's
     channel that the device does not have.
     """
     nominal = dict(device.quantities())
@@ -190,11 +214,11 @@ def build_model(device: Device, free: Sequence[str] = ()) -> Model:
     symbols = {path: ca.SX.sym(path) for path in free}
     p = device.values(symbols)
     links = device.links(p)
-    chain = _Chain(device, links, p)
-    model = chain.model(
-        ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1), np.array([nominal[f].si for f in free])
-    )
-    read = {symbol.name() for symbol in ca.symvar(ca.veccat(model.rates, model.balance, model.signals["reading"].expr))}
+    chain = Chain(device, links, p, ca.SX(0) if ambient is None else ambient, sample_time)
+    chosen = ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1)
+    model = Model(**chain.parts(chosen, np.array([nominal[f].si for f in free])))
+    moving = ca.veccat(model.rates, model.balance, model.signals["reading"].expr, *model.stepped.values())
+    read = {symbol.name() for symbol in ca.symvar(moving)}
     idle = [path for path in free if path not in read]
     if idle:
         what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
@@ -205,6 +229,8 @@ def build_model(device: Device, free: Sequence[str] = ()) -> Model:
 
 def _check_stiffness(model: Model) -> None:
     """Refuses a device whose restoring force does not rise over the whole stroke: its displacement would have no one value."""
+    if model.inertial:
+        return
     slope = ca.Function("slope", [model.x, model.z, model.u, model.p], [ca.diag(ca.jacobian(model.balance, model.z))])
     low, high = model.z_bounds
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
@@ -217,134 +243,3 @@ def _check_stiffness(model: Model) -> None:
             axis, where = model.axes[bad[0]], show(z[bad[0]], "um")
             what = f"the restoring force of {axis} does not rise at {where}; soften less, or lower the stroke"
             raise InputError(model.name, [Fault("stiffness", what)])
-
-
-def _numbers(values: Sequence[float | ca.SX], p: ca.SX, p_nominal: np.ndarray) -> np.ndarray:
-    """Values that may hold free parameters, at their nominal ones."""
-    return ca.Function("rest", [p], [ca.vertcat(*map(ca.SX, values), ca.SX(0, 1))])(p_nominal).full().ravel()
-
-
-class _Chain:
-    """Joins a device's links and its effects' terms, place by place."""
-
-    def __init__(self, device: Device, links: Links, p: SimpleNamespace) -> None:
-        self.device, self.links = device, links
-        self.z = ca.SX.sym("d", len(links.axes))
-        self.effects = [(effect, p.effect[k], k) for k, effect in enumerate(device.effect)]
-        self.members: list[tuple[Effect, SimpleNamespace, int, dict[str, ca.SX]]] = []
-        names, scales, units_ = [], [], []
-        faults = []
-        for effect, values, k in self.effects:
-            channels, units = self._channels(effect.place)
-            chosen = (
-                range(len(channels)) if effect.at == "all" else [i for i, c in enumerate(channels) if c == effect.at]
-            )
-            if effect.place is Place.HEAT and links.heat_signal is None:
-                faults.append(Fault(f"effect[{k}].kind", f"{effect.kind} acts on heat, and this device has none"))
-            if not chosen:
-                faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(channels)}, all"))
-            for i in chosen:
-                if effect.channel_unit and not same_dimension(effect.channel_unit, units[i]):
-                    faults.append(
-                        Fault(
-                            f"effect[{k}].at",
-                            f"{effect.kind} acts in {effect.channel_unit}, but {channels[i]} is in {units[i]}",
-                        )
-                    )
-                states = {
-                    state.name: ca.SX.sym(f"{effect.kind}_{k}_{state.name}_{channels[i]}") for state in effect.states
-                }
-                self.members.append((effect, values, i, states))
-                names += [symbol.name() for symbol in states.values()]
-                scales += [state.scale for state in effect.states]
-                units_ += [state.unit for state in effect.states]
-        if faults:
-            raise InputError(device.name, faults)
-        self.memory = ca.vertcat(*(symbol for *_, states in self.members for symbol in states.values()))
-        self.memory_names, self.memory_scales, self.memory_units = tuple(names), scales, tuple(units_)
-        self.memory_rates: dict[int, ca.SX] = {}
-
-    def _channels(self, place: Place) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        if place in (Place.POSE, Place.SENSOR):
-            return self.links.components, self.links.pose_units
-        links = self.links
-        unit = {
-            Place.DRIVE: links.drive.units[0], Place.HEAT: links.heat_signal[1] if links.heat_signal else "1",
-            Place.FORCE: links.force_unit, Place.DISPLACEMENT: "um",
-        }[place]  # fmt: skip
-        return self.links.axes, (unit,) * len(self.links.axes)
-
-    def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
-        """`before` plus every term of the effects at `place`; their rates are noted on the way."""
-        total = ca.SX(before)
-        for index, (effect, values, i, states) in enumerate(self.members):
-            if effect.place is not place:
-                continue
-            s = SimpleNamespace(value=before[i], all=before, index=i, **states)
-            if place not in (Place.POSE, Place.SENSOR):
-                s.displacement = self.z[i]
-                s.state = None if self.links.state is None else self.links.state.expr[i]
-            total[i] += effect.term(s, values)
-            rates = effect.rates(s, values)
-            self.memory_rates[index] = ca.vertcat(*(rates[name] for name in states))
-        return total
-
-    def model(self, p: ca.SX, p_nominal: np.ndarray) -> Model:
-        links, axes, n = self.links, self.links.axes, len(self.links.axes)
-        u, z = links.drive.expr, self.z
-        x = ca.SX(0, 1) if links.state is None else links.state.expr
-        drive = self._with_terms(Place.DRIVE, u)
-        produced = links.heat(drive)
-        heat = ca.SX.sym("heat", n)  # an unknown of its own, so that the inverse need not take squares apart
-        arriving = self._with_terms(Place.HEAT, heat)
-        pushed = links.force(drive, x, z)
-        balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z)
-        displacement = self._with_terms(Place.DISPLACEMENT, z)
-        pose = self._with_terms(Place.POSE, links.pose(displacement))
-        reading = self._with_terms(Place.SENSOR, pose)
-        memory_rates = ca.vertcat(*(self.memory_rates[i] for i in sorted(self.memory_rates)))
-        units, sizes = (links.force_unit,) * n, (links.force_scale,) * n
-        posed = (links.components, links.pose_units)
-        travel = (links.displacement_scale,) * n
-        signals = {
-            "drive": links.drive,
-            **({} if links.state is None else {"state": links.state}),
-            "force": Signal("force", "actuator force", axes, units, "F_", pushed, sizes),
-            "displacement": Signal("displacement", "stage displacement", axes, ("um",) * n, "d_", displacement, travel),
-            "pose": Signal("pose", "platform pose", *posed, "", pose, links.pose_scale),
-            "reading": Signal("reading", "sensor reading", *posed, "reading_", reading, links.pose_scale),
-        }
-        if links.heat_signal is not None:
-            label, unit, column, size = links.heat_signal
-            power = Signal(
-                "power", label, axes, (unit,) * n, column, ca.substitute(arriving, heat, produced), (size,) * n
-            )
-            signals = {"drive": signals.pop("drive"), "power": power, **signals}
-        state_names = () if links.state is None else tuple(f"{links.state.name}_{axis}" for axis in axes)
-        state_scale = () if links.state is None else links.state.scale
-        return Model(
-            name=self.device.name,
-            device=self.device,
-            x=ca.vertcat(x, self.memory),
-            n_states=x.numel(),
-            z=z,
-            u=u,
-            p=p,
-            p_nominal=p_nominal,
-            x_names=state_names + self.memory_names,
-            x_units=tuple(base_unit(u) for u in (*(links.state.units if links.state else ()), *self.memory_units)),
-            heat=heat,
-            heat_of_drive=produced,
-            rates_of_heat=ca.vertcat(links.rates(x, arriving), memory_rates),
-            balance=balance,
-            signals=signals,
-            force_parts=links.resistance_parts(z),
-            limits=tuple(
-                links.limits(SimpleNamespace(drive=u, state=x, force=pushed, displacement=z, carried=displacement))
-            ),
-            rest=np.concatenate([_numbers(links.rest, p, p_nominal), np.zeros(len(self.memory_scales))]),
-            x_scale=np.array([*state_scale, *self.memory_scales]),
-            z_scale=np.full(n, links.displacement_scale),
-            u_scale=np.array(links.drive.scale),
-            force_scale=links.force_scale,
-        )

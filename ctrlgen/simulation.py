@@ -9,6 +9,7 @@ import numpy as np
 
 from ctrlgen.errors import SolverError
 from ctrlgen.model import Model
+from ctrlgen.motion import next_sample
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ def simulate(
     Sample k of the result is the state at k sample_time, before row k of `u` acts; there are n + 1
     samples, the last with the last drive. Raises SolverError where no displacement balances the force.
     """
+    if model.inertial:
+        return _simulate_inertial(model, u, sample_time, x_0, z_0)
     steps = len(u)
     x, z, u_k = (ca.MX.sym(n, s.numel()) for n, s in (("x", model.x), ("z", model.z), ("u", model.u)))
     p = ca.DM(model.p_nominal)
@@ -70,3 +73,19 @@ def simulate(
     drives = np.vstack([u, u[-1:]])
     n = model.x.numel()
     return trace(model, sample_time * np.arange(steps + 1), states[:, :n], states[:, n:], drives)
+
+
+def _simulate_inertial(
+    model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | None, z_0: np.ndarray | None
+) -> Trace:
+    """The same for a stage with inertia, from standstill at home."""
+    n = model.x.numel()
+    start = np.concatenate([model.rest if x_0 is None else x_0, 0 * model.z_scale if z_0 is None else z_0])
+    after = next_sample(model, sample_time)
+    state = ca.vertcat(model.x, model.z)
+    one = ca.Function("one", [state, model.u, model.p], [ca.vertcat(after.x, after.z)])
+    states = one.mapaccum(len(u))(start, u.T, np.tile(model.p_nominal[:, None], (1, len(u)))).full()
+    if not np.all(np.isfinite(states)):
+        raise SolverError("the simulated motion is not a number; check the drive, and damping of the device")
+    states = np.hstack([start[:, None], states]).T
+    return trace(model, sample_time * np.arange(len(u) + 1), states[:, :n], states[:, n:], np.vstack([u, u[-1:]]))

@@ -146,6 +146,27 @@ def _reader(
     return read
 
 
+def written_unit(text: str) -> str:
+    """The unit in a written quantity: 'um' of '3 um', '1' of '0.5'."""
+    match = _NUMBER.match(text)
+    return (match[2] if match else "") or "1"
+
+
+def power_of(unit: str, marker: str) -> float:
+    """The power with which the base unit `marker` stands in `unit`: -2 for 'candela' in 's/candela^2'."""
+    (dimension,) = _unit(marker).dimensionality
+    return float(_unit(unit).dimensionality.get(dimension, 0))
+
+
+def read_quantity(unit: str | None, given: Any) -> Quantity:
+    """A quantity of a file, in `unit` or, where that is None, in whatever unit it is written in."""
+    if unit is None:
+        value = given.get("value") if isinstance(given, dict) else given
+        unit = written_unit(str(value))
+        _unit(unit)
+    return _reader(unit, None, None, False)(given)
+
+
 def quantity(
     unit: str, *, low: float | None = None, high: float | None = None, positive: bool = False, whole: bool = False
 ) -> Any:

@@ -86,7 +86,7 @@ def test_an_effect_at_a_place_that_does_not_exist_is_refused():
 
     with pytest.raises(InputError, match="'4X' is not one of 1X, 1Y"):
         build_model(effect_device({"kind": "drive_gain", "at": "4X", "gain": 0.1}))
-    with pytest.raises(InputError, match="but theta_x is in rad"):
+    with pytest.raises(InputError, match="wrong unit at theta_x: rad is needed"):
         build_model(effect_device({"kind": "home_offset", "at": "theta_x", "offset": "1 um"}))
 
 

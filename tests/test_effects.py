@@ -9,25 +9,35 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import effect_device
+from conftest import DEVICE, effect_device
 
 import ctrlgen.effects
 from ctrlgen import Controller, build_model, simulate
-from ctrlgen.effect import Effect, Place
+from ctrlgen.chain import channels
+from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.simulation import trace
-from ctrlgen.units import to_si
+from ctrlgen.units import from_si
 
 every_effect = pytest.mark.parametrize("effect", Effect.library.values(), ids=Effect.library)
 
 
+def relative(effect: type[Effect]) -> bool:
+    """Whether a parameter's unit depends on where the effect acts."""
+    return any(p.relative for p in effect.params)
+
+
 def table(effect: type[Effect], rng: np.random.Generator, *, off: bool = False, at: str | None = None) -> dict:
     """A device-file table with parameters drawn inside their bounds (a tenth of the way), or off."""
+    device = ctrlgen.load_device(DEVICE)
+    channel = (
+        at if at not in (None, "all") else {Place.POSE: "delta_x", Place.SENSOR: "delta_x"}.get(effect.place, "2X")
+    )
+    where = next(w for w in channels(device.links(device.values()), effect.place) if w.channel == channel)
     values = {}
     for p in effect.params:
-        high = p.bounds[1]
+        unit, high = where.unit_of(p), from_si(where.si(p.bounds[1], p), where.unit_of(p))
         value = p.off if off and p.off is not None else rng.uniform(0.02, 0.1) * (high if high < 1e3 else 1.0)
-        values[p.name] = f"{value!r} {'' if p.unit == '1' else p.unit}".strip()
-    channel = {Place.POSE: "delta_x", Place.SENSOR: "delta_x"}.get(effect.place, "2X")
+        values[p.name] = f"{value!r} {'' if unit == '1' else unit}".strip()
     return {"kind": effect.kind, "at": at or channel, **values}
 
 
@@ -41,7 +51,7 @@ def states(model, rng, n: int = 40):
 @every_effect
 def test_vanishes_exactly_when_off(effect, rng, model):
     with_effect = build_model(
-        effect_device(table(effect, rng, off=True, at="all" if effect.channel_unit is None else None))
+        effect_device(table(effect, rng, off=True, at=None if effect.pairs or relative(effect) else "all"))
     )
     x, z, u = states(with_effect, rng)
     n = model.x.numel()
@@ -84,7 +94,8 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
         Place.POSE: "m",
         Place.SENSOR: "m",
     }[effect.place]
-    numbers = {p.name: to_si(rng.uniform(0.2, 0.8) * p.bounds[1], p.unit) for p in effect.params}
+    where = Where("1X", place_unit, 1.0, "m", 1.0)
+    numbers = {p.name: where.si(rng.uniform(0.2, 0.8) * p.bounds[1], p) for p in effect.params}
     value, others = rng.uniform(0.5, 2, 2)
     displacement, temperature = rng.uniform(0.5, 2, 2)
     memory = {s.name: rng.uniform(0.5, 2) for s in effect.states}
@@ -97,9 +108,9 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
         s = SimpleNamespace(
             value=value * factor(place_unit), all=ca.DM(every), index=1,
             displacement=displacement * factor("m"), state=temperature * factor("K"),
-            **{state.name: memory[state.name] * factor(state.unit) for state in effect.states},
+            **{state.name: memory[state.name] * factor(where.unit_of(state)) for state in effect.states},
         )  # fmt: skip
-        p = SimpleNamespace(**{q.name: numbers[q.name] * factor(q.unit) for q in effect.params})
+        p = SimpleNamespace(**{q.name: numbers[q.name] * factor(where.unit_of(q)) for q in effect.params})
         instance = effect("all", {})
         rates = instance.rates(s, p)
         return float(instance.term(s, p)), [float(rates[state.name]) for state in effect.states]
@@ -111,7 +122,7 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
         scaled_term, scaled_rates = law(scale)
         assert scaled_term == pytest.approx(term * dimension_factor(place_unit, scale), rel=1e-9)
         for state, rate, scaled in zip(effect.states, rates, scaled_rates, strict=True):
-            assert scaled == pytest.approx(rate * dimension_factor(f"{state.unit}/s", scale), rel=1e-9)
+            assert scaled == pytest.approx(rate * dimension_factor(f"{where.unit_of(state)}/s", scale), rel=1e-9)
 
 
 def dimension_factor(unit: str, scale: dict[str, float]) -> float:

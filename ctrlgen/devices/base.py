@@ -15,7 +15,14 @@ from ctrlgen.units import Quantity
 
 
 class Section(BaseModel):
-    """A table of a device file. Unknown keys are faults; nothing changes after loading."""
+    """A table of a device file. Unknown keys are faults; nothing changes after loading.
+
+    `domain` is where a report places its numbers; `tolerance` is how far they may be off, relative, where the file
+    states no standard deviation: None where a number off its nominal would be a finding.
+    """
+
+    domain: ClassVar[str] = "mechanism"
+    tolerance: ClassVar[float | None] = None
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
@@ -67,6 +74,11 @@ class Links:
     Each map takes and gives SX column vectors in SI. A device whose actuators remember nothing has no `state` and
     no heat; `force_unit` says in what the balance is: N, or m where displacement itself is commanded.
     `heat_signal` is (label, unit, column prefix, typical size) of what the drive becomes before it acts.
+
+    With a `mass` per axis the displacement has inertia, mass d'' = force - resistance(d) - `drag`(d'), instead of
+    standing in balance. With `feedback` (u, reading, d', x) -> drive the loop is closed: u is the reference, and
+    `heat` (u - reading) drives the states. An `imposed` device is moved by its drive (displacement, velocity,
+    acceleration) and reads the force that takes.
     """
 
     axes: tuple[str, ...]
@@ -87,6 +99,12 @@ class Links:
     heat: Callable[[ca.SX], ca.SX] = lambda u: u
     heat_signal: tuple[str, str, str, float] | None = None
     resistance_parts: Callable[[ca.SX], dict[str, ca.SX]] = lambda d: {}
+    travel_unit: str = "um"
+    mass: tuple[float | ca.SX, ...] | None = None
+    drag: Callable[[ca.SX], ca.SX] | None = None
+    feedback: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX] | None = None
+    command_signal: tuple[str, str, str, float] | None = None
+    imposed: bool = False
 
 
 class Device(Section):

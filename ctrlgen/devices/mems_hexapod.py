@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
 from pydantic import Field, model_validator
@@ -20,6 +20,8 @@ Axis = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
 
 class Actuator(Section):
     """Bent-beam thermal actuator, S1 Table 1, with its heater."""
+
+    domain: ClassVar[str] = "actuator"
 
     beams: quantity("1", low=1, whole=True)
     beam_length: Length
@@ -45,6 +47,8 @@ class Actuator(Section):
 class Notch(Section):
     """Compliance of one circular notch about its free end, S1 eq. (7)."""
 
+    domain: ClassVar[str] = "stage"
+
     theta_x_per_M_x: quantity("rad/(N*um)", positive=True)
     theta_y_per_F_z: quantity("rad/N")
     theta_y_per_M_y: quantity("rad/(N*um)", positive=True)
@@ -59,6 +63,8 @@ class Notch(Section):
 
 class Stage(Section):
     """One axis of an X-Y stage, S1 Table 1 and sections 3.3-4.2."""
+
+    domain: ClassVar[str] = "stage"
 
     lever_short: Length
     lever_long: Length

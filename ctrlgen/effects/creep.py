@@ -15,7 +15,7 @@ class Creep(Effect):
         Param("gain", "1", (0.0, 0.2), "extra travel after infinite time, per travel", off=0.0),
         Param("tau", "s", (1e-3, 1e5), "relaxation time"),
     )
-    states = (State("z", "um", 1e-5),)
+    states = (State("z", "travel", 1.0),)
 
     def term(self, s, p):
         return p.gain * s.z

@@ -8,8 +8,7 @@ class HomeOffset(Effect):
 
     place = Place.SENSOR
     source = "definition"
-    channel_unit = "um"
-    params = (Param("offset", "um", (-1e3, 1e3), "reading at home", off=0.0),)
+    params = (Param("offset", "channel", (-1e3, 1e3), "reading at home", off=0.0),)
 
     def term(self, s, p):
         return p.offset

@@ -11,7 +11,7 @@ class Stiffening(Effect):
 
     place = Place.FORCE
     source = "S. Timoshenko, Strength of Materials II (1956), large deflection of clamped beams"
-    params = (Param("k3", "N/um^3", (-1e-6, 1e-6), "cubic stiffness", off=0.0),)
+    params = (Param("k3", "channel/travel^3", (-10.0, 10.0), "cubic stiffness", off=0.0),)
 
     def term(self, s, p):
         return -p.k3 * s.displacement**3

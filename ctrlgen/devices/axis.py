@@ -1,0 +1,95 @@
+"""A single-axis stage of second order: m q'' + c q' + k q = k_f u, open loop or closed."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import ClassVar, Literal
+
+import casadi as ca
+
+from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.units import quantity, written_unit
+
+ForceConstant = quantity("N/V", positive=True) | quantity("N/A", positive=True)
+
+
+class Mechanics(Section):
+    """The moving part and its flexures; a stiffness of zero makes an axis that integrates."""
+
+    domain: ClassVar[str] = "stage"
+    tolerance: ClassVar[float | None] = 0.1
+
+    mass: quantity("kg", positive=True)
+    damping: quantity("N*s/m", low=0.0)
+    stiffness: quantity("N/um", low=0.0)
+    stroke: quantity("um", positive=True)
+
+
+class Actuator(Section):
+    """A motor whose force is proportional to its drive, in volt or ampere."""
+
+    domain: ClassVar[str] = "actuator"
+    tolerance: ClassVar[float | None] = 0.1
+
+    force_constant: ForceConstant
+    drive_limit: quantity("V", positive=True) | quantity("A", positive=True)
+
+
+class Loop(Section):
+    """The position controller, u = k_p k_v (r - y) - k_v q' + k_i int(r - y) dt, clipped at the drive limit."""
+
+    domain: ClassVar[str] = "actuator"
+    tolerance: ClassVar[float | None] = 0.0
+
+    position_gain: quantity("1/s", positive=True)
+    velocity_gain: quantity("V/(m/s)", low=0.0)
+    integral_gain: quantity("V/(m*s)", low=0.0)
+
+
+class Axis(Device):
+    """Drive (or, in closed loop, reference) -> force -> displacement of one moving mass on flexures."""
+
+    kind: Literal["axis"]
+    mechanics: Mechanics
+    actuator: Actuator
+    loop: Loop | None = None
+
+    def links(self, p: SimpleNamespace) -> Links:
+        """Newton's second law with the device's numbers."""
+        m, a, axes = p.mechanics, p.actuator, ("axis",)
+        stroke, largest = self.mechanics.stroke.si, self.actuator.drive_limit.si
+        unit = written_unit(self.actuator.drive_limit.text)
+        force_scale = largest * self.actuator.force_constant.si
+        u, closed = ca.SX.sym("u", 1), self.loop is not None
+        volts = ("drive", "drive", axes, (unit,), "u_", u, (largest,))
+        drive = (
+            Signal("reference", "reference position", axes, ("um",), "r_", u, (stroke,)) if closed else Signal(*volts)
+        )
+        integral = Signal("integral", "integral of the error", axes, ("um*s",), "i_", ca.SX.sym("i", 1), (stroke,))
+
+        def feedback(r: ca.SX, y: ca.SX, v: ca.SX, x: ca.SX) -> ca.SX:
+            g = p.loop
+            wanted = g.position_gain * g.velocity_gain * (r - y) - g.velocity_gain * v + g.integral_gain * x
+            return ca.fmin(ca.fmax(wanted, -largest), largest)
+
+        def limits(signal: SimpleNamespace) -> list[Limit]:
+            bound = stroke if closed else largest
+            return [
+                Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, -bound, bound),
+                Limit("stroke", "stage displacement", axes, "um", signal.displacement, -stroke, stroke),
+            ]
+
+        return Links(
+            axes=axes, components=axes, pose_units=("um",), pose_scale=(stroke,), drive=drive,
+            state=integral if closed else None, rest=(0.0,) if closed else (),
+            displacement_scale=stroke, force_scale=force_scale,
+            force=lambda drive, x, d: a.force_constant * drive,
+            resistance=lambda d: m.stiffness * d,
+            drag=lambda v: m.damping * v,
+            mass=(m.mass,),
+            pose=lambda d: d,
+            rates=(lambda x, error: error) if closed else (lambda x, heat: ca.SX(0, 1)),
+            feedback=feedback if closed else None,
+            command_signal=("amplifier drive", unit, "u_", largest) if closed else None,
+            limits=limits,
+        )  # fmt: skip

@@ -1,0 +1,34 @@
+"""An axis that is believed to go where it is told: reading = command."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Literal
+
+import casadi as ca
+
+from ctrlgen.devices.base import Device, Limit, Links, Signal
+from ctrlgen.units import quantity, written_unit
+
+Travel = quantity("deg", positive=True) | quantity("um", positive=True)
+
+
+class Servo(Device):
+    """Command -> position, without force or time; linear or rotary by the unit of `travel`, the largest excursion."""
+
+    kind: Literal["servo"]
+    travel: Travel
+
+    def links(self, p: SimpleNamespace) -> Links:
+        """The identity."""
+        axes, unit, travel = ("axis",), written_unit(self.travel.text), self.travel.si
+        drive = Signal("command", "commanded position", axes, (unit,), "r_", ca.SX.sym("u", 1), (travel,))
+
+        def limits(signal: SimpleNamespace) -> list[Limit]:
+            return [Limit("drive", drive.label, axes, unit, signal.drive, -travel, travel)]
+
+        return Links(
+            axes=axes, components=axes, pose_units=(unit,), pose_scale=(travel,), drive=drive, state=None, rest=(),
+            displacement_scale=travel, force_scale=travel, force_unit=unit, travel_unit=unit,
+            force=lambda u, x, d: u, resistance=lambda d: d, pose=lambda d: d, limits=limits,
+        )  # fmt: skip

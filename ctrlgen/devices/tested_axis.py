@@ -1,0 +1,57 @@
+"""An axis that is moved by a test machine (or followed in its own motion) while the force is read."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import ClassVar, Literal
+
+import casadi as ca
+
+from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.units import quantity
+
+
+class Mechanics(Section):
+    """What resists the motion; each may be zero."""
+
+    domain: ClassVar[str] = "stage"
+    tolerance: ClassVar[float | None] = 1.0
+
+    mass: quantity("kg", low=0.0)
+    damping: quantity("N*s/m", low=0.0)
+    stiffness: quantity("N/um", low=0.0)
+    stroke: quantity("um", positive=True)
+    speed: quantity("um/s", positive=True)
+    force: quantity("N", positive=True)
+
+
+class TestedAxis(Device):
+    """Imposed displacement, velocity and acceleration -> force F = m a + c v + k d."""
+
+    kind: Literal["tested_axis"]
+    mechanics: Mechanics
+
+    def links(self, p: SimpleNamespace) -> Links:
+        """Newton's second law, read for the force."""
+        m, own = p.mechanics, self.mechanics
+        stroke, speed, force = own.stroke.si, own.speed.si, own.force.si
+        names = ("position", "velocity", "acceleration")
+        drive = Signal(
+            "motion",
+            "imposed motion",
+            names,
+            ("um", "um/s", "um/s^2"),
+            "",
+            ca.SX.sym("u", 3),
+            (stroke, speed, speed**2 / stroke),
+        )
+
+        def limits(signal: SimpleNamespace) -> list[Limit]:
+            return [Limit("stroke", "stage displacement", ("axis",), "um", signal.displacement, -stroke, stroke)]
+
+        return Links(
+            axes=("axis",), components=("force",), pose_units=("N",), pose_scale=(force,), drive=drive, state=None, rest=(),
+            displacement_scale=stroke, force_scale=force, imposed=True,
+            force=lambda motion, x, d: m.mass * motion[2] + m.damping * motion[1],
+            resistance=lambda d: m.stiffness * d, pose=lambda f: f, limits=limits,
+        )  # fmt: skip
