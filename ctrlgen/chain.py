@@ -26,6 +26,7 @@ class Chain:
         self.z = ca.SX.sym("d", len(links.axes))
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
+        self.before: dict[Place, ca.SX] = {}
         self.members: list[_Member] = []
         self.faults: list[Fault] = []
         for k, effect in enumerate(device.effect):
@@ -53,23 +54,19 @@ class Chain:
     def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
         """`before` plus every term of the effects at `place`; their rates are noted on the way."""
         total = ca.SX(before)
+        self.before[place] = total[:]
         for member in self.members:
             if member.effect.place is place:
-                total[member.index] += member.act(self._seen(place, before, member))
+                total[member.index] += member.act(self.seen(place, member.index, member.partner, member.states))
         return total
 
-    def _seen(self, place: Place, before: ca.SX, member: _Member) -> SimpleNamespace:
-        """What an effect's law may read."""
-        i = member.index
+    def seen(self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX]) -> SimpleNamespace:
+        """What the law of an effect at channel `i` of `place` may read, with the effect's own `states`."""
+        before = self.before[place]
         s = SimpleNamespace(
-            value=before[i],
-            all=before,
-            index=i,
-            partner=member.partner,
-            ambient=self.ambient,
-            sample_time=self.sample_time,
-            **member.states,
-        )
+            value=before[i], all=before, index=i, partner=partner, ambient=self.ambient, sample_time=self.sample_time,
+            **states,
+        )  # fmt: skip
         if place not in (Place.POSE, Place.SENSOR):
             i = min(i, len(self.links.axes) - 1)
             s.displacement, s.displacements = self.z[i], self.z
@@ -146,6 +143,7 @@ class Chain:
             z_scale=np.full(n, links.displacement_scale),
             u_scale=np.array(links.drive.scale),
             force_scale=links.force_scale,
+            seen=self.seen,
         )
 
     def _driven(self, x: ca.SX) -> tuple[dict[str, Signal], ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -249,7 +247,7 @@ def available(links: Links, sample_time: float | None = None) -> frozenset[str]:
     present = {
         "velocity": links.mass is not None or links.imposed, "state": links.heat_signal is not None,
         "heat": links.heat_signal is not None, "ambient": True, "sample_time": sample_time is not None,
-        "force": same_dimension(links.force_unit, "N"),
+        "force": same_dimension(links.force_unit, "N"), "spatial": len(links.components) == 6,
     }  # fmt: skip
     return frozenset(name for name, there in present.items() if there)
 

@@ -112,7 +112,7 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
-    needs: ClassVar[frozenset[str]] = frozenset()  # of velocity, state, heat, force, sample_time
+    needs: ClassVar[frozenset[str]] = frozenset()  # of velocity, state, heat, force, spatial, sample_time
     pairs: ClassVar[bool] = False
     active: ClassVar[bool] = False  # may put energy into the stage
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default

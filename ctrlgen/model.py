@@ -10,15 +10,17 @@ All SX, SI inside.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.chain import Chain
 from ctrlgen.devices import Device, Limit, Signal
+from ctrlgen.effect import Place
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.units import show
 
@@ -32,6 +34,7 @@ class Model:
     `rates_of_heat` dx/dt (n_x,) in terms of the `heat` that `heat_of_drive` (u) produces, and `balance` 0 = g(x, z, u)
     (n_axes,). `stepped` gives, for states that change once a sample, the new value by their place in x; `clocks` are
     the places of those that count time. `ambient` is the rise of the surroundings [K], zero unless it was asked for.
+    `seen` (place, channel, partner, states) is what an effect's law would read there.
     `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
     is one, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
     """
@@ -62,6 +65,7 @@ class Model:
     z_scale: np.ndarray
     u_scale: np.ndarray
     force_scale: float
+    seen: Callable[[Place, int, int | None, dict[str, ca.SX]], SimpleNamespace]
 
     @cached_property
     def rates(self) -> ca.SX:
@@ -72,6 +76,12 @@ class Model:
     def ambient_symbol(self) -> ca.SX:
         """`ambient` as an argument of a function: the symbol, or one that nothing depends on."""
         return self.ambient if self.ambient.is_symbolic() else ca.SX.sym("ambient")
+
+    @cached_property
+    def moved_by(self) -> frozenset[str]:
+        """Names of all symbols in the equations of motion and the readings."""
+        moving = ca.veccat(self.rates, self.balance, self.signals["reading"].expr, *self.stepped.values())
+        return frozenset(symbol.name() for symbol in ca.symvar(moving))
 
     @property
     def inertial(self) -> bool:
@@ -217,14 +227,22 @@ def build_model(
     chain = Chain(device, links, p, ca.SX(0) if ambient is None else ambient, sample_time)
     chosen = ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1)
     model = Model(**chain.parts(chosen, np.array([nominal[f].si for f in free])))
-    moving = ca.veccat(model.rates, model.balance, model.signals["reading"].expr, *model.stepped.values())
-    read = {symbol.name() for symbol in ca.symvar(moving)}
-    idle = [path for path in free if path not in read]
+    idle = [path for path in free if path not in model.moved_by]
     if idle:
         what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
         raise InputError(device.name, [Fault(path, what) for path in idle])
     _check_stiffness(model)
     return model
+
+
+def movable(device: Device) -> tuple[str, ...]:
+    """Paths of the numbers that act on motion or readings, not only on limits."""
+    paths = [path for path, number in device.quantities() if not number.whole]
+    symbols = {path: ca.SX.sym(path) for path in paths}
+    p = device.values(symbols)
+    parts = Chain(device, device.links(p), p, ca.SX(0), 1.0).parts(ca.vertcat(*symbols.values()), np.array([dict(device.quantities())[k].si for k in paths]))
+    model = Model(**parts)
+    return tuple(path for path in paths if path in model.moved_by)
 
 
 def _check_stiffness(model: Model) -> None:

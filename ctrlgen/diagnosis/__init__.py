@@ -1,0 +1,84 @@
+"""Recordings -> what was left out: the steps, in order. Each is a module of its own.
+
+gate (in `ctrlgen.gate`), `noise`, nominal refit (`fit`), is there a mismatch (`screen`, `adequacy`), `hypotheses`,
+`screen`, `search` (fit, choose, swap), `adequacy`, verdict (`diagnosis`), `where`, `writeback`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.adequacy import judge
+from ctrlgen.diagnosis.diagnosis import Diagnosis, errors, findings, verdict
+from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses
+from ctrlgen.diagnosis.noise import estimate
+from ctrlgen.diagnosis.screen import Screen
+from ctrlgen.diagnosis.search import Searcher
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.errors import Fault, InputError
+from ctrlgen.model import movable
+from ctrlgen.recording import Recording
+
+Progress = Callable[[str], None]
+
+
+def diagnose(device: Device, recording: Recording, seed: int = 0, progress: Progress | None = None) -> Diagnosis:
+    """What `device` leaves out that `recording` shows.
+
+    Deterministic for a given `seed`. `progress` is called with a sentence before each step. Raises InputError where the
+    recording holds nothing to fit or to hold out.
+    """
+    step = progress or (lambda _: None)
+    recording = _relative_ambient(recording)
+    missing = [role for role in ("fit", "hold_out") if not any(r.role == role for r in recording.records)]
+    if missing:
+        raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
+    step("noise")
+    noise = estimate(recording)
+    fitter = Fitter(recording, noise)
+    acting = set(movable(device))
+    sample_times = {r.sample_time for r in recording.records}
+    links = device.links(device.values())
+    look_back = min(sample_times) if np.isfinite(min(sample_times)) else None
+    ambient = any(r.ambient is not None for r in recording.records)
+    open_ = [
+        h for h in hypotheses(device, links, recording.channels, look_back, ambient)
+        if h.effect != PARAMETER or h.path in acting
+    ]  # fmt: skip
+    step(f"refit of the device as described, {len(open_)} hypotheses")
+    found = Searcher(fitter, Screen(fitter, open_, seed), step).run(Structure(device))
+    step("judging")
+    before, after = judge(fitter, found.nominal.fit), judge(fitter, found.chosen.fit)
+    said = verdict(found, before, after, bool(noise.known.all()))
+    return Diagnosis(
+        verdict=said,
+        summary="",
+        findings=findings(found),
+        held_out=errors(fitter, found, noise.known),
+        adequacy=after,
+        where={},
+        detectable={},
+        next_experiment=None,
+        history=(),
+        notes=(*recording.notes, *noise.said),
+        device=device,
+        next_device=found.chosen.fit.structure.described,
+        recording=recording,
+        search=found,
+        fitter=fitter,
+    )
+
+
+def _relative_ambient(recording: Recording) -> Recording:
+    """The surroundings as a rise over their mean in the records to fit."""
+    given = [r.ambient for r in recording.records if r.ambient is not None and r.role == "fit"]
+    if not given:
+        return replace(recording, records=tuple(replace(r, ambient=None) for r in recording.records))
+    mean = float(np.mean(np.concatenate(given)))
+    records = tuple(replace(r, ambient=None if r.ambient is None else r.ambient - mean) for r in recording.records)
+    return replace(recording, records=records)

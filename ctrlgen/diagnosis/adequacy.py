@@ -1,0 +1,89 @@
+"""Steps 3 and 9: does a structure leave anything over? Judged on the held-out records.
+
+The squares that must be expected there are those of the noise and of what the fit could not know better,
+n + trace(J_h C J_h'), with C the covariance of the fitted numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from ctrlgen.diagnosis.fit import Fit, Fitter
+
+RATIO = 1.10  # held-out error over what is expected: the gate of the design
+SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
+NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
+LAGS = 20
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """`ratio` of held-out error to what is expected, per channel; the smallest p of each test; `passed` all of it."""
+
+    ratio: tuple[float, ...]
+    p_values: dict[str, float]
+    passed: bool
+
+    @property
+    def worst(self) -> float:
+        """The largest ratio of any channel."""
+        return max(self.ratio, default=float("nan"))
+
+
+def judge(fitter: Fitter, fit: Fit) -> Adequacy:
+    """Ratio per channel, Ljung-Box (memory), McLeod-Li (size that comes and goes), correlation with the drive."""
+    n_y = len(fitter.recording.channels)
+    squares, expected = np.zeros(n_y), np.zeros(n_y)
+    p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
+    for record in fitter.held:
+        white = fitter.whitened(fit, record)
+        usable = fitter.noise.usable(record.valid)
+        squares += np.sum(white**2, axis=0)
+        expected += usable.sum(axis=0) + _spread(fitter, fit, record)
+        if fitter.recording.kind == "series":
+            for i in range(n_y):
+                e = white[usable[:, i], i]
+                if len(e) > 5 * LAGS:
+                    p["memory"].append(ljung_box(e))
+                    p["variance"].append(ljung_box(e**2 - np.mean(e**2)))
+                    p["drive"].append(cross_correlation(e, record.drive[usable[:, i]]))
+    ratio = tuple(np.sqrt(squares / np.maximum(expected, 1.0)))
+    smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
+    rejected = any(value < SURE for value in smallest.values()) and max(ratio, default=0.0) > NOTICED
+    return Adequacy(ratio, smallest, bool(max(ratio, default=0.0) <= RATIO and not rejected))
+
+
+def _spread(fitter: Fitter, fit: Fit, record: object) -> np.ndarray:
+    """trace(J_h C J_h') per channel."""
+    if not len(fit.theta):
+        return np.zeros(len(fitter.recording.channels))
+    response = fit.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+    _, slopes = response.sensitivities(record, fit.theta)
+    J = np.nan_to_num(fitter.noise.whiten(slopes[:, :, : len(fit.theta)], record.valid))
+    return np.einsum("nip,pq,niq->i", J, fit.covariance, J, optimize=True)
+
+
+def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
+    """p of the hypothesis that `e` has no autocorrelation up to `lags`. G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297."""
+    n, e = len(e), e - np.mean(e)
+    total = float(e @ e)
+    if total == 0:
+        return 1.0
+    r = np.array([float(e[k:] @ e[:-k]) / total for k in range(1, lags + 1)])
+    return float(stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))
+
+
+def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = LAGS) -> float:
+    """p of the hypothesis that white `e` is uncorrelated with the drive's changes at lags 0 ... `lags` (Bonferroni)."""
+    n, worst = len(e), 0.0
+    for u in drive.T:
+        u = u - np.mean(u)
+        if np.std(u) == 0:
+            continue
+        for k in range(lags + 1):
+            a, b = e[k:], u[: n - k]
+            worst = max(worst, abs(float(a @ b)) / (np.std(e) * np.linalg.norm(b)))
+    return float(min(1.0, 2 * stats.norm.sf(worst) * (lags + 1) * drive.shape[1]))

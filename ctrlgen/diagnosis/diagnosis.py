@@ -1,0 +1,142 @@
+"""What a diagnosis says, and the verdict from what the search found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.adequacy import Adequacy
+from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.search import Search
+from ctrlgen.recording import Recording
+
+CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
+LITTLE_LEFT = 0.1  # of the excess over the floor (in squares): more than that is not even partly explained
+NEAR = 1.5  # held-out error over the floor up to which a mismatch counts as partly explained
+CI = 1.959964  # standard deviations of a 95 % interval
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval, in `unit`; `sided` says "two", "upper" or "lower" where the data only bound it."""
+
+    value: float
+    ci95: tuple[float, float]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One cause that was left out."""
+
+    effect: str
+    location: str
+    parameters: dict[str, Estimate]
+    alternatives: tuple[tuple[str, str], ...]
+    held_out_gain: float
+    source: str
+    cause: Hypothesis
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """Held-out error of one channel before and after, and the noise, in `unit`."""
+
+    rms_before: float
+    rms_after: float
+    noise_floor: float | None
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The answer. `next_device` is the device file's content with the findings in it; `search` the evidence."""
+
+    verdict: str
+    summary: str
+    findings: tuple[Finding, ...]
+    held_out: dict[str, ChannelError]
+    adequacy: Adequacy
+    where: dict[str, Any]
+    detectable: dict[str, Any]
+    next_experiment: dict[str, Any] | None
+    history: tuple[dict[str, Any], ...]
+    notes: tuple[str, ...]
+    device: Device
+    next_device: Device
+    recording: Recording
+    search: Search
+    fitter: Fitter
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+def verdict(search: Search, before: Adequacy, after: Adequacy, known: bool) -> str:
+    """consistent | explained | partly | ambiguous | unexplained."""
+    found = search.chosen.fit.structure.causes
+    if not known:
+        return (AMBIGUOUS if any(search.rivals) else PARTLY) if found else CONSISTENT
+    if not after.passed:
+        excess = [max(r**2 - 1, 0.0) for r in (before.worst, after.worst)]
+        near = found and after.worst <= NEAR and excess[1] <= LITTLE_LEFT * excess[0]
+        return PARTLY if near else UNEXPLAINED
+    if not found:
+        return CONSISTENT
+    return AMBIGUOUS if any(search.rivals) else EXPLAINED
+
+
+def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:
+    """Held-out root mean square of each channel, nominal and chosen."""
+    from ctrlgen.units import from_si, to_si
+
+    found = {}
+    floor = fitter.noise.floor
+    for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
+        scale = from_si(1.0, unit) - from_si(0.0, unit) if to_si(0.0, unit) else from_si(1.0, unit)
+        rms = []
+        for trial in (search.nominal, search.chosen):
+            squares = [
+                ((r.observed - fitter.predicted(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held
+            ]
+            rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
+        found[channel] = ChannelError(rms[0], rms[1], float(floor[i] * scale) if known[i] else None, unit)
+    return found
+
+
+def findings(search: Search) -> tuple[Finding, ...]:
+    """The causes of the chosen structure with intervals and rivals, the most important first."""
+    from ctrlgen.units import from_si
+
+    fit, rows = search.chosen.fit, []
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if len(fit.theta) else np.zeros(0)
+    held = search.nominal.held
+    for k, cause in enumerate(fit.structure.causes):
+        parameters = {}
+        for i, unknown in enumerate(fit.structure.unknowns):
+            if unknown.cause == k:
+                name = cause.path.rpartition(".")[2] if cause.effect == PARAMETER else unknown.path.rpartition(".")[2]
+                low, high = fit.theta[i] - CI * sd[i], fit.theta[i] + CI * sd[i]
+                parameters[name] = Estimate(
+                    float(from_si(fit.theta[i], unknown.unit)),
+                    (float(from_si(max(low, unknown.low), unknown.unit)), float(from_si(min(high, unknown.high), unknown.unit))),
+                    unknown.unit,
+                )
+        rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
+        gain = _gain(search, k)
+        source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source
+        rows.append(Finding(cause.effect, cause.location, parameters, rivals, gain, source, cause))
+    del held
+    return tuple(sorted(rows, key=lambda f: -f.held_out_gain))
+
+
+def _gain(search: Search, k: int) -> float:
+    """Share of the nominal held-out squares that goes with this cause, from the round that added it."""
+    cause = search.chosen.fit.structure.causes[k]
+    for round_ in search.rounds:
+        for trial in round_.trials:
+            if trial.cause == cause and trial.fit.structure.causes[-1] == cause:
+                return float((round_.before.held - trial.held) / search.nominal.held)
+    return float((search.nominal.held - search.chosen.held) / search.nominal.held)

@@ -1,0 +1,111 @@
+"""Step 5: what could have been left out. Every effect of the library at every place where it can act, and every number of the device that could be off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from ctrlgen.chain import available, channels
+from ctrlgen.devices import Device, Links
+from ctrlgen.devices.base import Section
+from ctrlgen.effect import Effect, Place, Where
+from ctrlgen.units import Quantity, from_si
+
+DOMAIN = {
+    Place.DRIVE: "actuator", Place.HEAT: "actuator", Place.FORCE: "stage", Place.DISPLACEMENT: "stage",
+    Place.POSE: "mechanism", Place.SENSOR: "sensor",
+}  # fmt: skip
+PARAMETER = "parameter"
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One effect at one place, `at` a channel (or "all") `of` another; or, for `effect` "parameter", one number of the device."""
+
+    effect: str
+    location: str
+    at: str = ""
+    of: str | None = None
+    path: str = ""
+
+    @property
+    def law(self) -> type[Effect]:
+        """The effect's class. Raises KeyError for a parameter."""
+        return Effect.library[self.effect]
+
+    def shapes(self, where: Where) -> list[dict[str, float]]:
+        """Every combination of the grids of the shape parameters [SI]; one empty one for laws without shape."""
+        shaped = [p for p in self.law.params if p is not self.law.amplitude()]
+        grids = [[where.si(value, p) for value in p.grid or (sum(p.bounds) / 2,)] for p in shaped]
+        return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
+
+
+def hypotheses(device: Device, links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool) -> list[Hypothesis]:
+    """All that can act on `device` and be seen in the channels `observed`."""
+    found = [h for law in Effect.library.values() for h in _of_law(law, links, observed, sample_time, ambient)]
+    return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
+
+
+def _of_law(
+    law: type[Effect], links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+) -> Iterator[Hypothesis]:
+    there = available(links, sample_time) - (frozenset() if ambient else {"ambient"})
+    if not law.needs <= there or (law.place is Place.HEAT and links.heat_signal is None):
+        return
+    domain = law.domain or DOMAIN[law.place]
+    places = channels(links, law.place)
+    seen = {channel.removeprefix("reading.") for channel in observed}
+    if law.place is Place.SENSOR:
+        places = [where for where in places if where.channel in seen]
+    for where in places:
+        if law.pairs:
+            for other in channels(links, law.place):
+                if other.channel != where.channel:
+                    yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, other.channel)
+        else:
+            yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel)
+    if len(places) > 1 and not law.pairs and law.place not in (Place.POSE, Place.SENSOR):
+        yield Hypothesis(law.kind, f"{domain}:all", "all")
+
+
+def _numbers(device: Device) -> Iterator[tuple[str, str]]:
+    """(path, location) of every number that may be off and is not taken as uncertain anyway."""
+    for path, section, number in numbers(device):
+        if not number.whole:
+            yield path, f"{section.domain}:{path.rpartition('.')[2]}"
+
+
+def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
+    """Every number outside the effects with the section that holds it."""
+
+    def walk(node: object, prefix: str, section: Section) -> Iterator[tuple[str, Section, Quantity]]:
+        if isinstance(node, Quantity):
+            yield prefix, section, node
+        elif isinstance(node, Section):
+            for key in type(node).model_fields:
+                if key != "effect":
+                    yield from walk(getattr(node, key), f"{prefix}.{key}" if prefix else key, node)
+        elif isinstance(node, tuple):
+            for i, member in enumerate(node):
+                yield from walk(member, f"{prefix}[{i}]", section)
+
+    yield from walk(device, "", device)
+
+
+def nuisances(device: Device) -> dict[str, float]:
+    """Paths of the numbers that are uncertain by their own statement or their section's tolerance, with that deviation [SI]."""
+    found = {}
+    for path, section, number in numbers(device):
+        sd = number.sd if number.sd is not None else (section.tolerance or 0.0) * abs(number.si)
+        if sd and not number.whole:
+            found[path] = sd
+    return found
+
+
+def written(si: float, unit: str, source: str | None = None) -> Quantity:
+    """A number found, as a device file would state it."""
+    shown = f"{from_si(si, unit):.9g} {'' if unit == '1' else unit}".strip()
+    return Quantity(si, shown, source)
+
+

@@ -1,0 +1,137 @@
+"""A model on a record: what it reads, and how that changes with every free parameter.
+
+State S = (x, z), drive u, ambient e, free parameters p:
+
+    S+ = F(S, u, u+, e, p),  y = H(S, u, e, p),
+    D+ = F_S D + F_p,        dy/dp = H_S D + H_p,   D = dS/dp.
+
+What depends on p alone (a Jacobian of struts, say) is computed once for a record, not once a sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.devices import Device
+from ctrlgen.model import Model, build_model
+from ctrlgen.motion import balanced, next_sample
+from ctrlgen.recording import Record
+
+START_NEWTON_STEPS = 12  # from home to the first displacement; later ones start from the sample before
+POSE_NEWTON_STEPS = 8
+
+
+class Response:
+    """The readings `channels` of `device` with the parameters `free`, for records of one sample time."""
+
+    def __init__(
+        self, device: Device, free: Sequence[str], channels: Sequence[str], sample_time: float, linear: bool
+    ) -> None:
+        self.free, self.channels, self.sample_time, self.linear = tuple(free), tuple(channels), sample_time, linear
+        self.ambient = ca.SX.sym("ambient")
+        look_back = sample_time if np.isfinite(sample_time) else None
+        self.model: Model = build_model(device, free, self.ambient, look_back)
+        self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
+
+    @cached_property
+    def initial(self) -> tuple[int, ...]:
+        """Places in S of what a record may start with: actuators' states and, with inertia, velocity and displacement."""
+        m = self.model
+        if not m.inertial:
+            return tuple(range(m.n_states)) if np.isfinite(self.sample_time) else ()
+        return (*range(m.n_states), *range(self.n_x - m.v.numel(), self.n_s))
+
+    @cached_property
+    def _observed(self) -> ca.SX:
+        signals = self.model.signals
+        rows = []
+        for channel in self.channels:
+            role, name = channel.split(".", 1)
+            rows.append(signals[role].expr[signals[role].channels.index(name)])
+        return ca.vertcat(*rows)
+
+    @cached_property
+    def _kernel(self) -> tuple[ca.Function, ca.Function]:
+        """(p -> constants, their Jacobian) and (S, u, u+, e, constants -> S+, y, F_S, F_c, H_S, H_c)."""
+        m = self.model
+        S, e = ca.vertcat(m.x, m.z), self.ambient
+        steps = POSE_NEWTON_STEPS if not np.isfinite(self.sample_time) else 4
+        after = next_sample(m, self.sample_time, self.linear, steps)
+        following = ca.vertcat(after.x, after.z)
+        if np.isfinite(self.sample_time):
+            y = self._observed
+        else:  # a settled pose is read after it has settled
+            y = ca.substitute(self._observed, ca.vertcat(m.x, m.z, m.u), ca.vertcat(after.x, after.z, after.u_next))
+        (following, y), symbols, parametric = ca.extract_parametric([following, y], m.p, {"extract_trivial": True})
+        c = ca.vertcat(ca.SX(0, 1), *symbols)
+        value = ca.vertcat(ca.SX(0, 1), *parametric)
+        constants = ca.Function("constants", [m.p], [value, ca.densify(ca.jacobian(value, m.p))])
+        slopes = [ca.jacobian(a, b) for a in (following, y) for b in (S, c)]
+        sample = ca.Function(
+            "sample", [S, m.u, after.u_next, e, c], [following, y, *slopes], {"cse": True}
+        )  # fmt: skip
+        return constants, sample
+
+    def begin(self, record: Record, p: np.ndarray) -> np.ndarray:
+        """S before the first sample: actuators at rest; the stage at home, or in balance where it has no inertia."""
+        m = self.model
+        x = m.rest.copy()
+        x[list(m.clocks)] = record.time[0] if np.isfinite(self.sample_time) else 0.0
+        if m.inertial or not np.isfinite(self.sample_time):
+            return np.concatenate([x, 0.0 * m.z_scale])
+        z = balanced(m, m.x, m.u, START_NEWTON_STEPS)
+        start = ca.Function("start", [m.x, m.z, m.u, m.p, self.ambient], [z])
+        return np.concatenate([x, start(x, m.z_scale, record.drive[0], p, self._ambients(record)[0]).full().ravel()])
+
+    @staticmethod
+    def _ambients(record: Record) -> np.ndarray:
+        return np.zeros(len(record.time)) if record.ambient is None else record.ambient
+
+    def outputs(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
+        """Readings (n, n_y), SI; `start` is added to what a record may start with."""
+        constants, sample = self._kernel
+        c = constants(p)[0]
+        S, u, u_1, e = (ca.MX.sym(k, n) for k, n in (("S", self.n_s), ("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1)))
+        following, y = sample(S, u, u_1, e, c)[:2]
+        one = ca.Function("one", [S, u, u_1, e], [following, y])
+        values = one.mapaccum(len(record.time))(self._start(record, p, start), *self._inputs(record))
+        return values[1].full().T
+
+    def sensitivities(
+        self, record: Record, p: np.ndarray, start: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Readings (n, n_y) and their derivatives (n, n_y, n_p + len(initial)) by `free`, then by what the record starts with."""
+        constants, sample = self._kernel
+        c, by_p = constants(p)
+        k, n_i, n_y = len(self.free), len(self.initial), len(self.channels)
+        seed = ca.horzcat(by_p, ca.DM(by_p.shape[0], n_i))
+        S, D = ca.MX.sym("S", self.n_s), ca.MX.sym("D", self.n_s, k + n_i)
+        u, u_1, e = (ca.MX.sym(name, n) for name, n in (("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1)))
+        following, y, F_S, F_c, H_S, H_c = sample(S, u, u_1, e, c)
+        D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
+        one = ca.Function(
+            "one", [ca.vertcat(S, ca.vec(D)), u, u_1, e], [ca.vertcat(following, ca.vec(D_next)), ca.vertcat(y, ca.vec(Y))]
+        )  # fmt: skip
+        D_0 = np.zeros((self.n_s, k + n_i))
+        D_0[list(self.initial), k + np.arange(n_i)] = 1.0
+        begin = np.concatenate([self._start(record, p, start), D_0.ravel(order="F")])
+        values = one.mapaccum(len(record.time))(begin, *self._inputs(record))[1].full()
+        slopes = values[n_y:].reshape(k + n_i, n_y, -1)
+        return values[:n_y].T, np.moveaxis(slopes, 2, 0).transpose(0, 2, 1)
+
+    def _start(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+        S = self.begin(record, p)
+        if start is not None:
+            S[list(self.initial)] += start
+        return S
+
+    def _inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Drive now, drive at the next sample, ambient; for settled poses the pose's own drive comes as the next."""
+        u = record.drive
+        following = np.vstack([u[1:], u[-1:]]) if np.isfinite(self.sample_time) else u
+        before = u if np.isfinite(self.sample_time) else np.vstack([u[:1], u[:-1]])
+        return before.T, following.T, self._ambients(record)[None, :]

@@ -1,0 +1,156 @@
+"""Steps 7 and 8: fit the suspects jointly with the device, add the one that explains most, drop what is not needed, swap.
+
+Structures are compared by T = objective on the records to fit + BIC's price of their numbers + whitened squares on the
+held-out records, where nothing was fitted. A cause is added only if the record shows it beyond what chance does
+anywhere among all hypotheses, if it is material (a tenth of the noise), and if the held-out records gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
+from ctrlgen.diagnosis.structure import Structure
+
+MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
+MOST_CAUSES = 6
+TRIALS = 6  # suspects fitted a round
+TRIAL_STEPS = 15
+RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
+CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One structure fitted, with its whitened squares on the held-out records and its total T."""
+
+    fit: Fit
+    held: float
+    total: float
+    cause: Hypothesis | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What one round saw: its screen and its trials, best first."""
+
+    screened: Screened
+    trials: tuple[Trial, ...]
+    before: Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The nominal fit, the chosen one, per cause the rivals that explain alike, and the rounds in order."""
+
+    nominal: Trial
+    chosen: Trial
+    rivals: tuple[tuple[Trial, ...], ...]
+    rounds: tuple[Round, ...]
+    last: Screened
+    n_held: int = field(default=0)
+
+
+class Searcher:
+    """Looks for the causes of a mismatch in one recording."""
+
+    def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
+        self.fitter, self.screen, self.step = fitter, screen, step
+        self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
+        self.known: dict[tuple, Trial] = {}
+
+    def trial(self, structure: Structure, cause: Hypothesis | None = None, steps: int = TRIAL_STEPS, theta: np.ndarray | None = None) -> Trial:
+        """Fits one structure and judges it on the held-out records."""
+        fit = self.fitter.fit(structure, theta, steps)
+        held, _ = self.fitter.held_out(fit)
+        price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
+        return Trial(fit, held, fit.objective + price + held, cause)
+
+    def run(self, structure: Structure) -> Search:
+        """Forward rounds until nothing more is justified, with swaps in between; then the rivals of each cause."""
+        nominal = current = self.trial(structure, steps=40)
+        rounds: list[Round] = []
+        while True:
+            self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
+            screened = self.screen.run(current.fit)
+            if len(current.fit.structure.causes) >= MOST_CAUSES:
+                break
+            trials = self._try(current, self._conspicuous(screened))
+            rounds.append(Round(screened, trials, current))
+            better = [t for t in trials if self._justified(current, t)]
+            if not better:
+                break
+            current = better[0]
+            current = self._prune(self._swap(current))
+        rivals = tuple(self._rivals(current, k) for k in range(len(current.fit.structure.causes)))
+        return Search(nominal, current, rivals, tuple(rounds), screened, self.fitter.held_out(current.fit)[1])
+
+    def _need(self, screened: Screened) -> float:
+        """The z^2 that a cause must show."""
+        return max(screened.threshold**2, MATERIAL**2 * self.n_fit)
+
+    def _conspicuous(self, screened: Screened) -> list[Suspect]:
+        loud = [s for s in screened.suspects if s.z**2 > self._need(screened)]
+        if not loud:
+            return []
+        chosen: list[Suspect] = []
+        for s in loud:
+            same = sum(c.hypothesis.effect == s.hypothesis.effect for c in chosen)
+            if s.z**2 >= CLOSE * loud[0].z**2 and same < 2 and len(chosen) < TRIALS:
+                chosen.append(s)
+        return chosen
+
+    def _try(self, current: Trial, suspects: list[Suspect]) -> tuple[Trial, ...]:
+        trials = []
+        for s in suspects:
+            self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
+            trials.append(self.trial(_warm(current.fit, s.hypothesis, s.start), s.hypothesis))
+        return tuple(sorted(trials, key=lambda t: t.total))
+
+    def _justified(self, before: Trial, after: Trial) -> bool:
+        gained = before.fit.objective - after.fit.objective
+        added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
+        needed = max(MATERIAL**2 * self.n_fit, 12.0 + added * np.log(max(self.n_fit, 2)))
+        return gained > needed and before.held - after.held > 2.0
+
+    def _swap(self, current: Trial) -> Trial:
+        """Each earlier cause against what would be suspected in its place, now that the others are there."""
+        for k in range(len(current.fit.structure.causes) - 1):
+            for rival in self._replacements(current, k)[:3]:
+                if rival.total < current.total - RIVAL:
+                    current = rival
+        return current
+
+    def _replacements(self, current: Trial, k: int) -> list[Trial]:
+        structure = current.fit.structure
+        bare = self.trial(_cooled(current.fit).without(k))
+        screened = self.screen.run(bare.fit)
+        suspects = [s for s in self._conspicuous(screened) if s.hypothesis != structure.causes[k]]
+        return sorted(self._try(bare, suspects), key=lambda t: t.total)
+
+    def _prune(self, current: Trial) -> Trial:
+        for k in reversed(range(len(current.fit.structure.causes))):
+            if len(current.fit.structure.causes) < 2:
+                break
+            bare = self.trial(_cooled(current.fit).without(k))
+            if not self._justified(bare, current):
+                current = bare
+        return current
+
+    def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
+        return tuple(t for t in self._replacements(current, k) if t.total < current.total + RIVAL)
+
+
+def _cooled(fit: Fit) -> Structure:
+    """The structure with its causes starting where the fit ended."""
+    s = fit.structure
+    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))))
+
+
+def _warm(fit: Fit, cause: Hypothesis, start: dict[str, float]) -> Structure:
+    return _cooled(fit).with_cause(cause, start)

@@ -1,0 +1,185 @@
+"""A device with some causes added and some of its numbers free: what a fit works on.
+
+The nominal device is nested in every structure: an effect at its `off`, a number at its nominal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ctrlgen.chain import channels
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nuisances, numbers, written
+from ctrlgen.diagnosis.response import Response
+from ctrlgen.effect import Param, Where
+from ctrlgen.model import movable
+from ctrlgen.recording import Record, Recording
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One free number [SI]: `sd` is its stated deviation from `nominal`, None where nothing is known beforehand.
+
+    `cause` is the place of its hypothesis in the structure, None for the device's own uncertain numbers.
+    """
+
+    path: str
+    unit: str
+    nominal: float
+    low: float
+    high: float
+    size: float
+    sd: float | None = None
+    cause: int | None = None
+    amplitude: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """`device` as described, with `causes` and their starting values ({parameter: SI}, one mapping a cause)."""
+
+    device: Device
+    causes: tuple[Hypothesis, ...] = ()
+    starts: tuple[dict[str, float], ...] = ()
+
+    def with_cause(self, cause: Hypothesis, start: dict[str, float]) -> Structure:
+        """The same with one cause more."""
+        return replace(self, causes=(*self.causes, cause), starts=(*self.starts, start))
+
+    def without(self, index: int) -> Structure:
+        """The same with one cause less."""
+        keep = [k for k in range(len(self.causes)) if k != index]
+        return replace(self, causes=tuple(self.causes[k] for k in keep), starts=tuple(self.starts[k] for k in keep))
+
+    def place(self, cause: Hypothesis) -> Where:
+        """The channel at which a cause acts; the first one where it acts at all of them."""
+        where = channels(self.device.links(self.device.values()), cause.law.place)
+        return where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
+
+    @cached_property
+    def described(self) -> Device:
+        """The device with the causes' effects at their starting values."""
+        added, values = [], {}
+        for cause, start in zip(self.causes, self.starts, strict=True):
+            if cause.effect == PARAMETER:
+                values[cause.path] = start["value"]
+                continue
+            where = self.place(cause)
+            law = cause.law
+            numbers_ = {p.name: written(_inside(start[p.name], p, where), where.unit_of(p)) for p in law.params}
+            added.append(law(cause.at, numbers_, cause.of))
+        return changed(self.device, values).model_copy(update={"effect": (*self.device.effect, *added)})
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The device's uncertain numbers, then every parameter of every cause."""
+        causes = {c.path for c in self.causes if c.effect == PARAMETER}
+        acting = _movable(self.device)
+        sections = {path: (section, number) for path, section, number in numbers(self.device)}
+        rows = []
+        for path, sd in nuisances(self.device).items():
+            if path in acting and path not in causes:
+                q = sections[path][1]
+                rows.append(Unknown(path, _unit(q.text), q.si, *_around(q.si, 5 * sd), sd, sd))
+        k = len(self.device.effect)
+        for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
+            if cause.effect == PARAMETER:
+                q = sections[cause.path][1]
+                span = max(abs(q.si), 1e-3) * 0.9 if _unit(q.text) not in ("deg", "rad") else 0.5
+                rows.append(
+                    Unknown(cause.path, _unit(q.text), q.si, q.si - span, q.si + 10 * span, max(abs(q.si), 1e-3) * 1e-3, None, index, True)
+                )
+                continue
+            where, law = self.place(cause), cause.law
+            for p in law.params:
+                low, high = (where.si(b, p) for b in p.bounds)
+                off = 0.0 if p.off is None else where.si(p.off, p)
+                size = max(abs(start[p.name] - off), 1e-6 * (high - low)) if p.off is not None else abs(start[p.name]) or high - low
+                rows.append(
+                    Unknown(f"effect[{k}].{p.name}", where.unit_of(p), off, low, high, size, None, index, p is law.amplitude())
+                )
+            k += 1
+        return tuple(rows)
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """Where a fit begins, one SI number an unknown."""
+        values = []
+        for unknown in self.unknowns:
+            if unknown.cause is None:
+                values.append(unknown.nominal)
+            else:
+                name = unknown.path.rpartition(".")[2] if self.causes[unknown.cause].effect != PARAMETER else "value"
+                values.append(min(max(self.starts[unknown.cause][name], unknown.low), unknown.high))
+        return np.array(values)
+
+    def responses(self, recording: Recording, cache: dict) -> dict[tuple[float, bool], Response]:
+        """One response for every sample time and drive convention in the recording."""
+        kinds = {(r.sample_time, r.linear) for r in recording.records}
+        free = tuple(u.path for u in self.unknowns)
+        found = {}
+        for h, linear in kinds:
+            key = (self.causes, h, linear, tuple(cause.effect for cause in self.causes))
+            if key not in cache:
+                cache[key] = Response(self.described, free, recording.channels, h, linear)
+            found[h, linear] = cache[key]
+        return found
+
+
+def _inside(value: float, p: Param, where: Where) -> float:
+    low, high = (where.si(b, p) for b in p.bounds)
+    return min(max(value, low), high)
+
+
+def _around(value: float, reach: float) -> tuple[float, float]:
+    """Bounds of an uncertain number, which does not change its sign."""
+    low, high = value - reach, value + reach
+    return (max(low, 1e-3 * value), high) if value > 0 else (low, min(high, 1e-3 * value)) if value < 0 else (low, high)
+
+
+def _unit(text: str) -> str:
+    from ctrlgen.units import written_unit
+
+    return written_unit(text)
+
+
+_MOVABLE: dict[int, frozenset[str]] = {}
+
+
+def _movable(device: Device) -> frozenset[str]:
+    key = id(device)
+    if key not in _MOVABLE:
+        _MOVABLE[key] = frozenset(movable(device))
+    return _MOVABLE[key]
+
+
+def changed(device: Device, values: dict[str, float]) -> Device:
+    """The device with some of its numbers at other values [SI]."""
+
+    def walk(node: object, prefix: str) -> object:
+        from ctrlgen.devices.base import Section
+        from ctrlgen.units import Quantity, written_unit
+
+        if isinstance(node, Quantity):
+            return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
+        if isinstance(node, Section):
+            fields = {
+                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key)
+                for key in type(node).model_fields
+                if key != "effect"
+            }
+            return node.model_copy(update=fields)
+        if isinstance(node, tuple):
+            return tuple(walk(member, f"{prefix}[{i}]") for i, member in enumerate(node))
+        return node
+
+    return walk(device, "") if values else device
+
+
+def starts_of(record: Record, responses: dict[tuple[float, bool], Response]) -> int:
+    """How many numbers a record may start with."""
+    return len(responses[record.sample_time, record.linear].initial)
