@@ -17,7 +17,7 @@ LAYERS = [
     "effect", "effects",
     "devices.base", "devices.hinge", "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod", "devices",
     "calibration pose_errors",
-    "model", "simulation inverse", "controller linearisation",
+    "model", "marking recording_formats recording_file", "gate", "recording", "simulation inverse", "controller linearisation",
     "paths", "scenario", "workspace", "programme", "shortfall", "solution",
     "cprint", "firmware", "reference", "comparison",
     "measures", "figures", "bode report",
