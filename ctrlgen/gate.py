@@ -52,18 +52,24 @@ class Judged:
     faults: tuple[Fault, ...] = ()
 
 
-def examine(record: Record, kind: str, model: Model, names: Names, where: str, spoken: np.ndarray) -> Judged:
+def examine(record: Record, kind: str, model: Model, names: Names, where: str) -> Judged:
     """One record as read -> its stretches without a break, each sample marked.
 
-    `spoken` (n_y,) bool: the channels this record has columns for. `where` is its place in recording.toml.
+    `record.valid` says which channels it has columns for; `where` is its place in recording.toml.
     """
+    spoken = record.valid.any(0)
     faults = _empty(record, kind, names, where, spoken) + _beyond_limits(record, kind, model, names, where)
     notes: list[str] = []
     pieces = [record]
-    if not faults and kind == "series":
-        faults, notes, pieces = _clock(record, where)
-    if not faults:
-        faults = _nothing_happens(record, where)
+    if kind == "series" and len(record.time) >= SHORTEST[kind]:
+        period, said, wrong = _clock(record, where)
+        faults += wrong
+        if not faults:
+            pieces, notes = _stretches(replace(record, sample_time=period))
+            notes = said + notes
+            if not pieces:
+                faults = [Fault(where, f"{record.name}: {notes[-1]} Nothing is left; record without gaps")]
+    faults = faults or _nothing_happens(record, where)
     if faults:
         return Judged(faults=tuple(faults))
     marked = []
@@ -133,15 +139,15 @@ def _constant(y: np.ndarray) -> bool:
     return bool(len(finite) == 0 or (finite == finite[0]).all())
 
 
-def _clock(record: Record, where: str) -> tuple[list[Fault], list[str], list[Record]]:
-    """Faults, notes, and the stretches of the record between breaks with their sample time [s]."""
+def _clock(record: Record, where: str) -> tuple[float, list[str], list[Fault]]:
+    """The sample time [s], notes and faults of the time stamps."""
     t = record.time
     lost = np.flatnonzero(~np.isfinite(t))
     if len(lost):
         what = (
             f"has no number in row {lost[0]} ({len(lost)} of {len(t)} rows); repair the file or leave them out by rows"
         )
-        return [Fault(f"{where}.time", what)], [], []
+        return np.nan, [], [Fault(f"{where}.time", what)]
     step = np.diff(t)
     back = np.flatnonzero(step <= 0)
     if len(back):
@@ -150,7 +156,7 @@ def _clock(record: Record, where: str) -> tuple[list[Fault], list[str], list[Rec
             f"does not rise from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {len(back)} times in all; "
             "sort the rows, remove doubled ones, or give sample_rate if the samples are evenly spaced"
         )
-        return [Fault(f"{where}.time", what)], [], []
+        return np.nan, [], [Fault(f"{where}.time", what)]
     period = float(np.median(step))
     regular = step[step <= BREAK * period]
     period = float(regular.mean())
@@ -160,22 +166,19 @@ def _clock(record: Record, where: str) -> tuple[list[Fault], list[str], list[Rec
             f"is uneven: steps differ from {period:.6g} s by {100 * jitter:.2g} % (rms; 1 % is allowed); resample to an even "
             "grid and say how in `source`, or give sample_rate if only the time stamps are rounded"
         )
-        return [Fault(f"{where}.time", what)], [], []
+        return np.nan, [], [Fault(f"{where}.time", what)]
     notes = []
     if jitter > JITTER / 10:
         notes.append(
             f"{record.name}: time stamps jitter by {100 * jitter:.2g} % of the sample time (rms); taken as even."
         )
-    breaks = set((np.flatnonzero(step > BREAK * period) + 1).tolist())
-    pieces, said = _stretches(replace(record, sample_time=period), breaks)
-    if not pieces:
-        return [Fault(where, f"{record.name}: {said[-1]} Nothing is left; record without gaps")], [], []
-    return [], notes + said, pieces
+    return period, notes, []
 
 
-def _stretches(record: Record, breaks: set[int]) -> tuple[list[Record], list[str]]:
+def _stretches(record: Record) -> tuple[list[Record], list[str]]:
     """The record cut at gaps in time and where a drive is missing; joined over what is missing while the drive rests."""
     known = np.isfinite(record.drive).all(1)
+    breaks = (np.flatnonzero(np.diff(record.time) > BREAK * record.sample_time) + 1).tolist()
     edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
     bounds = [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
     cuts = [(a, b) for lo, hi in bounds for a, b in _split(lo, hi, breaks)]
@@ -194,6 +197,9 @@ def _stretches(record: Record, breaks: set[int]) -> tuple[list[Record], list[str
             parts.append(part)
     kept = [part for part in parts if len(part.time) >= SHORTEST["series"]]
     dropped = sum(len(part.time) for part in parts) - sum(len(part.time) for part in kept)
+    if not notes and len(parts) == 1:
+        count = len(known) - len(parts[0].time)
+        notes.append(f"{record.name}: a drive is missing in {count} samples at its begin or end; they are left out.")
     if len(parts) > 1:
         at = ", ".join(f"{part.time[0]:.6g} s" for part in parts[1:6]) + (", ..." if len(parts) > 6 else "")
         notes.append(
@@ -204,8 +210,8 @@ def _stretches(record: Record, breaks: set[int]) -> tuple[list[Record], list[str
     return kept, notes
 
 
-def _split(a: int, b: int, breaks: set[int]) -> list[tuple[int, int]]:
-    edges = [a, *sorted(k for k in breaks if a < k < b), b]
+def _split(a: int, b: int, breaks: list[int]) -> list[tuple[int, int]]:
+    edges = [a, *(k for k in breaks if a < k < b), b]
     return list(pairwise(edges))
 
 

@@ -80,7 +80,8 @@ def stuck(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
 
     A stretch of eight equal samples or more counts where the channel is seen to be noisy with the drive at rest, or,
     no rest being there to tell, where the drive (n, n_u) moves meanwhile and the channel repeats itself nowhere else.
-    At the end of the channel's range five suffice while the drive moves, if it ran into the end at speed: clipping.
+    At the end of the channel's range five suffice where the channel is noisy otherwise, or ran into the end at speed while
+    the drive moved: clipping.
     Coarsely quantised channels at rest, and stages held by friction, repeat themselves rightly and are left alone.
     """
     marked = np.zeros(len(observed), dtype=bool)
@@ -88,11 +89,16 @@ def stuck(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
     if not runs or np.nanmin(observed) == np.nanmax(observed):
         return marked
     noisy = _noisy(observed, drive, runs)
-    span = np.ptp(drive, axis=0)
+    span, ends = np.ptp(drive, axis=0), (np.nanmin(observed), np.nanmax(observed))
     for a, b in runs:
-        moves = bool((np.ptp(drive[a:b], axis=0) > 0.05 * span)[span > 0].any())
+        moves = bool(
+            (np.ptp(drive[a : (a + b) // 2], axis=0) > 0.05 * span)[span > 0].any()
+        )  # the end may be dead time
         frozen = b - a >= STUCK and (noisy["rest"] or (noisy["rest"] is None and moves and noisy["elsewhere"]))
-        if frozen or (moves and _at_rail(observed, a, b)):
+        clipped = observed[a] in ends and (
+            (moves and _at_speed(observed, a, b)) or (noisy["elsewhere"] and noisy["shakes"])
+        )
+        if frozen or clipped:
             marked[a:b] = True
     return marked
 
@@ -105,21 +111,29 @@ def _runs(y: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _noisy(y: np.ndarray, drive: np.ndarray, runs: list[tuple[int, int]]) -> dict[str, bool | None]:
-    """Whether neighbouring samples differ, `rest` with the drive at rest (None: no rest seen), `elsewhere` out of the runs."""
+    """Whether neighbouring samples differ, `rest` with the drive at rest (None: no rest seen), `elsewhere` out of the runs;
+    `shakes` whether they differ as noise does."""
     equal = y[1:] == y[:-1]
     inside = np.zeros(len(y) - 1, dtype=bool)
     for a, b in runs:
         inside[a : b - 1] = True
     resting = (np.diff(drive, axis=0) == 0).all(1)
-    rest = None if resting.sum() < 50 else bool(equal[resting].mean() < 0.5 and equal[resting & ~inside].mean() < 0.2)
-    return {"rest": rest, "elsewhere": bool((~inside).sum() >= 50 and equal[~inside].mean() < 0.2)}
+    rest = None
+    if resting.sum() >= 50:
+        rest = bool(equal[resting].mean() < 0.5 and equal[resting & ~inside].mean() < 0.2 and _shakes(y, resting))
+    elsewhere = bool((~inside).sum() >= 50 and equal[~inside].mean() < 0.2)
+    return {"rest": rest, "elsewhere": elsewhere, "shakes": _shakes(y, ~inside)}
 
 
-def _at_rail(y: np.ndarray, a: int, b: int) -> bool:
-    """Whether y[a:b] lies at the channel's largest or smallest value and was reached or left at speed."""
-    low, high = np.nanmin(y), np.nanmax(y)
-    if y[a] not in (low, high):
-        return False
-    speed = max(10 * quantum(y[np.isfinite(y)]), 1e-3 * (high - low))
+def _shakes(y: np.ndarray, where: np.ndarray) -> bool:
+    """Whether steps change sign as often as noise does: white two of three times, settling and ringing seldom."""
+    step = np.where(where & np.isfinite(y[1:]) & np.isfinite(y[:-1]), np.diff(y), 0.0)
+    both = (step[1:] != 0) & (step[:-1] != 0)
+    return bool(both.sum() >= 20 and (step[1:] * step[:-1] < 0)[both].mean() > 0.25)
+
+
+def _at_speed(y: np.ndarray, a: int, b: int) -> bool:
+    """Whether y[a:b] was reached or left at speed, not by slowing down."""
+    speed = max(10 * quantum(y[np.isfinite(y)]), 1e-3 * (np.nanmax(y) - np.nanmin(y)))
     sides = [(a - 2, a - 1)] * (a >= 2) + [(b, b + 1)] * (b + 1 < len(y))
     return any(abs(y[j] - y[i]) >= speed for i, j in sides)

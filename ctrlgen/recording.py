@@ -152,8 +152,7 @@ class _File:
             faults += reader.faults
             if raw is None:
                 continue
-            spoken = np.array([name in sound for name in channels])
-            found = gate.examine(raw, self.written.kind, self.model, names, where, spoken)
+            found = gate.examine(raw, self.written.kind, self.model, names, where)
             records += [(where, piece) for piece in found.records]
             notes += found.notes
             faults += found.faults
@@ -185,42 +184,62 @@ class _Reader:
         self.tables: dict[str, Table | None] = {}
 
     def read(self, names: gate.Names, kind: str) -> Record | None:
-        """The record before any judgement; None, with faults, where a file or column cannot be read."""
+        """The record before any judgement; None where drives or clock cannot be read. `valid`: the channel was read."""
         r = self.record
-        values = {name: self._column(f"{self.where}.columns.{name!r}", column) for name, column in self.columns.items()}
+        read = {name: self._column(f"{self.where}.columns.{name!r}", column) for name, column in self.columns.items()}
+        values = {name: column for name, column in read.items() if column is not None}
         clock = None if r.time is None else self._column(f"{self.where}.time", r.time)
         ambient = self._ambient(r.conditions.ambient)
-        rows = {len(v) for v in (*values.values(), clock, ambient if np.ndim(ambient) else None) if v is not None}
-        if len(rows) > 1:
-            listed = ", ".join(f"{name} {len(v)}" for name, v in values.items() if v is not None)
-            self.faults.append(
-                Fault(self.where, f"columns have different numbers of rows ({listed}); export them together")
-            )
-        n = min(rows, default=0)
-        if r.rows and n and r.rows[1] > n:
-            self.faults.append(
-                Fault(f"{self.where}.rows", f"{list(r.rows)} ends after the last of {n} rows of {r.file}")
-            )
-        timed = kind == "poses" or clock is not None or r.sample_rate is not None
-        if self.faults or not timed or any(name not in values for name in names.drives):
+        sizes = {name: len(column) for name, column in values.items()}
+        sizes |= {} if clock is None else {"time": len(clock)}
+        sizes |= {"ambient": len(ambient)} if np.ndim(ambient) else {}
+        n = min(sizes.values(), default=0)
+        if len(set(sizes.values())) > 1:
+            listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+            what = f"columns have different numbers of rows ({listed}); export them together"
+            self.faults.append(Fault(self.where, what))
             return None
+        if r.rows and n and r.rows[1] > n:
+            what = f"{list(r.rows)} ends after the last of {n} rows of {r.file}"
+            self.faults.append(Fault(f"{self.where}.rows", what))
+        timed = kind == "poses" or clock is not None or (r.time is None and r.sample_rate is not None)
+        if not timed or any(name not in values for name in names.drives):
+            return None
+        return self._record(names, values, *self._clock(kind, clock, n), ambient)
+
+    def _clock(self, kind: str, clock: np.ndarray | None, n: int) -> tuple[np.ndarray, float]:
+        """Time of every row of the file (n,) [s] and the sample time [s], NaN where the gate must find it."""
+        r = self.record
+        begin = r.start.si if r.start else 0.0
+        if clock is not None:
+            finite = clock[np.isfinite(clock)]
+            return begin + clock - (finite[0] if len(finite) else 0.0), np.nan
+        period = r.dwell.si if r.dwell else np.inf if kind == "poses" else 1 / r.sample_rate.si
+        return begin + np.arange(n) * (1.0 if np.isinf(period) else period), period
+
+    def _record(
+        self,
+        names: gate.Names,
+        values: dict[str, np.ndarray],
+        time: np.ndarray,
+        period: float,
+        ambient: np.ndarray | float | None,
+    ) -> Record:
+        r, n = self.record, len(time)
         chosen = slice(*(r.rows or (0, n)))
-        blank = np.full(n, np.nan)
-        spoken = [name in values for name in names.observed]
-        observed = np.column_stack([values.get(name, blank) for name in names.observed] or [np.empty((n, 0))])
-        period = np.inf if kind == "poses" else 1 / r.sample_rate.si if r.sample_rate else np.nan
-        period = r.dwell.si if r.dwell else period
-        time = np.arange(n) * (1.0 if np.isinf(period) else period) if clock is None else clock - clock[:1]
+        observed = np.full((n, len(names.observed)), np.nan)
+        for i, name in enumerate(names.observed):
+            observed[:, i] = values.get(name, np.nan)
         return Record(
             name=r.file + (f"[{r.rows[0]}:{r.rows[1]}]" if r.rows else ""),
             role=r.role,
-            time=(time + (r.start.si if r.start else 0.0))[chosen],
+            time=time[chosen],
             sample_time=period,
             drive=np.column_stack([values[name] for name in names.drives])[chosen],
             observed=observed[chosen],
             linear=r.between_samples == "linear",
             ambient=None if ambient is None else (np.zeros(n) + ambient)[chosen],
-            valid=np.tile(spoken, (n, 1))[chosen],
+            valid=np.tile([name in values for name in names.observed], (n, 1))[chosen],
         )
 
     def _ambient(self, given: Any) -> np.ndarray | float | None:
