@@ -18,12 +18,15 @@ LAYERS = [
     "devices.base", "devices.hinge",
     "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis", "devices",
     "calibration pose_errors",
-    "chain", "model", "motion", "simulation inverse", "controller linearisation",
+    "chain", "model", "marking recording_formats recording_file", "gate", "recording",
+    "motion", "simulation inverse", "controller linearisation",
     "paths", "scenario", "workspace", "programme", "shortfall", "solution",
     "cprint", "firmware", "reference", "comparison",
     "measures", "figures", "bode report",
     "reproduce reproduce.row reproduce.rounding reproduce.s0_data", "reproduce.hinge_errors reproduce.s3_tables",
     "reproduce.s3_lengths", "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s3", "reproduce.all",
+    "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise", "diagnosis.structure", "diagnosis.fit",
+    "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis", "diagnosis",
     "job", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}

@@ -242,6 +242,12 @@ def test_the_model_is_the_kinematic_jacobian_without_state_or_force(device, rng)
     assert np.allclose(pose, matrices(device)["J_k"] @ travel, rtol=1e-12, atol=0)
 
 
+def test_the_model_follows_its_whole_travel(device, rng) -> None:
+    model = build_model(device)
+    travels = rng.uniform(*model.u_bounds, (500, 6))
+    assert np.allclose(simulate(model, travels, 1e-2).z[:-1][1:], travels[:-1], rtol=1e-12, atol=0)
+
+
 # The recordings
 
 

@@ -85,8 +85,8 @@ class MesoHexapod(Device):
             drive=drive,
             state=None,
             rest=(),
-            displacement_scale=1e-5,
-            force_scale=1e-5,
+            displacement_scale=travel,  # far below it the balance could not be met to its last digit
+            force_scale=travel,
             force=lambda u, x, d: u,
             resistance=lambda d: d,
             force_unit="um",

@@ -1,0 +1,290 @@
+"""A recording: what a device was driven with and what was measured, SI, judged by the gate and never filled in.
+
+`recording.toml` names the files, their columns and units (`ctrlgen.recording_file`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ctrlgen import gate
+from ctrlgen.errors import Fault, InputError
+from ctrlgen.files import read_toml, validate
+from ctrlgen.model import Model
+from ctrlgen.recording_file import FILE, Column, RecordingFile, RecordTable, check, deviation, fits
+from ctrlgen.recording_formats import Table, read_table
+from ctrlgen.units import parse, same_dimension, to_si
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One uninterrupted run, SI; n samples of n_u drives and n_y observed channels.
+
+    `name` file with rows; `role` fit, hold_out or rest; `time` (n,) [s] on the clock common to the records of one
+    recording.toml, k for settled poses; `sample_time` [s], inf for settled poses; `drive` (n, n_u) in the order of
+    `model.signals["drive"].channels`, always finite; `observed` (n, n_y) in the order of `Recording.channels`, NaN
+    where not `valid` (n, n_y): missing, in a gap, spike, stuck, or a pose that belongs to the other part. `linear`:
+    the drive goes straight between samples, else it is held. `ambient` (n,) [K], None where not given.
+    """
+
+    name: str
+    role: str
+    time: np.ndarray
+    sample_time: float
+    drive: np.ndarray
+    observed: np.ndarray
+    linear: bool
+    ambient: np.ndarray | None
+    valid: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Records of one device. `channels` observed, such as 'reading.delta_x', with the reader's `units` and the stated
+    standard deviation of the `noise` in SI (None where nobody stated one); `notes` what the gate marked or could not do."""
+
+    title: str
+    device: str
+    kind: str
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    noise: tuple[float | None, ...]
+    records: tuple[Record, ...]
+    notes: tuple[str, ...]
+
+
+def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
+    """The recordings in `paths` (recording.toml, or the folders that hold one) joined, each sample judged by the gate.
+
+    At least one record is to be fitted and one held out; where none is named, part of the longest is held out.
+    Raises InputError with every fault of every file.
+    """
+    read = [_File(Path(path), model, many=len(paths) > 1) for path in paths]
+    if not read:
+        raise InputError("recordings", [Fault("paths", "are none; name a recording.toml")])
+    faults = [fault for file in read for fault in file.faults]
+    kinds = {file.written.kind for file in read if file.written}
+    if len(kinds) > 1:
+        faults.append(Fault("kind", "series and poses cannot be joined; diagnose them one after the other"))
+    twice = [file.path for k, file in enumerate(read) if file.path.resolve() in [f.path.resolve() for f in read[:k]]]
+    faults += [Fault(str(path), "is given twice; name each recording once") for path in twice]
+    source = read[0].path if len(read) == 1 else "recordings"
+    written = [column for file in read for record in file.columns for column in record.items()]
+    channels = tuple(dict.fromkeys(name for name, _ in written if not name.startswith("drive.")))
+    first = {name: column.unit for name, column in reversed(written)}
+    if faults:
+        raise InputError(source, faults + [f for file in read for f in file.judge(channels, first)[2]])
+    judged = [file.judge(channels, first) for file in read]
+    names = _names(model, channels, tuple(first[name] for name in channels))
+    faults = [fault for *_, found in judged for fault in found]
+    records = [record for found, *_ in judged for record in found]
+    if not faults:
+        faults = gate.compare([record for _, record in records], [where for where, _ in records], names)
+    parts = gate.hold_out([record for _, record in records], read[0].written.kind) if not faults else gate.Judged()
+    if faults or parts.faults:
+        raise InputError(source, [*faults, *parts.faults])
+    noise, said = _noise(channels, written, model)
+    return Recording(
+        title=" + ".join(dict.fromkeys(file.written.title for file in read)),
+        device=model.device.name,
+        kind=read[0].written.kind,
+        channels=channels,
+        units=names.units,
+        noise=noise,
+        records=parts.records,
+        notes=tuple(note for _, notes, _ in judged for note in notes) + said + parts.notes,
+    )
+
+
+def _names(model: Model, channels: tuple[str, ...], units: tuple[str, ...]) -> gate.Names:
+    drive = model.signals["drive"]
+    return gate.Names(tuple(f"drive.{c}" for c in drive.channels), drive.units, channels, units)
+
+
+def _noise(
+    channels: tuple[str, ...], written: Sequence[tuple[str, Column]], model: Model
+) -> tuple[tuple[float | None, ...], tuple[str, ...]]:
+    """The stated noise of each channel [SI]; where records differ the largest, with a note."""
+    stated, notes = [], []
+    for channel in channels:
+        values = {deviation(c.noise, c.unit) for name, c in written if name == channel and c.noise}
+        stated.append(max(values, default=None))
+        if len(values) > 1:
+            notes.append(f"{channel}: records state different noise; the largest is taken for all.")
+    return tuple(stated), tuple(notes)
+
+
+class _File:
+    """One recording.toml, its faults against the model, and its records once read."""
+
+    def __init__(self, path: Path, model: Model, many: bool) -> None:
+        self.path, self.model = (path / FILE if path.is_dir() else path), model
+        self.prefix = f"{self.path}: " if many else ""
+        self.written: RecordingFile | None = None
+        self.columns: list[dict[str, Column]] = []
+        self.faults: list[Fault] = []
+        try:
+            self.written = validate(RecordingFile, read_toml(self.path), self.path)
+        except InputError as error:
+            self.faults = [Fault(self.prefix + fault.where, fault.what) for fault in error.faults]
+            return
+        self.faults = [Fault(self.prefix + fault.where, fault.what) for fault in check(self.written, model)]
+        self.columns = [self.written.columns_of(record) for record in self.written.record]
+
+    def judge(
+        self, channels: tuple[str, ...], units: dict[str, str]
+    ) -> tuple[list[tuple[str, Record]], list[str], list[Fault]]:
+        """The records after the gate with their places, its notes, and every fault of reading and gate."""
+        records, notes, faults, spans = [], [], [], []
+        if self.written is None:
+            return records, notes, faults
+        names = _names(self.model, channels, tuple(units[name] for name in channels))
+        for k, (record, columns) in enumerate(zip(self.written.record, self.columns, strict=True)):
+            where = f"{self.prefix}record[{k}]"
+            sound = {name: column for name, column in columns.items() if fits(name, column, self.model)}
+            reader = _Reader(self.path.parent, record, sound, where)
+            raw = reader.read(names, self.written.kind)
+            faults += reader.faults
+            if raw is None:
+                continue
+            found = gate.examine(raw, self.written.kind, self.model, names, where)
+            records += [(where, piece) for piece in found.records]
+            notes += found.notes
+            faults += found.faults
+            if found.records:
+                spans.append((k, record, found.records[0].time[0], found.records[-1].time[-1]))
+        return records, notes, faults + self._overlaps(spans)
+
+    def _overlaps(self, spans: list[tuple[int, RecordTable, float, float]]) -> list[Fault]:
+        """Records that the common clock, where one is stated, has run at the same time."""
+        if not any(record.start for _, record, *_ in spans):
+            return []
+        return [
+            Fault(
+                f"{self.prefix}record[{k}].start",
+                f"{record.file} begins at {begin:.6g} s, before {other.file} ends ({last:.6g} s); give the start of both",
+            )
+            for k, record, begin, end in spans
+            for _, other, earliest, last in spans
+            if other is not record and earliest <= begin < last
+        ]
+
+
+class _Reader:
+    """Reads one record's files; collects faults on the way."""
+
+    def __init__(self, folder: Path, record: RecordTable, columns: dict[str, Column], where: str) -> None:
+        self.folder, self.record, self.columns, self.where = folder, record, columns, where
+        self.faults: list[Fault] = []
+        self.tables: dict[str, Table | None] = {}
+
+    def read(self, names: gate.Names, kind: str) -> Record | None:
+        """The record before any judgement; None where drives or clock cannot be read. `valid`: the channel was read."""
+        r = self.record
+        read = {name: self._column(f"{self.where}.columns.{name!r}", column) for name, column in self.columns.items()}
+        values = {name: column for name, column in read.items() if column is not None}
+        clock = None if r.time is None else self._column(f"{self.where}.time", r.time)
+        ambient = self._ambient(r.conditions.ambient)
+        sizes = {name: len(column) for name, column in values.items()}
+        sizes |= {} if clock is None else {"time": len(clock)}
+        sizes |= {"ambient": len(ambient)} if np.ndim(ambient) else {}
+        n = min(sizes.values(), default=0)
+        if len(set(sizes.values())) > 1:
+            listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+            what = f"columns have different numbers of rows ({listed}); export them together"
+            self.faults.append(Fault(self.where, what))
+            return None
+        if r.rows and n and r.rows[1] > n:
+            what = f"{list(r.rows)} ends after the last of {n} rows of {r.file}"
+            self.faults.append(Fault(f"{self.where}.rows", what))
+        timed = kind == "poses" or clock is not None or (r.time is None and r.sample_rate is not None)
+        if not timed or any(name not in values for name in names.drives):
+            return None
+        return self._record(names, values, *self._clock(kind, clock, n), ambient)
+
+    def _clock(self, kind: str, clock: np.ndarray | None, n: int) -> tuple[np.ndarray, float]:
+        """Time of every row of the file (n,) [s] and the sample time [s], NaN where the gate must find it."""
+        r = self.record
+        begin = r.start.si if r.start else 0.0
+        if clock is not None:
+            finite = clock[np.isfinite(clock)]
+            return begin + clock - (finite[0] if len(finite) else 0.0), np.nan
+        period = r.dwell.si if r.dwell else np.inf if kind == "poses" else 1 / r.sample_rate.si
+        return begin + np.arange(n) * (1.0 if np.isinf(period) else period), period
+
+    def _record(
+        self,
+        names: gate.Names,
+        values: dict[str, np.ndarray],
+        time: np.ndarray,
+        period: float,
+        ambient: np.ndarray | float | None,
+    ) -> Record:
+        r, n = self.record, len(time)
+        chosen = slice(*(r.rows or (0, n)))
+        observed = np.full((n, len(names.observed)), np.nan)
+        for i, name in enumerate(names.observed):
+            observed[:, i] = values.get(name, np.nan)
+        return Record(
+            name=r.file + (f"[{r.rows[0]}:{r.rows[1]}]" if r.rows else ""),
+            role=r.role,
+            time=time[chosen],
+            sample_time=period,
+            drive=np.column_stack([values[name] for name in names.drives])[chosen],
+            observed=observed[chosen],
+            linear=r.between_samples == "linear",
+            ambient=None if ambient is None else (np.zeros(n) + ambient)[chosen],
+            valid=np.tile([name in values for name in names.observed], (n, 1))[chosen],
+        )
+
+    def _ambient(self, given: Any) -> np.ndarray | float | None:
+        if isinstance(given, Column):
+            return self._column(f"{self.where}.conditions.ambient", given)
+        try:
+            return None if given is None else parse(given, "degC")
+        except ValueError:  # the check of the file has said so
+            return None
+
+    def _column(self, where: str, column: Column) -> np.ndarray | None:
+        """A column in SI (n,); None, with a fault, where it cannot be read."""
+        file = column.file or self.record.file
+        try:
+            if file not in self.tables:
+                self.tables[file] = None
+                self.tables[file] = read_table(self.folder / file)
+        except InputError as error:
+            place = f"{self.where}.file" if column.file is None else f"{where}.file"
+            self.faults += [Fault(place, f"{file} {fault.what}") for fault in error.faults]
+        table = self.tables[file]
+        if table is None:
+            return None
+        try:
+            name = table.find(column.column)
+            values = table.numbers(name)
+        except InputError as error:
+            self.faults += [Fault(where, f"{file} {fault.what}") for fault in error.faults]
+            return None
+        try:
+            scale = to_si(1.0, column.unit), to_si(0.0, column.unit)
+        except ValueError:  # the check of the file has said so
+            return None
+        if _contradicts(table.units.get(name), scale, column.unit):
+            said = f"{file} says {table.units[name]}, recording.toml says {column.unit}; one of them is wrong"
+            self.faults.append(Fault(where, said))
+        return values * (scale[0] - scale[1]) + scale[1]
+
+
+def _contradicts(stated: str | None, scale: tuple[float, float], unit: str) -> bool:
+    """Whether a file's own unit is another one than the one given; a text that is no unit contradicts nothing."""
+    if stated is None:
+        return False
+    try:
+        other = to_si(1.0, stated), to_si(0.0, stated)
+        return not same_dimension(stated, unit) or not np.allclose(other, scale, rtol=1e-9, atol=0)
+    except ValueError:
+        return False

@@ -1,0 +1,182 @@
+"""recording.toml as written, and what is wrong with it before any data are read."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ctrlgen.devices.base import Section
+from ctrlgen.errors import Fault
+from ctrlgen.model import Model
+from ctrlgen.units import parse, quantity, same_dimension
+
+FILE = "recording.toml"
+
+
+class Column(Section):
+    """A column of a measurement file: its name or number from 0, its unit, the stated standard deviation of its noise.
+
+    `file` where it stands in another file than the record's, row by row the same samples.
+    """
+
+    column: str | Annotated[int, Field(strict=True, ge=0)]
+    unit: str
+    noise: str | None = None
+    file: str | None = None
+
+
+class Conditions(Section):
+    """What surrounds the device: the ambient temperature, constant or recorded."""
+
+    ambient: str | Column | None = None
+
+
+class RecordTable(Section):
+    """One [[record]] as written."""
+
+    file: str
+    role: Literal["fit", "hold_out", "rest"]
+    time: Column | None = None
+    sample_rate: quantity("Hz", positive=True) | None = None
+    dwell: quantity("s", positive=True) | None = None
+    start: quantity("s") | None = None
+    between_samples: Literal["held", "linear"] = "held"
+    rows: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
+    conditions: Conditions = Conditions()
+    columns: dict[str, Column] = {}
+
+
+class RecordingFile(Section):
+    """recording.toml as written; `columns` are every record's, which may override single ones."""
+
+    title: str
+    device: str
+    source: str = ""
+    kind: Literal["series", "poses"]
+    columns: dict[str, Column] = {}
+    record: Annotated[tuple[RecordTable, ...], Field(min_length=1)]
+
+    def columns_of(self, record: RecordTable) -> dict[str, Column]:
+        """The columns of one record by signal: its own, and the file's where it has none of its own."""
+        return {**self.columns, **record.columns}
+
+
+def deviation(text: str, unit: str) -> float:
+    """A standard deviation in SI: of a temperature, the difference. Raises ValueError."""
+    temperature = same_dimension(unit, "K")
+    value = parse(text.replace(" degC", " delta_degC") if temperature else text, "delta_degC" if temperature else unit)
+    if value < 0:
+        raise ValueError(f"{text!r} is negative")
+    return value
+
+
+def check(written: RecordingFile, model: Model) -> list[Fault]:
+    """Every fault of the file against the model: device, timing, signals, units, rows."""
+    return _Check(written, model).faults
+
+
+def fits(name: str, column: Column, model: Model) -> bool:
+    """Whether a column's name is a signal of the model and its unit of that signal's dimension."""
+    try:
+        return name in signal_units(model) and same_dimension(column.unit, signal_units(model)[name])
+    except ValueError:
+        return False
+
+
+def signal_units(model: Model) -> dict[str, str]:
+    """Every channel of the model as a recording names it, with the reader's unit: 'drive.1X': 'W'."""
+    return {
+        f"{role}.{channel}": unit
+        for role, signal in model.signals.items()
+        for channel, unit in zip(signal.channels, signal.units, strict=True)
+    }
+
+
+class _Check:
+    """Collects the faults of one file."""
+
+    def __init__(self, written: RecordingFile, model: Model) -> None:
+        self.written, self.model = written, model
+        self.faults: list[Fault] = []
+        if written.device != model.device.name:
+            what = f"{written.device!r} is not {model.device.name!r}, the device given; give the one it was made on"
+            self._fault("device", what)
+        for k, record in enumerate(written.record):
+            self._check_time(f"record[{k}]", record)
+            self._check_channels(f"record[{k}]", written.columns_of(record))
+            self._check_rows(k, record)
+
+    def _fault(self, where: str, what: str) -> None:
+        fault = Fault(where, what)
+        if fault not in self.faults:
+            self.faults.append(fault)
+
+    def _check_time(self, where: str, record: RecordTable) -> None:
+        """How the record is timed must fit the kind of recording."""
+        if self.written.kind == "series":
+            if (record.time is None) == (record.sample_rate is None):
+                what = 'give either time = { column = "...", unit = "s" } or sample_rate = "1 kHz"'
+                self._fault(f"{where}.time", what)
+            if record.dwell is not None:
+                self._fault(f"{where}.dwell", 'belongs to poses; leave it out, or write kind = "poses"')
+        elif record.time is not None or record.sample_rate is not None:
+            self._fault(
+                f"{where}.time", 'poses have no clock; leave it out and give dwell = "2 s" if they did not settle'
+            )
+        if record.time is not None:
+            self._check_unit(f"{where}.time", record.time, "s")
+        ambient = record.conditions.ambient
+        if isinstance(ambient, Column):
+            self._check_unit(f"{where}.conditions.ambient", ambient, "K")
+        elif ambient is not None:
+            try:
+                parse(ambient, "degC")
+            except ValueError as error:
+                self._fault(f"{where}.conditions.ambient", str(error))
+
+    def _check_channels(self, where: str, columns: dict[str, Column]) -> None:
+        """Every drive there, something observed, each name a signal of the model, each unit of its dimension."""
+        units = signal_units(self.model)
+        for name, column in columns.items():
+            own = "columns" if column is self.written.columns.get(name) else f"{where}.columns"
+            if name not in units:
+                near = difflib.get_close_matches(name, units, n=1)
+                hint = f"did you mean {near[0]!r}?" if near else f"its signals are {', '.join(self.model.signals)}"
+                self._fault(f"{own}.{name!r}", f"is no signal of {self.model.device.name}; {hint}")
+            else:
+                self._check_unit(f"{own}.{name!r}", column, units[name])
+        for name, unit in units.items():
+            if name.startswith("drive.") and name not in columns:
+                what = f'is missing, and the device cannot be simulated without; add "{name}" = {{ column = "...", unit = "{unit}" }}'
+                self._fault(f"{where}.columns", f"{name} {what}")
+        if all(name.startswith("drive.") for name in columns):
+            known = next((name for name in units if name.startswith("reading.")), "reading")
+            self._fault(f"{where}.columns", f'nothing is observed; add "{known}" = {{ column = "...", unit = "..." }}')
+
+    def _check_unit(self, where: str, column: Column, unit: str) -> None:
+        try:
+            if not same_dimension(column.unit, unit):
+                self._fault(
+                    where, f"unit = {column.unit!r} is the wrong dimension; {unit} or a multiple of it is needed"
+                )
+                return
+            if column.noise is not None:
+                deviation(column.noise, column.unit)
+        except ValueError as error:
+            self._fault(where, f"{error}; write for example {unit!r}")
+
+    def _check_rows(self, k: int, record: RecordTable) -> None:
+        """Rows are a stretch, and none is both fitted and held out."""
+        if record.rows and record.rows[0] >= record.rows[1]:
+            self._fault(f"record[{k}].rows", f"{list(record.rows)} is empty; write [first, one past the last]")
+        for i, other in enumerate(self.written.record[:k]):
+            a, b = record.rows or (0, 1 << 62), other.rows or (0, 1 << 62)
+            if (
+                record.file == other.file
+                and max(a[0], b[0]) < min(a[1], b[1])
+                and "rest" not in (record.role, other.role)
+            ):
+                what = f"share rows of {record.file} with record[{i}]; no sample may be fitted twice, or fitted and held out"
+                self._fault(f"record[{k}].rows", what)

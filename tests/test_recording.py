@@ -1,0 +1,532 @@
+"""Recordings: six formats read alike, every fault at once, doubtful samples marked and never filled."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT, SCENARIOS
+
+from ctrlgen import build_model, load_device
+from ctrlgen.errors import InputError
+from ctrlgen.marking import spikes, stuck
+from ctrlgen.recording import load_recordings
+from ctrlgen.recording_formats import READERS, read_table
+from ctrlgen.reproduce.s0_data import load_s0
+
+MEASURED = Path(os.environ.get("CTRLGEN_RECORDINGS", ROOT.parent / "shared" / "recordings"))
+AXES = ("1X", "1Y", "2X", "2Y", "3X", "3Y")
+N = 400
+
+
+@pytest.fixture(scope="module")
+def meso():
+    return build_model(load_device(SCENARIOS / "devices" / "meso_hexapod.toml"))
+
+
+def samples(n: int = N, seed: int = 1) -> dict[str, np.ndarray]:
+    """Columns of a healthy record in reader's units: slow heater powers [W], a noisy reading [um], a temperature [degC]."""
+    rng = np.random.default_rng(seed)
+    t = 0.001 * np.arange(n)
+    drives = {f"u{a}": 0.2 + 0.1 * np.sin(2 * np.pi * (3 + k + 0.1 * seed) * t) for k, a in enumerate(AXES)}
+    read = 2 * np.sin(2 * np.pi * 3.3 * t + seed) + 0.01 * rng.standard_normal(n)
+    tilt = 1e-4 * np.cos(2 * np.pi * 5 * t) + 1e-6 * rng.standard_normal(n)
+    return {"t": t, **drives, "x": read, "tilt": tilt, "T": 23 + 0.001 * np.arange(n)}
+
+
+def csv_text(columns: dict[str, np.ndarray]) -> str:
+    cells = [["" if math.isnan(v) else repr(float(v)) for v in column] for column in columns.values()]
+    return "\n".join([",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]) + "\n"
+
+
+COLUMNS = {
+    **{f"drive.{a}": {"column": f"u{a}", "unit": "W"} for a in AXES},
+    "reading.delta_x": {"column": "x", "unit": "um", "noise": "10 nm"},
+}
+
+
+def toml(value) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{json.dumps(k)} = {toml(v)}" for k, v in value.items()) + " }"
+    return json.dumps(value)
+
+
+def described(folder, *records: dict, columns=COLUMNS, device="mems_hexapod", kind="series"):
+    """recording.toml in `folder`; a record without time gets the column t."""
+    lines = [f'title = "test"\ndevice = "{device}"\nkind = "{kind}"\n']
+    for record in records:
+        if kind == "series" and not {"time", "sample_rate"} & set(record):
+            record = {**record, "time": {"column": "t", "unit": "s"}}
+        lines += ["[[record]]", *(f"{k} = {toml(v)}" for k, v in record.items() if v is not None)]
+    lines += ["[columns]", *(f"{json.dumps(k)} = {toml(v)}" for k, v in columns.items())]
+    (folder / "recording.toml").write_text("\n".join(lines))
+    return folder
+
+
+def two(folder, fit: dict[str, np.ndarray], **record):
+    """A recording of `fit` and a healthy held-out record."""
+    (folder / "fit.csv").write_text(csv_text(fit))
+    (folder / "held.csv").write_text(csv_text(samples(seed=2)))
+    return described(folder, {"file": "fit.csv", "role": "fit", **record}, {"file": "held.csv", "role": "hold_out"})
+
+
+def refused(*arguments) -> dict[str, str]:
+    """Where -> what of the faults; load_recordings must refuse."""
+    with pytest.raises(InputError) as raised:
+        load_recordings(*arguments)
+    return {fault.where: fault.what for fault in raised.value.faults}
+
+
+# formats
+
+
+def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:
+    if ending == ".csv":
+        path.write_text(csv_text(columns))
+    elif ending == ".json":
+        path.write_text(json.dumps({k: [None if math.isnan(x) else x for x in v] for k, v in columns.items()}))
+    elif ending == ".mat":
+        from scipy.io import savemat
+
+        savemat(path, {**{k: v[:, None] for k, v in columns.items()}, "gain": 3.0})
+    elif ending in (".h5", ".hdf5"):
+        h5py = pytest.importorskip("h5py", reason="h5py is not installed: HDF5 was not read")
+        with h5py.File(path, "w") as file:
+            for name, column in columns.items():
+                file["log/" + name] = column
+            file["log/x"].attrs["unit"] = "um"
+    elif ending == ".tdms":
+        nptdms = pytest.importorskip("nptdms", reason="npTDMS is not installed: TDMS was not read")
+        with nptdms.TdmsWriter(path) as writer:
+            writer.write_segment([nptdms.ChannelObject("log", name, column) for name, column in columns.items()])
+    else:
+        asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: MDF4 was not read")
+        with asammdf.MDF(version="4.10") as file:
+            rest = {name: column for name, column in columns.items() if name != "t"}
+            file.append([asammdf.Signal(c, columns["t"], name=n, unit="um" * (n == "x")) for n, c in rest.items()])
+            file.save(path)
+
+
+@pytest.mark.parametrize("ending", list(READERS))
+def test_every_format_gives_the_same_record(ending, tmp_path, model):
+    columns = samples()
+    write_as(ending, tmp_path / f"run{ending}", columns)
+    clock = {"column": "time" if ending == ".mf4" else "t", "unit": "s"}
+    described(tmp_path, {"file": f"run{ending}", "role": "fit", "time": clock})
+    fit, held = load_recordings([tmp_path], model).records
+    assert np.allclose(np.vstack([fit.drive, held.drive])[:, 2], columns["u2X"], rtol=1e-15)
+    assert np.allclose(np.vstack([fit.observed, held.observed])[:, 0], 1e-6 * columns["x"], rtol=1e-15)
+    assert fit.sample_time == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_a_matlab_file_of_version_7_3_is_hdf5_turned(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed: MATLAB 7.3 was not read")
+    with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as file:
+        file["log/u"] = np.arange(5.0)[None, :]
+        file["both"] = np.arange(10.0).reshape(2, 5)
+    with open(tmp_path / "run.mat", "r+b") as file:  # the header by which MATLAB tells the version
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    table = read_table(tmp_path / "run.mat")
+    assert np.array_equal(table.numbers("log.u"), np.arange(5))
+    assert np.array_equal(table.numbers("both[1]"), np.arange(5, 10))
+
+
+def test_structures_and_matrices_have_named_columns(tmp_path):
+    (tmp_path / "a.json").write_text('{"dt": 0.1, "log": {"m": [[1, 2], [3, null], [5, 6]], "text": ["a", "b"]}}')
+    table = read_table(tmp_path / "a.json")
+    assert list(table.columns) == ["log.m[0]", "log.m[1]"]
+    assert table.find("m[1]") == table.find(1) == "log.m[1]"
+    assert np.array_equal(table.numbers("log.m[1]"), [2, np.nan, 6], equal_nan=True)
+    (tmp_path / "b.json").write_text('[{"t": 0, "u": 1}, {"t": 1}]')
+    assert np.array_equal(read_table(tmp_path / "b.json").numbers("u"), [1, np.nan], equal_nan=True)
+
+
+def test_a_csv_may_lack_a_header_or_use_the_decimal_comma(tmp_path):
+    (tmp_path / "a.csv").write_text("# made by hand\n0;1,5\n1;2,5\n2;\n")
+    table = read_table(tmp_path / "a.csv")
+    assert np.array_equal(table.numbers(table.find(1)), [1.5, 2.5, np.nan], equal_nan=True)
+
+
+def test_bad_cells_are_listed_by_line(tmp_path):
+    (tmp_path / "a.csv").write_text("t,u\n0,1\n1,OVER\n2,x\n")
+    with pytest.raises(InputError, match=r"line 3 'OVER', line 4 'x'"):
+        read_table(tmp_path / "a.csv").numbers("u")
+
+
+@pytest.mark.parametrize(("ending", "package"), [(".h5", "h5py"), (".tdms", "npTDMS"), (".mf4", "asammdf")])
+def test_a_missing_package_is_named_with_its_command(ending, package, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, package.lower(), None)
+    (tmp_path / f"a{ending}").write_bytes(b"")
+    with pytest.raises(InputError, match=f"pip install {package} "):
+        read_table(tmp_path / f"a{ending}")
+
+
+@pytest.mark.parametrize("ending", list(READERS))
+def test_a_damaged_file_is_an_input_error(ending, tmp_path):
+    (tmp_path / f"a{ending}").write_bytes(b"\x00\x01 no such thing {")
+    with pytest.raises(InputError):
+        table = read_table(tmp_path / f"a{ending}")
+        table.numbers(table.find("u"))
+
+
+def test_channels_of_mdf_on_different_clocks_are_not_mixed(tmp_path):
+    asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: MDF4 was not read")
+    with asammdf.MDF(version="4.10") as file:
+        for name, start in (("u", 0.0), ("y", 0.5)):
+            file.append([asammdf.Signal(np.arange(9.0), start + np.arange(9.0), name=name)])
+        file.save(tmp_path / "a.mf4")
+    with pytest.raises(InputError, match="different times"):
+        read_table(tmp_path / "a.mf4")
+
+
+# what a record holds
+
+
+def test_units_become_si_and_the_stated_noise_too(tmp_path, model):
+    recording = load_recordings([two(tmp_path, samples())], model)
+    assert recording.channels == ("reading.delta_x",) and recording.units == ("um",)
+    assert recording.noise == (pytest.approx(1e-8),)
+    assert recording.notes == () and all(r.valid.all() for r in recording.records)
+    assert [r.role for r in recording.records] == ["fit", "hold_out"]
+
+
+def test_the_drives_stand_in_the_models_order_whatever_the_files(tmp_path, model):
+    columns = {name: COLUMNS[name] for name in reversed(COLUMNS)}
+    two(tmp_path, samples())
+    described(tmp_path, {"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}, columns=columns)
+    drive = load_recordings([tmp_path], model).records[0].drive
+    assert np.allclose(drive, np.column_stack([samples()[f"u{a}"] for a in AXES]), rtol=1e-15)
+
+
+def test_several_records_share_a_clock(tmp_path, model):
+    two(tmp_path, samples())
+    first, second = {"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}
+    described(tmp_path, {**first, "start": "10 s"}, {**second, "start": "1 min"})
+    records = load_recordings([tmp_path], model).records
+    assert [r.time[0] for r in records] == [10, 60] and records[1].time[-1] == pytest.approx(60.399)
+    described(tmp_path, {**first, "start": "10 s"}, {**second, "start": "10.2 s"})
+    assert "before fit.csv ends (10.399 s)" in refused([tmp_path], model)["record[1].start"]
+
+
+def test_rows_split_a_file_and_keep_their_time(tmp_path, model):
+    (tmp_path / "a.csv").write_text(csv_text(samples()))
+    record = {"file": "a.csv", "sample_rate": "1 kHz"}
+    described(tmp_path, {**record, "role": "fit", "rows": [0, 250]}, {**record, "role": "hold_out", "rows": [250, 400]})
+    fit, held = load_recordings([tmp_path], model).records
+    assert (fit.name, held.name) == ("a.csv[0:250]", "a.csv[250:400]")
+    assert len(fit.time) == 250 and held.time[0] == pytest.approx(0.25)
+    assert np.allclose(held.observed[:, 0], 1e-6 * samples()["x"][250:], rtol=1e-15)
+
+
+@pytest.mark.parametrize("conditions", [{"ambient": "23.5 degC"}, {"ambient": {"column": "T", "unit": "degC"}}])
+def test_the_ambient_temperature_is_a_constant_or_a_column(conditions, tmp_path, model):
+    record = load_recordings([two(tmp_path, samples(), conditions=conditions)], model).records[0]
+    constant = isinstance(conditions["ambient"], str)
+    wanted = np.full(N, 296.65) if constant else 273.15 + samples()["T"]
+    assert np.allclose(record.ambient, wanted, rtol=1e-12)
+
+
+def test_the_drive_is_held_unless_it_is_said_to_be_linear(tmp_path, model):
+    fit, held = load_recordings([two(tmp_path, samples(), between_samples="linear")], model).records
+    assert fit.linear and not held.linear
+
+
+def test_two_recordings_are_joined_channel_by_channel(tmp_path, model):
+    a, b = tmp_path / "a", tmp_path / "b"
+    a.mkdir(), b.mkdir()
+    two(a, samples())
+    (b / "c.csv").write_text(csv_text(samples(seed=3)))
+    tilt = {**COLUMNS, "reading.theta_y": {"column": "tilt", "unit": "rad"}}
+    described(b, {"file": "c.csv", "role": "fit"}, columns=tilt)
+    recording = load_recordings([a, b], model)
+    assert recording.channels == ("reading.delta_x", "reading.theta_y") and recording.noise[1] is None
+    assert [r.valid[:, 1].all() for r in recording.records] == [False, False, True]
+    assert np.isnan(recording.records[0].observed[:, 1]).all()
+    assert any("given twice" in what for what in refused([a, a], model).values())
+
+
+# refusals
+
+
+def test_all_faults_of_a_file_are_listed_at_once(tmp_path, model):
+    drive = samples()
+    drive["t"][50] = drive["t"][48]
+    drive["u3X"][7] = 1.2
+    two(tmp_path, drive)
+    columns = {
+        **COLUMNS,
+        "reading.delta_x": {"column": "x", "unit": "V"},
+        "reading.detla_y": {"column": "x", "unit": "um"},
+    }
+    columns["reading.delta_z"] = {"column": "z", "unit": "um"}
+    described(
+        tmp_path, {"file": "fit.csv", "role": "fit"}, {"file": "none.csv", "role": "hold_out"},
+        columns=columns, device="other",
+    )  # fmt: skip
+    found = refused([tmp_path], model)
+    assert "'other' is not 'mems_hexapod'" in found["device"]
+    assert "wrong dimension; um" in found["columns.'reading.delta_x'"]
+    assert "did you mean 'reading.delta_y'" in found["columns.'reading.detla_y'"]
+    assert "does not rise from row 49" in found["record[0].time"]
+    assert "1.2 W at" in found["record[0].columns.'drive.3X'"]
+    assert "has no column 'z'" in found["record[0].columns.'reading.delta_z'"]
+    assert "does not exist" in found["record[1].file"]
+
+
+def test_faults_of_the_data_are_listed_at_once_for_all_records(tmp_path, model):
+    fit, held = samples(), samples(seed=2)
+    fit["u3X"][7] = 1.2
+    held["t"][50] = held["t"][48]
+    fit["u1Y"][:] = np.nan
+    two(tmp_path, fit)
+    (tmp_path / "held.csv").write_text(csv_text(held))
+    found = refused([tmp_path], model)
+    assert "1.2 W at 0.007 s, the device allows 0 W to 1 W (1 of 400" in found["record[0].columns.'drive.3X'"]
+    assert "no number at all" in found["record[0].columns.'drive.1Y'"]
+    assert "does not rise from row 49 (0.049 s)" in found["record[1].time"]
+
+
+def test_rounding_at_a_limit_is_no_excess(tmp_path, model):
+    drive = samples()
+    drive["u3X"][7] = 1 + 5e-7
+    load_recordings([two(tmp_path, drive)], model)
+    drive["u3X"][7] = 1 + 5e-6
+    assert "record[0].columns.'drive.3X'" in refused([two(tmp_path, drive)], model)
+
+
+def test_a_missing_drive_is_refused_with_the_line_to_add(tmp_path, model):
+    two(tmp_path, samples())
+    columns = {name: column for name, column in COLUMNS.items() if name != "drive.2Y"}
+    described(tmp_path, {"file": "fit.csv", "role": "fit"}, columns=columns)
+    assert '"drive.2Y" = { column' in refused([tmp_path], model)["record[0].columns"]
+
+
+def test_a_unit_that_the_file_itself_contradicts_is_refused(tmp_path, model):
+    (tmp_path / "fit.csv").write_text(csv_text(samples()).replace(",x,", ",x [nm],", 1))
+    described(tmp_path, {"file": "fit.csv", "role": "fit"})
+    assert "says nm, recording.toml says um" in refused([tmp_path], model)["record[0].columns.'reading.delta_x'"]
+
+
+def test_uneven_sampling_is_refused_and_a_little_jitter_noted(tmp_path, model, rng):
+    fit = samples()
+    fit["t"] = fit["t"] + 1e-3 * 0.003 * rng.standard_normal(N)
+    assert "jitter by 0." in load_recordings([two(tmp_path, fit)], model).notes[0]
+    fit["t"] = fit["t"] + 1e-3 * 0.03 * rng.standard_normal(N)
+    assert "resample to an even grid" in refused([two(tmp_path, fit)], model)["record[0].time"]
+
+
+def test_held_out_data_must_not_be_the_fitted(tmp_path, model):
+    two(tmp_path, samples())
+    (tmp_path / "held.csv").write_text(csv_text({k: v[100:300] for k, v in samples().items()}))
+    assert "holds the data of fit.csv" in refused([tmp_path], model)["record[1]"]
+    record = {"file": "fit.csv"}
+    described(tmp_path, {**record, "role": "fit", "rows": [0, 300]}, {**record, "role": "hold_out", "rows": [290, 400]})
+    assert "share rows of fit.csv" in refused([tmp_path], model)["record[1].rows"]
+
+
+def test_a_record_in_which_nothing_happens_is_refused(tmp_path, model):
+    still = samples()
+    for name in still.keys() - {"t", "T"}:
+        still[name][:] = 0.1
+    assert "nothing can be learnt" in refused([two(tmp_path, still)], model)["record[0]"]
+
+
+def test_rest_is_the_drive_at_rest(tmp_path, model):
+    two(tmp_path, samples())
+    records = [{"file": "fit.csv", "role": "rest"}, {"file": "held.csv", "role": "fit"}]
+    described(tmp_path, *records)
+    assert "called rest, but drive." in refused([tmp_path], model)["record[0].role"]
+    rest = {**samples(), **{f"u{a}": np.full(N, 0.2) for a in AXES}}
+    (tmp_path / "fit.csv").write_text(csv_text(rest))
+    assert [r.role for r in load_recordings([tmp_path], model).records] == ["rest", "fit", "hold_out"]
+
+
+def test_a_series_needs_one_clock_and_poses_none(tmp_path, model):
+    two(tmp_path, samples())
+    clock = {"time": {"column": "t", "unit": "s"}, "sample_rate": "1 kHz"}
+    described(tmp_path, {"file": "fit.csv", "role": "fit", **clock})
+    assert "give either" in refused([tmp_path], model)["record[0].time"]
+    described(tmp_path, {"file": "fit.csv", "role": "fit", **clock}, kind="poses")
+    assert "poses have no clock" in refused([tmp_path], model)["record[0].time"]
+
+
+# what is marked
+
+
+def test_missing_samples_are_marked_and_not_filled(tmp_path, model):
+    fit = samples()
+    fit["x"][[5, 90]] = np.nan
+    recording = load_recordings([two(tmp_path, fit)], model)
+    record = recording.records[0]
+    assert np.array_equal(np.flatnonzero(~record.valid[:, 0]), [5, 90]) and np.isnan(record.observed[[5, 90], 0]).all()
+    assert recording.notes == ("fit.csv, reading.delta_x: 2 of 400 samples are missing (first at 0.005 s); not used.",)
+
+
+def test_a_gap_cuts_a_record_where_the_drive_is_not_known(tmp_path, model):
+    kept = np.r_[0:150, 200:N]
+    recording = load_recordings([two(tmp_path, {k: v[kept] for k, v in samples().items()})], model)
+    first, second = recording.records[:2]
+    assert len(first.time) == 150 and len(second.time) == 200 and second.time[0] == pytest.approx(0.2)
+    assert first.valid.all() and second.valid.all() and "cut before 0.2 s" in recording.notes[0]
+    lost = samples()
+    lost["u2X"][150:200] = np.nan
+    again = load_recordings([two(tmp_path, lost)], model).records[:2]
+    assert [len(r.time) for r in again] == [150, 200] and np.array_equal(again[1].drive, second.drive)
+
+
+def test_rows_without_a_drive_at_the_end_are_left_out_with_a_note(tmp_path, model):
+    fit = samples()
+    fit["u2X"][390:] = np.nan
+    recording = load_recordings([two(tmp_path, fit)], model)
+    assert len(recording.records[0].time) == 390 and "missing in 10 samples" in recording.notes[0]
+
+
+def test_a_gap_while_the_drive_rests_is_marked(tmp_path, model):
+    fit = samples()
+    for axis in AXES:
+        fit[f"u{axis}"][140:210] = 0.2
+    kept = np.r_[0:150, 200:N]
+    recording = load_recordings([two(tmp_path, {k: v[kept] for k, v in fit.items()})], model)
+    record = recording.records[0]
+    assert len(record.time) == N and np.allclose(record.time, fit["t"], atol=1e-9)
+    assert np.array_equal(np.flatnonzero(~record.valid[:, 0]), np.arange(150, 200))
+    assert "50 samples are missing after 0.149 s" in recording.notes[0]
+
+
+def test_spikes_are_marked(tmp_path, model):
+    fit = samples()
+    fit["x"][100] += 0.3
+    fit["x"][200:203] -= 0.3
+    recording = load_recordings([two(tmp_path, fit)], model)
+    assert np.array_equal(np.flatnonzero(~recording.records[0].valid[:, 0]), [100, 200, 201, 202])
+    assert "4 of 400 samples are spikes" in recording.notes[0]
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize("shape", ["steps", "pulse", "ringing", "staircase"])
+def test_motion_of_the_device_is_no_spike(shape, noise, rng):
+    n = 4000
+    u = np.repeat(rng.uniform(-1, 1, n // 200), 200)
+    if shape == "pulse":
+        u = (np.arange(n) % 400 < 2).astype(float)
+    y = np.zeros(n)
+    pole = {"steps": 0.3, "pulse": 0.3, "ringing": 0.97 * np.exp(0.9j), "staircase": 0.0}[shape]
+    state = 0j
+    for k in range(n):
+        state = pole * state + (1 - pole) * u[k - (k > 0)]
+        y[k] = state.real
+    assert not spikes(y + noise * rng.standard_normal(n), u[:, None]).any()
+
+
+def test_coloured_noise_has_no_spikes(rng):
+    from scipy.signal import lfilter
+
+    drive = np.sin(0.01 * np.arange(20_000))[:, None]
+    for denominator in ([1.0], [1, -0.95], [1, -1.9, 0.9025]):
+        assert not spikes(lfilter([1], denominator, rng.standard_normal(20_000)), drive).any()
+
+
+def test_clipped_and_frozen_stretches_are_marked(tmp_path, model):
+    fit = samples()
+    fit["x"] = np.minimum(fit["x"], 1.5)
+    clipped = fit["x"] == 1.5
+    fit["x"][10:40] = fit["x"][10]
+    recording = load_recordings([two(tmp_path, fit)], model)
+    bad = ~recording.records[0].valid[:, 0]
+    assert bad[10:40].all() and bad[clipped].mean() > 0.9 and not bad[~clipped & (np.arange(N) >= 40)].any()
+    assert "stuck or clipped" in recording.notes[0]
+
+
+def test_a_coarse_sensor_at_rest_is_not_stuck():
+    drive = np.clip(np.sin(0.01 * np.arange(4000)), -0.5, 0.5)
+    reading = np.round(drive * 200 + 0.1 * np.random.default_rng(0).standard_normal(4000))
+    assert not stuck(reading, drive[:, None]).any()
+
+
+def test_a_dead_channel_is_kept_and_named(tmp_path, model):
+    dead = samples()
+    dead["tilt"][:] = 2e-4
+    two(tmp_path, dead)
+    columns = {**COLUMNS, "reading.theta_y": {"column": "tilt", "unit": "rad"}}
+    described(tmp_path, {"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}, columns=columns)
+    recording = load_recordings([tmp_path], model)
+    assert recording.notes == ("fit.csv, reading.theta_y: reads 0.0002 rad throughout; a dead channel? Kept.",)
+    assert recording.records[0].valid.all()
+
+
+# holding out
+
+
+def test_the_end_of_a_series_is_held_out_where_nothing_else_is(tmp_path, model):
+    (tmp_path / "a.csv").write_text(csv_text(samples()))
+    recording = load_recordings([described(tmp_path, {"file": "a.csv", "role": "fit"})], model)
+    fit, held = recording.records
+    assert (len(fit.time), len(held.time)) == (280, 120) and held.time[0] == pytest.approx(0.28)
+    assert fit.valid.all() and held.valid.all() and "its last 120 of 400 samples" in recording.notes[-1]
+
+
+def test_what_is_too_short_to_divide_is_refused(tmp_path, model):
+    (tmp_path / "a.csv").write_text(csv_text(samples(199)))
+    described(tmp_path, {"file": "a.csv", "role": "fit"})
+    assert "too short to divide (199 rows, 200 are needed)" in refused([tmp_path], model)["record"]
+    (tmp_path / "a.csv").write_text(csv_text(samples(200)))
+    assert len(load_recordings([tmp_path], model).records) == 2
+
+
+def poses(folder, n: int, **record):
+    rng = np.random.default_rng(4)
+    names = ("1x", "2x", "2y", "3x", "3y", "1y")
+    columns = {name: rng.uniform(-100, 100, n) for name in names} | {"z": rng.standard_normal(n)}
+    (folder / "p.csv").write_text(csv_text(columns))
+    known = {f"drive.{name}": {"column": name, "unit": "um"} for name in names}
+    known["reading.delta_z"] = {"column": "z", "unit": "um"}
+    described(
+        folder, {"file": "p.csv", "role": "fit", **record}, columns=known, device="meso_hexapod", kind="poses"
+    )  # fmt: skip
+    return folder
+
+
+def test_every_third_pose_is_held_out_in_its_place(tmp_path, meso):
+    recording = load_recordings([poses(tmp_path, 14)], meso)
+    fit, held = recording.records
+    assert np.array_equal(np.flatnonzero(held.valid[:, 0]), [2, 5, 8, 11]) and np.array_equal(fit.valid, ~held.valid)
+    assert np.isnan(fit.observed[2, 0]) and np.array_equal(fit.drive, held.drive)
+    assert math.isinf(fit.sample_time) and np.array_equal(fit.time, np.arange(14))
+    assert "too short to divide" in refused([poses(tmp_path, 11)], meso)["record"]
+
+
+def test_poses_with_a_dwell_have_a_clock(tmp_path, meso):
+    record = load_recordings([poses(tmp_path, 12, dwell="2 s", start="1 s")], meso).records[0]
+    assert record.sample_time == 2 and np.array_equal(record.time, 1 + 2.0 * np.arange(12))
+
+
+# real data
+
+
+def test_the_poses_of_nist_are_a_recording(meso):
+    recording = load_recordings([SCENARIOS / "nist_hexapod"], meso)
+    device, s0 = load_s0()
+    fit, held = recording.records
+    single = (s0.commanded != 0).sum(1) == 1
+    assert single[:24].all() and not single[24:].any() and (len(fit.time), len(held.time)) == (24, 30)
+    travels = np.vstack([fit.drive, held.drive])
+    assert np.allclose(travels, s0.inputs, rtol=0, atol=1e-12)  # a picometre: travels.csv has ten digits
+    assert np.allclose(np.vstack([fit.observed, held.observed]), s0.measured, rtol=1e-12, atol=0)
+    assert device.name == recording.device and not recording.notes
+
+
+@pytest.mark.parametrize(
+    "name", ["emps/DATA_EMPS.mat", "friction_damper/ds2_1Hz_36lb_1in.json", "rotary_axis/run_a.csv"]
+)
+def test_real_files_are_read_and_nothing_in_them_is_marked(name):
+    path = MEASURED / name
+    if not path.exists():
+        pytest.skip(f"{path} is not there: the real recording was not read")
+    drive, read = {".mat": ("vir", "qm"), ".json": (1, 2), ".csv": ("commanded_deg", "measured_deg")}[path.suffix]
+    table = read_table(path)
+    u, y = (table.numbers(table.find(column)) for column in (drive, read))
+    assert len(u) > 3000 and not spikes(y, u[:, None]).any() and not stuck(y, u[:, None]).any()
