@@ -240,7 +240,9 @@ def movable(device: Device) -> tuple[str, ...]:
     paths = [path for path, number in device.quantities() if not number.whole]
     symbols = {path: ca.SX.sym(path) for path in paths}
     p = device.values(symbols)
-    parts = Chain(device, device.links(p), p, ca.SX(0), 1.0).parts(ca.vertcat(*symbols.values()), np.array([dict(device.quantities())[k].si for k in paths]))
+    parts = Chain(device, device.links(p), p, ca.SX(0), 1.0).parts(
+        ca.vertcat(*symbols.values()), np.array([dict(device.quantities())[k].si for k in paths])
+    )
     model = Model(**parts)
     return tuple(path for path in paths if path in model.moved_by)
 

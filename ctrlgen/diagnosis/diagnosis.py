@@ -98,9 +98,7 @@ def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, Chann
         scale = from_si(1.0, unit) - from_si(0.0, unit) if to_si(0.0, unit) else from_si(1.0, unit)
         rms = []
         for trial in (search.nominal, search.chosen):
-            squares = [
-                ((r.observed - fitter.predicted(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held
-            ]
+            squares = [((r.observed - fitter.predicted(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held]
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         found[channel] = ChannelError(rms[0], rms[1], float(floor[i] * scale) if known[i] else None, unit)
     return found
@@ -121,7 +119,10 @@ def findings(search: Search) -> tuple[Finding, ...]:
                 low, high = fit.theta[i] - CI * sd[i], fit.theta[i] + CI * sd[i]
                 parameters[name] = Estimate(
                     float(from_si(fit.theta[i], unknown.unit)),
-                    (float(from_si(max(low, unknown.low), unknown.unit)), float(from_si(min(high, unknown.high), unknown.unit))),
+                    (
+                        float(from_si(max(low, unknown.low), unknown.unit)),
+                        float(from_si(min(high, unknown.high), unknown.unit)),
+                    ),
                     unknown.unit,
                 )
         rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)

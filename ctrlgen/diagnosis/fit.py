@@ -54,7 +54,11 @@ class Fit:
         found = {}
         for unknown, value in zip(self.structure.unknowns, self.theta, strict=True):
             if unknown.cause == cause:
-                found["value" if unknown.path[-1] != "." and "effect[" not in unknown.path else unknown.path.rpartition(".")[2]] = float(value)
+                found[
+                    "value"
+                    if unknown.path[-1] != "." and "effect[" not in unknown.path
+                    else unknown.path.rpartition(".")[2]
+                ] = float(value)
         return found
 
 
@@ -71,7 +75,9 @@ class Fitter:
         """The optimum from `theta`, or from the structure's own start."""
         problem = _Problem(self, structure)
         low, high = problem.bounds
-        begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)]) / problem.scale
+        begin = (
+            np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)]) / problem.scale
+        )
         begin = np.clip(begin, low + 1e-12 * (high - low), high - 1e-12 * (high - low))
         if len(begin):
             found = least_squares(
@@ -81,6 +87,21 @@ class Fitter:
         else:
             found = begin
         return problem.result(found * problem.scale)
+
+    def learn_noise(self, fit: Fit) -> None:
+        """Where nothing but the misfit tells the noise: what `fit` leaves over, alike for all channels of one unit."""
+        channels = self.recording.channels
+        squares, count = np.zeros(len(channels)), np.zeros(len(channels))
+        for record in self.to_fit:
+            y = self.predicted(fit, record)
+            squares += np.sum(np.where(record.valid, record.observed - y, 0.0) ** 2, axis=0)
+            count += record.valid.sum(axis=0)
+        sd = self.noise.sd.copy()
+        used = len(fit.theta) / max(count.sum(), 1.0)
+        for i in np.flatnonzero(~self.noise.known):
+            alike = [k for k in range(len(channels)) if self.recording.units[k] == self.recording.units[i]]
+            sd[i] = np.sqrt(squares[alike].sum() / (count[alike].sum() * (1 - used)))
+        self.noise = Noise(sd, self.noise.ar, self.noise.known, self.noise.said)
 
     def predicted(self, fit: Fit, record: Record) -> np.ndarray:
         """Readings (n, n_y) of a fitted structure on any record, started as the record itself says best."""
@@ -92,7 +113,7 @@ class Fitter:
         for _ in range(2):  # readings are close to linear in what a record starts with
             y, slopes = response.sensitivities(record, fit.theta, start)
             white = self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
-            J = self.noise.whiten(slopes[:, :, len(fit.theta) :], record.valid).reshape(len(white), -1) * sizes
+            J = self.noise.whiten(slopes[:, :, len(fit.theta) :], record.valid).reshape(len(white), len(start)) * sizes
             with_prior = np.vstack([J, np.eye(len(start))])
             step = np.linalg.lstsq(with_prior, np.concatenate([white, -start / sizes]), rcond=None)[0]
             start = start + step * sizes
@@ -133,8 +154,12 @@ class _Problem:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        low = np.concatenate([[u.low for u in self.structure.unknowns], np.full(self.n_starts, -1e3) * self.scale[self.k :]])
-        high = np.concatenate([[u.high for u in self.structure.unknowns], np.full(self.n_starts, 1e3) * self.scale[self.k :]])
+        low = np.concatenate(
+            [[u.low for u in self.structure.unknowns], np.full(self.n_starts, -1e3) * self.scale[self.k :]]
+        )
+        high = np.concatenate(
+            [[u.high for u in self.structure.unknowns], np.full(self.n_starts, 1e3) * self.scale[self.k :]]
+        )
         return low / self.scale, high / self.scale
 
     def _evaluate(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -149,7 +174,7 @@ class _Problem:
             y, Y = response.sensitivities(record, values[:k], values[own])
             white = noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
             J = np.zeros((len(white), len(scaled)))
-            W = noise.whiten(Y, record.valid).reshape(len(white), -1)
+            W = noise.whiten(Y, record.valid).reshape(len(white), Y.shape[2])
             J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
             rows.append(white)
             slopes.append(J * self.scale)
@@ -161,7 +186,11 @@ class _Problem:
             P[row, i] = self.scale[i] / u.sd
         slopes += [P, np.eye(len(scaled))[k:]]
         rows.append(scaled[k:])
-        self.at = (scaled.copy(), _finite(np.concatenate(rows)), np.nan_to_num(np.vstack(slopes), posinf=0.0, neginf=0.0))
+        self.at = (
+            scaled.copy(),
+            _finite(np.concatenate(rows)),
+            np.nan_to_num(np.vstack(slopes), posinf=0.0, neginf=0.0),
+        )
         return self.at
 
     def residual(self, scaled: np.ndarray) -> np.ndarray:

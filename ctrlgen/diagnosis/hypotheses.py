@@ -41,7 +41,9 @@ class Hypothesis:
         return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
 
 
-def hypotheses(device: Device, links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool) -> list[Hypothesis]:
+def hypotheses(
+    device: Device, links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+) -> list[Hypothesis]:
     """All that can act on `device` and be seen in the channels `observed`."""
     found = [h for law in Effect.library.values() for h in _of_law(law, links, observed, sample_time, ambient)]
     return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
@@ -107,5 +109,3 @@ def written(si: float, unit: str, source: str | None = None) -> Quantity:
     """A number found, as a device file would state it."""
     shown = f"{from_si(si, unit):.9g} {'' if unit == '1' else unit}".strip()
     return Quantity(si, shown, source)
-
-

@@ -32,9 +32,10 @@ class Noise:
         """`values` (n, n_y, ...) filtered to unit white noise; zero where a sample or one that it leans on is not `valid`."""
         white = np.zeros_like(values)
         for i, (sd, a) in enumerate(zip(self.sd, self.ar, strict=True)):
-            taps = np.concatenate([[1.0], -a])
             clean = np.where(valid[:, i].reshape(-1, *(1,) * (values.ndim - 2)), values[:, i], 0.0)
-            white[:, i] = lfilter(taps, [1.0], clean, axis=0) / sd
+            white[:, i] = clean / sd
+            for lag, coefficient in enumerate(a, 1):
+                white[lag:, i] -= coefficient / sd * clean[:-lag]
             white[~self.usable(valid)[:, i], i] = 0.0
         return white
 
@@ -88,7 +89,12 @@ def _channel(recording: Recording, i: int) -> tuple[float, np.ndarray, bool, str
         return stated, np.zeros(0), True, f"{name}: as stated, taken as white"
     parts = [np.diff(_valid(r.observed[:, i], r.valid[:, i]), 3) for r in recording.records]
     sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), 1e-300)  # 1 + 9 + 9 + 1: variance of third differences
-    return sd, np.zeros(0), True, f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
+    return (
+        sd,
+        np.zeros(0),
+        True,
+        f"{name}: from the fastest part of the readings, taken as white; record some rest to know it",
+    )
 
 
 def _valid(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
@@ -109,7 +115,9 @@ def period(drive: np.ndarray) -> int | None:
     for lag in matches[matches >= 50]:
         if 2 * lag > n:
             return None
-        if np.all(np.abs(drive[lag : lag + 32] - first) <= 1e-9 * span) and np.all(np.abs(drive[lag:] - drive[:-lag]) <= 1e-9 * span):
+        if np.all(np.abs(drive[lag : lag + 32] - first) <= 1e-9 * span) and np.all(
+            np.abs(drive[lag:] - drive[:-lag]) <= 1e-9 * span
+        ):
             return int(lag)
     return None
 

@@ -95,7 +95,10 @@ class Response:
         """Readings (n, n_y), SI; `start` is added to what a record may start with."""
         constants, sample = self._kernel
         c = constants(p)[0]
-        S, u, u_1, e = (ca.MX.sym(k, n) for k, n in (("S", self.n_s), ("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1)))
+        S, u, u_1, e = (
+            ca.MX.sym(k, n)
+            for k, n in (("S", self.n_s), ("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1))
+        )
         following, y = sample(S, u, u_1, e, c)[:2]
         one = ca.Function("one", [S, u, u_1, e], [following, y])
         values = one.mapaccum(len(record.time))(self._start(record, p, start), *self._inputs(record))
@@ -110,7 +113,9 @@ class Response:
         k, n_i, n_y = len(self.free), len(self.initial), len(self.channels)
         seed = ca.horzcat(by_p, ca.DM(by_p.shape[0], n_i))
         S, D = ca.MX.sym("S", self.n_s), ca.MX.sym("D", self.n_s, k + n_i)
-        u, u_1, e = (ca.MX.sym(name, n) for name, n in (("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1)))
+        u, u_1, e = (
+            ca.MX.sym(name, n) for name, n in (("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1))
+        )
         following, y, F_S, F_c, H_S, H_c = sample(S, u, u_1, e, c)
         D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
         one = ca.Function(
@@ -120,7 +125,7 @@ class Response:
         D_0[list(self.initial), k + np.arange(n_i)] = 1.0
         begin = np.concatenate([self._start(record, p, start), D_0.ravel(order="F")])
         values = one.mapaccum(len(record.time))(begin, *self._inputs(record))[1].full()
-        slopes = values[n_y:].reshape(k + n_i, n_y, -1)
+        slopes = values[n_y:].reshape(k + n_i, n_y, values.shape[1])
         return values[:n_y].T, np.moveaxis(slopes, 2, 0).transpose(0, 2, 1)
 
     def _start(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:

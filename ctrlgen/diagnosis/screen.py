@@ -121,7 +121,10 @@ class Screen:
                 best[h] = int(j)
         order = sorted(best.values(), key=lambda j: -abs(z[j]))
         suspects = tuple(self._suspect(columns[j], z[j], score[j] / own[j], left[j], j) for j in order)
-        sds = {(columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j])) for j in order}
+        sds = {
+            (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
+            for j in order
+        }
         return Screened(suspects, cosine, self._threshold(cosine[np.ix_(seen, seen)]), sds)
 
     def _suspect(self, column: _Column, z: float, amplitude: float, left: float, j: int) -> Suspect:
@@ -149,7 +152,14 @@ class _Sums:
         self.JJ = self.JS = self.Jr = self.Sr = self.SS = self.norm2 = None
 
     def add(self, J: np.ndarray, S: np.ndarray, r: np.ndarray) -> None:
-        parts = {"JJ": J.T @ J, "JS": J.T @ S, "Jr": J.T @ r, "Sr": S.T @ r, "SS": S.T @ S, "norm2": np.einsum("ij,ij->j", S, S)}
+        parts = {
+            "JJ": J.T @ J,
+            "JS": J.T @ S,
+            "Jr": J.T @ r,
+            "Sr": S.T @ r,
+            "SS": S.T @ S,
+            "norm2": np.einsum("ij,ij->j", S, S),
+        }
         for name, value in parts.items():
             old = getattr(self, name)
             setattr(self, name, value if old is None else old + value)
@@ -211,7 +221,9 @@ class _Slopes:
                     terms.append(term * size)
                     states += list(m_states.values())
                     rates += [ca.substitute(ca.SX(change[state.name]), a, off) for state in law.states]
-                    stepped += [ca.substitute(ca.SX(new[state.name]), a, off) if state.stepped else None for state in law.states]
+                    stepped += [
+                        ca.substitute(ca.SX(new[state.name]), a, off) if state.stepped else None for state in law.states
+                    ]
                     clocks += [state.clock for state in law.states]
                 columns.append(_Column(h, shape, tuple(self.probe_index[law.place, i] for i in at), size, side))
         return columns, SimpleNamespace(terms=terms, states=states, rates=rates, stepped=stepped, clocks=clocks)
@@ -221,7 +233,9 @@ class _Slopes:
         r, record = self.response, self.record
         constants, sample = r._kernel
         c = constants(self.p)[0]
-        S, u, u_1, e = (ca.MX.sym(k, n) for k, n in (("S", r.n_s), ("u", r.model.u.numel()), ("u1", r.model.u.numel()), ("e", 1)))
+        S, u, u_1, e = (
+            ca.MX.sym(k, n) for k, n in (("S", r.n_s), ("u", r.model.u.numel()), ("u1", r.model.u.numel()), ("e", 1))
+        )
         following, y = sample(S, u, u_1, e, c)[:2]
         one = ca.Function("one", [S, u, u_1, e], [following, y])
         begin = r._start(record, self.p, start)
@@ -283,9 +297,13 @@ class _Slopes:
         u, u_1, e = r._inputs(record)
         for a in range(0, n, BLOCK):
             b = min(a + BLOCK, n)
-            block = linear.map(b - a)(before[a:b].T, u[:, a:b], u_1[:, a:b], e[:, a:b], np.tile(self.p[:, None], (1, b - a)))
+            block = linear.map(b - a)(
+                before[a:b].T, u[:, a:b], u_1[:, a:b], e[:, a:b], np.tile(self.p[:, None], (1, b - a))
+            )
             F_S, F_p, H_S, H_p = (_stacked(x, b - a) for x in block)
-            following = np.vstack([terms[a + 1 : b + 1], terms[-1:]])[: b - a] if np.isfinite(r.sample_time) else terms[a:b]
+            following = (
+                np.vstack([terms[a + 1 : b + 1], terms[-1:]])[: b - a] if np.isfinite(r.sample_time) else terms[a:b]
+            )
             Y, D = self._propagate(F_S, F_p, H_S, H_p, terms[a:b], following, D)
             joined = np.concatenate([tail, Y])
             valid = np.vstack([np.ones((len(tail), n_y), bool), np.ones((b - a, n_y), bool)])
@@ -299,12 +317,21 @@ class _Slopes:
         """(S, u, u+, e, p) -> F_S, F_p, H_S, H_p for the columns' probes and numbers."""
         constants, sample = self.response._kernel
         r = self.response
-        args = [ca.MX.sym(k, n) for k, n in (("S", r.n_s), ("u", r.model.u.numel()), ("u1", r.model.u.numel()), ("e", 1), ("p", len(r.free)))]
+        args = [
+            ca.MX.sym(k, n)
+            for k, n in (
+                ("S", r.n_s),
+                ("u", r.model.u.numel()),
+                ("u1", r.model.u.numel()),
+                ("e", 1),
+                ("p", len(r.free)),
+            )
+        ]
         c, by_p = constants(args[4])
         _, _, F_S, F_c, H_S, H_c = sample(*args[:4], c)
         return ca.Function("linearised", args, [ca.densify(x) for x in (F_S, F_c @ by_p, H_S, H_c @ by_p)])
 
-    def _propagate(self, F_S, F_p, H_S, H_p, terms, following, D):  # noqa: ANN001, ANN202
+    def _propagate(self, F_S, F_p, H_S, H_p, terms, following, D):
         """Slopes of the readings (n, n_y, columns) over one block, and D after it."""
         n = len(terms)
         inject_x = np.zeros((n, F_S.shape[1], len(self.columns)))
@@ -331,5 +358,3 @@ def _stacked(flat: ca.DM, n: int) -> np.ndarray:
     """(rows, n * columns) as CasADi's map gives it -> (n, rows, columns)."""
     dense = flat.full()
     return dense.reshape(dense.shape[0], n, -1).transpose(1, 0, 2)
-
-

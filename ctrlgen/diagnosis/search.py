@@ -64,7 +64,13 @@ class Searcher:
         self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
         self.known: dict[tuple, Trial] = {}
 
-    def trial(self, structure: Structure, cause: Hypothesis | None = None, steps: int = TRIAL_STEPS, theta: np.ndarray | None = None) -> Trial:
+    def trial(
+        self,
+        structure: Structure,
+        cause: Hypothesis | None = None,
+        steps: int = TRIAL_STEPS,
+        theta: np.ndarray | None = None,
+    ) -> Trial:
         """Fits one structure and judges it on the held-out records."""
         fit = self.fitter.fit(structure, theta, steps)
         held, _ = self.fitter.held_out(fit)
@@ -73,7 +79,7 @@ class Searcher:
 
     def run(self, structure: Structure) -> Search:
         """Forward rounds until nothing more is justified, with swaps in between; then the rivals of each cause."""
-        nominal = current = self.trial(structure, steps=40)
+        current = self._measured(self.trial(structure, steps=40))
         rounds: list[Round] = []
         while True:
             self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
@@ -86,9 +92,17 @@ class Searcher:
             if not better:
                 break
             current = better[0]
-            current = self._prune(self._swap(current))
+            current = self._measured(self._prune(self._swap(current)))
+        nominal = self.trial(structure, steps=40)
         rivals = tuple(self._rivals(current, k) for k in range(len(current.fit.structure.causes)))
         return Search(nominal, current, rivals, tuple(rounds), screened, self.fitter.held_out(current.fit)[1])
+
+    def _measured(self, trial: Trial) -> Trial:
+        """The same structure under the noise that it leaves, where nothing else tells the noise."""
+        if self.fitter.noise.known.all():
+            return trial
+        self.fitter.learn_noise(trial.fit)
+        return self.trial(_cooled(trial.fit))
 
     def _need(self, screened: Screened) -> float:
         """The z^2 that a cause must show."""
@@ -101,7 +115,7 @@ class Searcher:
         chosen: list[Suspect] = []
         for s in loud:
             same = sum(c.hypothesis.effect == s.hypothesis.effect for c in chosen)
-            if s.z**2 >= CLOSE * loud[0].z**2 and same < 2 and len(chosen) < TRIALS:
+            if s.z**2 >= CLOSE * loud[0].z ** 2 and same < 2 and len(chosen) < TRIALS:
                 chosen.append(s)
         return chosen
 

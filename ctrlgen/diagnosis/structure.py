@@ -5,7 +5,6 @@ The nominal device is nested in every structure: an effect at its `off`, a numbe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -91,16 +90,40 @@ class Structure:
                 q = sections[cause.path][1]
                 span = max(abs(q.si), 1e-3) * 0.9 if _unit(q.text) not in ("deg", "rad") else 0.5
                 rows.append(
-                    Unknown(cause.path, _unit(q.text), q.si, q.si - span, q.si + 10 * span, max(abs(q.si), 1e-3) * 1e-3, None, index, True)
+                    Unknown(
+                        cause.path,
+                        _unit(q.text),
+                        q.si,
+                        q.si - span,
+                        q.si + 10 * span,
+                        max(abs(q.si), 1e-3) * 1e-3,
+                        None,
+                        index,
+                        True,
+                    )
                 )
                 continue
             where, law = self.place(cause), cause.law
             for p in law.params:
                 low, high = (where.si(b, p) for b in p.bounds)
                 off = 0.0 if p.off is None else where.si(p.off, p)
-                size = max(abs(start[p.name] - off), 1e-6 * (high - low)) if p.off is not None else abs(start[p.name]) or high - low
+                size = (
+                    max(abs(start[p.name] - off), 1e-6 * (high - low))
+                    if p.off is not None
+                    else abs(start[p.name]) or high - low
+                )
                 rows.append(
-                    Unknown(f"effect[{k}].{p.name}", where.unit_of(p), off, low, high, size, None, index, p is law.amplitude())
+                    Unknown(
+                        f"effect[{k}].{p.name}",
+                        where.unit_of(p),
+                        off,
+                        low,
+                        high,
+                        size,
+                        None,
+                        index,
+                        p is law.amplitude(),
+                    )
                 )
             k += 1
         return tuple(rows)
