@@ -56,6 +56,11 @@ def from_si(value: Any, unit: str) -> Any:
     return (value - offset) / scale
 
 
+def difference(value: Any, unit: str) -> Any:
+    """An SI difference in `unit`: of temperatures without the zero."""
+    return value / _affine(unit)[0]
+
+
 def base_unit(unit: str) -> str:
     """The SI unit of numbers that a reader sees in `unit`: 'um' -> 'm', 'degC' -> 'K', 'W' -> 'W'."""
     for plain in ("m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"):

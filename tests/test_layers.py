@@ -26,7 +26,10 @@ LAYERS = [
     "reproduce reproduce.row reproduce.rounding reproduce.s0_data", "reproduce.hinge_errors reproduce.s3_tables",
     "reproduce.s3_lengths", "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s3", "reproduce.all",
     "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise", "diagnosis.structure", "diagnosis.fit",
-    "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis", "diagnosis",
+    "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis",
+    "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
+    "diagnosis.empirical diagnosis.detectable diagnosis.profile diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
+    "diagnosis.evidence", "diagnosis",
     "job", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}

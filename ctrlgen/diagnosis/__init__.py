@@ -14,6 +14,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import judge
 from ctrlgen.diagnosis.diagnosis import Diagnosis, errors, findings, verdict
+from ctrlgen.diagnosis.evidence import evidence
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses
 from ctrlgen.diagnosis.noise import estimate
@@ -55,22 +56,25 @@ def diagnose(device: Device, recording: Recording, seed: int = 0, progress: Prog
     step("judging")
     before, after = judge(fitter, found.nominal.fit), judge(fitter, found.chosen.fit)
     said = verdict(found, before, after, bool(noise.known.all()))
+    step("evidence")
+    beside = evidence(fitter, found, after.passed, seed)
     return Diagnosis(
         verdict=said,
         summary="",
         findings=findings(found),
         held_out=errors(fitter, found, noise.known),
         adequacy=after,
-        where={},
-        detectable={},
-        next_experiment=None,
-        history=(),
+        where=beside.where,
+        detectable=beside.detectable,
+        next_experiment=beside.next_experiment,
+        history=beside.history,
         notes=(*recording.notes, *noise.said),
         device=device,
         next_device=found.chosen.fit.structure.described,
         recording=recording,
         search=found,
         fitter=fitter,
+        extra=beside.extra,
     )
 
 

@@ -14,7 +14,7 @@ it acts, S+ = F(S, u) + F_delta delta, linearised along the motion.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import casadi as ca
@@ -48,12 +48,15 @@ class Suspect:
 @dataclass(frozen=True, eq=False)
 class Screened:
     """Suspects, the most conspicuous first; `cosine` between their projected slopes; `threshold` the |z| that a record
-    without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each."""
+    without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
+    `hidden` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes) whose own
+    effect looks most like theirs, -1 where they do not reach the readings at all."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
     threshold: float
     amplitude_sd: dict[tuple[str, str], float]
+    hidden: dict[Hypothesis, int] = field(default_factory=dict)
 
     def alike(self, a: Suspect, b: Suspect) -> float:
         """|cos| between two suspects."""
@@ -125,7 +128,10 @@ class Screen:
             (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
             for j in order
         }
-        return Screened(suspects, cosine, self._threshold(cosine[np.ix_(seen, seen)]), sds)
+        resembles = np.argmax(np.abs(project) * scale[:, None], axis=0) if len(project) else np.full(len(columns), -1)
+        hidden = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
+        hidden = {h: k for h, k in hidden.items() if h not in best}
+        return Screened(suspects, cosine, self._threshold(cosine[np.ix_(seen, seen)]), sds, hidden)
 
     def _suspect(self, column: _Column, z: float, amplitude: float, left: float, j: int) -> Suspect:
         h = column.hypothesis

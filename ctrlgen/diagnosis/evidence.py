@@ -1,0 +1,135 @@
+"""The evidence beside the verdict: where, what was detectable, how sure the numbers are, what else it could be, what next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.diagnosis.along import along
+from ctrlgen.diagnosis.detectable import detectable
+from ctrlgen.diagnosis.experiment import Experiment, next_experiment
+from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.profile import profiles
+from ctrlgen.diagnosis.proposal import files
+from ctrlgen.diagnosis.search import Search, Trial
+from ctrlgen.diagnosis.unknown import unknown
+from ctrlgen.diagnosis.where import where
+
+NEXT_DEVICE = "../device.next.toml"  # from the folder of the next experiment
+REST = 1.1  # noise: what is left above it is looked into although causes were found
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """`where`, `detectable`, `next_experiment`, `history` and `extra` (profiles, unknown, files of the next experiment)
+    as plain numbers and words, in the reader's units; `objects` the same as they were computed, for figures."""
+
+    where: dict[str, Any]
+    detectable: dict[str, Any]
+    next_experiment: dict[str, Any] | None
+    history: tuple[dict[str, Any], ...]
+    extra: dict[str, Any]
+
+
+def evidence(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> Evidence:
+    """Everything beside the findings. `explained`: the chosen structure leaves nothing over."""
+    recording = fitter.recording
+    nominal, chosen = search.nominal.fit, search.chosen.fit
+    records = [*fitter.to_fit, *fitter.held]
+
+    def place(fit: Fit, lefts: list) -> dict[str, Any]:
+        return plain(where(lefts, recording.channels, recording.units, seed))
+
+    before = [along(fitter, nominal, record) for record in records]
+    after = before if chosen is nominal else [along(fitter, chosen, record) for record in records]
+    extra: dict[str, Any] = {"profiles": plain(profiles(fitter, chosen)), "unknown": None, "files": {}}
+    if not explained:
+        extra["unknown"] = plain(unknown(fitter, chosen, after))
+    experiment = next_experiment(fitter, search, explained, seed)
+    if experiment is not None:
+        extra["files"] = files(fitter, chosen, experiment, NEXT_DEVICE)
+    return Evidence(
+        where={"nominal": place(nominal, before), "left": place(chosen, after)},
+        detectable=plain(detectable(chosen, search.last, chosen.n)),
+        next_experiment=_next(experiment),
+        history=history(search),
+        extra=extra,
+    )
+
+
+def history(search: Search) -> tuple[dict[str, Any], ...]:
+    """The rounds in order: what was tried, with T before and after and the z of the screen, and what was decided."""
+    rows = []
+    following = [r.before for r in search.rounds[1:]] + [search.chosen]
+    for number, (round_, then) in enumerate(zip(search.rounds, following, strict=True), 1):
+        grew = len(then.fit.structure.causes) > len(round_.before.fit.structure.causes)
+        rows.append(
+            {
+                "round": number,
+                "threshold": float(round_.screened.threshold),
+                "suspects": len(round_.screened.suspects),
+                "total_before": float(round_.before.total),
+                "tried": [_tried(t, round_.screened.suspects, then) for t in round_.trials],
+                "kept": [[c.effect, c.location] for c in then.fit.structure.causes],
+                "decision": _decision(round_.before, then, grew, bool(round_.trials)),
+            }
+        )
+    return tuple(rows)
+
+
+def _tried(trial: Trial, suspects: tuple, then: Trial) -> dict[str, Any]:
+    z = next((s.z for s in suspects if s.hypothesis == trial.cause), float("nan"))
+    kept = trial.cause in then.fit.structure.causes
+    return plain(
+        {
+            "effect": trial.cause.effect, "location": trial.cause.location, "z": z, "total": trial.total,
+            "held_out": trial.held, "kept": kept,
+        }
+    )  # fmt: skip
+
+
+def _decision(before: Trial, then: Trial, grew: bool, tried: bool) -> str:
+    if not tried:
+        return "nothing stands out: stopped"
+    added = [c for c in then.fit.structure.causes if c not in before.fit.structure.causes]
+    gone = [c for c in before.fit.structure.causes if c not in then.fit.structure.causes]
+    if not added and not gone:
+        return "nothing tried is justified on the held-out records: stopped"
+    words = [f"added {c.effect} at {c.location}" for c in added] + [f"dropped {c.effect} at {c.location}" for c in gone]
+    return ", ".join(words)
+
+
+def _next(found: Experiment | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    best = found.candidates[0]
+    return plain(
+        {
+            "separates": list(found.rivals), "why": found.reason, "drive": best.said, "kind": best.kind,
+            "strength": best.strength, "samples": len(found.record.drive), "sample_time": found.record.sample_time,
+            "separation_now": found.before, "separation_after": found.after, "settles": found.settles,
+            "candidates": list(found.candidates),
+        }
+    )  # fmt: skip
+
+
+def plain(value: Any) -> Any:
+    """Dataclasses, arrays and numpy numbers as dicts, lists and numbers that JSON knows; not finite becomes None.
+
+    Arrays sample by sample are for figures, not for diagnosis.json, and are left out.
+    """
+    if is_dataclass(value):
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.name != "free"}
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(item) for item in value]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
