@@ -78,7 +78,7 @@ class Links:
     With a `mass` per axis the displacement has inertia, mass d'' = force - resistance(d) - `drag`(d'), instead of
     standing in balance. With `feedback` (u, reading, d', x) -> drive the loop is closed: u is the reference, and
     `heat` (u - reading) drives the states. An `imposed` device is moved by its drive (displacement, velocity,
-    acceleration) and reads the force that takes.
+    acceleration) and reads the force that takes. `bipolar` says whether the drive has both signs.
     """
 
     axes: tuple[str, ...]
@@ -105,6 +105,7 @@ class Links:
     feedback: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX] | None = None
     command_signal: tuple[str, str, str, float] | None = None
     imposed: bool = False
+    bipolar: bool = True
 
 
 class Device(Section):

@@ -198,6 +198,7 @@ class MemsHexapod(Device):
             },
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
+            bipolar=False,
         )
 
 

@@ -126,6 +126,7 @@ class RrrStage(Device):
             },
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
+            bipolar=False,
         )
 
 
