@@ -162,7 +162,13 @@ def draw_bench(rng: Rng, seconds: float = 6.0, loop: bool = False, ambient: bool
         clock += n * dt + 0.5
     scene = _scene(axis, fit, noise, clock - 0.5, dt)
     return Bench(
-        axis, stated, scene, tuple(takes), bool(rng.uniform() < 0.25), bool(rng.uniform() < 0.5), {"sd": noise, "phi": phi}
+        axis,
+        stated,
+        scene,
+        tuple(takes),
+        bool(rng.uniform() < 0.25),
+        bool(rng.uniform() < 0.5),
+        {"sd": noise, "phi": phi},
     )
 
 
@@ -196,10 +202,12 @@ def readings(bench: Bench, planted: list[Planted]) -> list[Array]:
 
 def device_text(stated: Axis) -> str:
     """device.toml as a maker would write it."""
-    entry = {
-        name: f'{name} = {{ value = "{getattr(stated, name):.6g} {UNITS[name]}", sd = "{sd * getattr(stated, name):.3g} {UNITS[name]}", source = "data sheet" }}'
-        for name, sd in STATED_SD.items()
-    }
+    entry = {}
+    for name, share in STATED_SD.items():
+        value, unit = getattr(stated, name), UNITS[name]
+        entry[name] = (
+            f'{name} = {{ value = "{value:.6g} {unit}", sd = "{share * value:.3g} {unit}", source = "data sheet" }}'
+        )
     if stated.stiffness == 0:
         entry["stiffness"] = 'stiffness = "0 N/um"'
     lines = [

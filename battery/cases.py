@@ -91,7 +91,13 @@ def _mixture(rng: Rng, n: int) -> tuple[str, ...]:
 
 
 def _truth(planted: Planted, size: float, location: str) -> dict[str, Any]:
-    return {"name": planted.name, "location": location, "size": size, "amplitude": planted.amplitude, "shape": planted.shape}
+    return {
+        "name": planted.name,
+        "location": location,
+        "size": size,
+        "amplitude": planted.amplitude,
+        "shape": planted.shape,
+    }
 
 
 def _clean(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str, Any]]:
@@ -99,7 +105,10 @@ def _clean(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str, An
     spikes = bool(rng.uniform() < 0.33)
     if spikes:
         bench = axis_cases.with_spikes(rng, bench)
-    return (lambda d: axis_cases.write_bench(d, bench, [])), axis_cases.describe(bench) | {"spikes": spikes, "planted": []}
+    return (lambda d: axis_cases.write_bench(d, bench, [])), axis_cases.describe(bench) | {
+        "spikes": spikes,
+        "planted": [],
+    }
 
 
 def _ruler(bench: axis_cases.Bench) -> Ruler:
@@ -121,8 +130,12 @@ def _with_laws(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str
             continue
         planted = [p for p, _ in found]
         truth = [_truth(p, s, f"{PLACE.get(p.name, 'stage')}:axis") for p, s in found]
-        return (lambda d, b=bench, p=planted: axis_cases.write_bench(d, b, p)), axis_cases.describe(bench) | {"planted": truth}
-    raise RuntimeError(f"case {order.number} ({order.wanted}): no draw gave the wanted size; widen the law's shape values")
+        return (lambda d, b=bench, p=planted: axis_cases.write_bench(d, b, p)), axis_cases.describe(bench) | {
+            "planted": truth
+        }
+    raise RuntimeError(
+        f"case {order.number} ({order.wanted}): no draw gave the wanted size; widen the law's shape values"
+    )
 
 
 def _place(name: str, rng: Rng, bench: axis_cases.Bench, ruler: Ruler, low: float, high: float, kind: str) -> Any:

@@ -124,7 +124,7 @@ def readings(bench: PoseBench, fault: Fault | None) -> dict[str, Array]:
 
 
 def size(bench: PoseBench, fault: Fault) -> float:
-    """rms of the fault's change over the noise, in the component in which it is largest; no refit, since faults are nominal numbers here."""
+    """rms of the fault's change over the noise, in its largest component; no refit: faults are nominal numbers here."""
     change = (readings(bench, fault)["fit"] - readings(bench, None)["fit"]) / np.repeat(bench.sd, 3)
     return float(np.sqrt(np.mean(change**2, axis=0)).max())
 
@@ -150,7 +150,14 @@ def write_bench(folder: Path, bench: PoseBench, fault: Fault | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "device.toml").write_text(device_text())
     noise = [f'"{bench.sd[0] * 1e6:.3g} urad"'] * 3 + [f'"{bench.sd[1] * 1e3:.3g} nm"'] * 3
-    lines = ['title = "Settled poses"', 'device = "mems_hexapod"', 'source = "bench"', 'kind = "poses"', "", "[columns]"]
+    lines = [
+        'title = "Settled poses"',
+        'device = "mems_hexapod"',
+        'source = "bench"',
+        'kind = "poses"',
+        "",
+        "[columns]",
+    ]
     lines += [f'"drive.{axis}" = {{ column = "P_{axis}", unit = "W" }}' for axis in AXES]
     for name, sd in zip(COMPONENTS, noise, strict=True):
         unit = "urad" if name.startswith("theta") else "um"

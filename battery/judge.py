@@ -165,7 +165,9 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
     j.exact = exact == len(truths) and not left
     j.in_set = exact + near == len(truths) and not left
     names = {f["effect"] for f in findings} | {a["effect"] for f in findings for a in f.get("alternatives", [])}
-    j.admitted = j.verdict == "ambiguous" and any(_among(f, t, own=True) for f in findings for t in truths) and len(names) > 1
+    j.admitted = (
+        j.verdict == "ambiguous" and any(_among(f, t, own=True) for f in findings for t in truths) and len(names) > 1
+    )
     ratios = [c["rms_after"] / c["noise_floor"] for c in diagnosis.get("held_out", {}).values() if c.get("noise_floor")]
     j.ratio = max(ratios) if ratios else None
     return j

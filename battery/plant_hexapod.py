@@ -192,8 +192,9 @@ class Faults:
     """What is wrong; everything zero is S1 as printed. Shares unless said otherwise; six values follow AXES or COMPONENTS.
 
     `drive` on the drive, `order`: which drive reaches actuator k, `crosstalk`: of every other heater's power,
-    `resistance` [1/K] of the heater (voltage drive), `stiffness` and `cubic` [N/um^3] of the stages, `coupling`: of the other axis of a
-    stage, `turn` [rad] of the platform frame, `gain`, `offset` [um, rad] and `bow` [1/um, 1/rad] of the sensor, `finite`: 1 for finite rotations.
+    `resistance` [1/K] of the heater (voltage drive), `stiffness` and `cubic` [N/um^3] of the stages, `coupling`: of
+    the other axis of a stage, `turn` [rad] of the platform frame, `gain`, `offset` [um, rad] and `bow` [1/um, 1/rad]
+    of the sensor, `finite`: 1 for finite rotations.
     """
 
     drive: Array = field(default_factory=lambda: np.zeros(6))
@@ -222,7 +223,9 @@ def changed(numbers: SimpleNamespace, shares: dict[str, float]) -> SimpleNamespa
 class Hexapod:
     """Drives (n, 6) [W, or V with `voltage`] to poses (n, 6) (theta; u) [rad, um]."""
 
-    def __init__(self, numbers: SimpleNamespace | None = None, faults: Faults | None = None, voltage: bool = False) -> None:
+    def __init__(
+        self, numbers: SimpleNamespace | None = None, faults: Faults | None = None, voltage: bool = False
+    ) -> None:
         self.n, self.faults, self.voltage = numbers or read(), faults or Faults(), voltage
         self.J = jacobian(self.n)
         self._K_bar = actuator_stiffness(self.n.actuator)[0, 0]

@@ -109,6 +109,7 @@ def _number(what: str, values: Sequence[float], at: float, goal: str, most: floa
 
 def table(judged: Sequence[Judgement]) -> list[Row]:
     """The rows of the goals table of DIAGNOSIS.md."""
+
     def of(*kinds: str) -> list[Judgement]:
         return [j for j in judged if j.kind in kinds]
 
@@ -175,7 +176,9 @@ def figure(path: Path, judged: Sequence[Judgement]) -> None:
 
     pairs = confusion(judged)
     rows = sorted({t for t, _ in pairs}, key=lambda t: (t == "nothing", t))
-    columns = sorted({n for _, n in pairs}, key=lambda n: (n in {"none", "failed"}, rows.index(n) if n in rows else 99, n))
+    columns = sorted(
+        {n for _, n in pairs}, key=lambda n: (n in {"none", "failed"}, rows.index(n) if n in rows else 99, n)
+    )
     M = np.array([[pairs[t, n] for n in columns] for t in rows], dtype=float)
     fig = Figure(figsize=(2.5 + 0.28 * len(columns), 2 + 0.26 * len(rows)), layout="constrained")
     ax = fig.subplots()
@@ -184,7 +187,15 @@ def figure(path: Path, judged: Sequence[Judgement]) -> None:
     ax.set_yticks(range(len(rows)), rows, fontsize=7)
     for (i, k), count in np.ndenumerate(M):
         if count:
-            ax.text(k, i, f"{count:.0f}", ha="center", va="center", fontsize=6, color="white" if count > M[i].sum() / 2 else "black")
+            ax.text(
+                k,
+                i,
+                f"{count:.0f}",
+                ha="center",
+                va="center",
+                fontsize=6,
+                color="white" if count > M[i].sum() / 2 else "black",
+            )
     ax.set_xlabel("named"), ax.set_ylabel("planted")
     fig.savefig(path, dpi=150)
 
