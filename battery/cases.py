@@ -23,7 +23,7 @@ from battery.size import OWN, Ruler, left_over
 SINGLE = (
     "stiffening", "hysteresis", "log_creep", "creep", "backlash", "coulomb", "stribeck", "viscous", "quadratic_damping",
     "end_stop", "resonance", "softening", "cyclic", "bow", "drift", "temperature_sensitivity", "low_pass", "delay",
-    "quantisation", "stuck", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag", "vibration", "step",
+    "quantisation", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag", "vibration", "step",
     "drive_gain", "sensor_gain", "stiffness", "home_offset",
 )  # fmt: skip
 FIXED = ("low_pass", "delay", "stuck")  # drawn at a size a bench would see, not scaled
@@ -46,8 +46,8 @@ PLACE = {
 }  # fmt: skip
 COUNTS = {  # clean, single, weak, multiple, outside, confusable, hexapod clean, hexapod single
     "ci": (2, 4, 1, 1, 1, 1, 1, 1),
-    "small": (10, 31, 8, 8, 7, 4, 2, 11),
-    "full": (110, 93, 40, 48, 42, 16, 10, 33),
+    "small": (10, 30, 8, 8, 7, 4, 2, 11),
+    "full": (110, 90, 40, 48, 42, 16, 10, 33),
 }
 CLASSES = ("clean", "single", "weak", "multiple", "outside", "confusable", "hexapod_clean", "hexapod_single")
 Rng = np.random.Generator

@@ -14,9 +14,11 @@ FORCE_CONSTANT = "parameter@force_constant"
 ACCEPTED: dict[str, tuple[str, ...]] = {
     "softening": ("stiffening",),
     "hysteresis": ("hysteresis", "bouc_wen"),
-    "creep": ("creep", "log_creep", "thermal_lag"),
+    "creep": ("creep", "log_creep", "thermal_lag", "second_pole"),
     "log_creep": ("log_creep", "creep"),
-    "thermal_lag": ("thermal_lag", "creep"),
+    "thermal_lag": ("thermal_lag", "second_pole", "creep"),
+    "viscous": ("viscous", "asymmetric_viscous"),
+    "step": ("step", "force_step"),
     "low_pass": ("low_pass", "thermal_lag"),
     "coulomb": ("coulomb",),
     "stribeck": ("stribeck",),
@@ -34,6 +36,10 @@ ALSO_AT = {
     "drive_gain": ("actuator", "sensor"),
     "sensor_gain": ("sensor", "actuator"),
     "stiffness": ("stage", "mechanics"),
+    "lost_beams": ("actuator", "stage"),  # a weaker actuator, as a drive or as a force
+    "degradation": ("actuator", "stage"),
+    "step": ("disturbance", "stage"),
+    "vibration": ("disturbance", "stage", "sensor"),  # one line is one line, wherever it enters
     "parameter": ("mechanism", "actuator", "stage", "hexapod"),
 }
 Value = Callable[[dict[str, Any]], float]
@@ -46,10 +52,7 @@ TRUTHS: dict[str, dict[tuple[str, ...], Value]] = {
     "cyclic": {("period", "pitch", "wavelength"): lambda t: t["shape"]["period"]},
     "temperature_sensitivity": {("sensitivity", "gain", "slope"): lambda t: t["amplitude"]},
     "quadratic_damping": {("c2", "coefficient", "drag", "damping"): lambda t: t["amplitude"]},
-    "vibration": {
-        ("amplitude", "force"): lambda t: abs(t["amplitude"]),
-        ("frequency",): lambda t: t["shape"]["frequency"],
-    },
+    "vibration": {("frequency",): lambda t: t["shape"]["frequency"]},
     "step": {("amplitude", "size", "height", "force"): lambda t: t["amplitude"], ("moment", "time"): lambda t: t["shape"]["moment"]},
     "lost_beams": {("share", "fraction", "lost"): lambda t: t["amplitude"], ("moment", "time"): lambda t: t["shape"]["moment"]},
     "resonance": {("frequency",): lambda t: t["shape"]["frequency"]},
@@ -121,7 +124,7 @@ class Judgement:
 
 
 def _covered(finding: dict[str, Any], truth: dict[str, Any]) -> list[tuple[str, str, bool]]:
-    if finding["effect"] != truth["name"]:
+    if finding["effect"] not in {truth["name"], f"force_{truth['name']}"}:
         return []
     out = []
     given = finding.get("parameters", {})
