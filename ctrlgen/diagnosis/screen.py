@@ -29,6 +29,8 @@ from ctrlgen.recording import Record
 
 BLOCK = 5000  # samples worked on at a time
 OWN_LEFT = 1e-5  # of |s|^2: below, the hypothesis cannot be told from what is free already
+TOO_ALIKE = 0.04  # 1 - cos^2 of a pair below which its amplitudes mean nothing
+PAIRS = 4000  # considered, the best first
 NULLS = 2000  # simulated records without mismatch
 SETTLED_LAG = 1e9
 
@@ -48,12 +50,14 @@ class Suspect:
 @dataclass(frozen=True, eq=False)
 class Screened:
     """Suspects, the most conspicuous first; `cosine` between their projected slopes; `threshold` the |z| that a record
-    without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each."""
+    without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
+    `pairs` of suspects that together would explain most, with the chi^2 they would: two causes can hide each other."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
     threshold: float
     amplitude_sd: dict[tuple[str, str], float]
+    pairs: tuple[tuple[float, Suspect, Suspect], ...] = ()
 
     def alike(self, a: Suspect, b: Suspect) -> float:
         """|cos| between two suspects."""
@@ -125,7 +129,40 @@ class Screen:
             (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
             for j in order
         }
-        return Screened(suspects, cosine, self._threshold(cosine[np.ix_(seen, seen)]), sds)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            size = score / own
+        pairs = self._pairs(columns, seen, score / np.sqrt(np.where(own > 0, own, np.inf)), size, left, cosine)
+        return Screened(suspects, cosine, self._threshold(cosine[np.ix_(seen, seen)]), sds, pairs)
+
+    def _pairs(
+        self, columns: list[_Column], seen: np.ndarray, z: np.ndarray, size: np.ndarray, left: np.ndarray, cosine: np.ndarray
+    ) -> tuple[tuple[float, Suspect, Suspect], ...]:
+        """Pairs by the chi^2 that both amplitudes together explain, (z_1^2 + z_2^2 - 2 c z_1 z_2)/(1 - c^2)."""
+        c, a = cosine[np.ix_(seen, seen)], z[seen]
+        apart = 1 - c**2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = (a[:, None] - c * a[None, :]) / apart  # amplitude of the row's hypothesis, in its own deviations
+            gain = (a[:, None] ** 2 + a[None, :] ** 2 - 2 * c * np.outer(a, a)) / apart
+        side = np.array([columns[j].one_sided for j in seen])
+        wrong = (side[:, None] * first < 0) | (side[None, :] * first.T < 0)
+        names = np.unique([hash(columns[j].hypothesis) for j in seen], return_inverse=True)[1]
+        gain[(apart < TOO_ALIKE) | wrong | (names[:, None] == names[None, :])] = 0.0
+        upper = np.triu(gain, 1)
+        order = np.argsort(upper, axis=None)[::-1][:PAIRS]
+        found, known = [], set()
+        for flat in order:
+            i, j = np.unravel_index(flat, upper.shape)
+            names_ = frozenset((columns[seen[i]].hypothesis, columns[seen[j]].hypothesis))
+            if upper[i, j] <= 0 or names_ in known:
+                continue
+            known.add(names_)
+            scale_i, scale_j = first[i, j] / a[i], first[j, i] / a[j]
+            pair = tuple(
+                self._suspect(columns[seen[k]], z[seen[k]], size[seen[k]] * scale, left[seen[k]], int(seen[k]))
+                for k, scale in ((i, scale_i), (j, scale_j))
+            )
+            found.append((float(upper[i, j]), *pair))
+        return tuple(found)
 
     def _suspect(self, column: _Column, z: float, amplitude: float, left: float, j: int) -> Suspect:
         h = column.hypothesis
@@ -201,18 +238,20 @@ class _Slopes:
         for h in hypotheses:
             law, where = h.law, structure.place(h)
             names = [w.channel for w in channels(links, law.place)]
-            at = range(len(names)) if h.at == "all" else [names.index(h.at)]
+            partner = names.index(h.of) if h.of else None
+            at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
+            if law.mutual:
+                at += [(partner, i) for i, _ in at]
             amplitude = law.amplitude()
             low, high = (where.si(b, amplitude) for b in amplitude.bounds)
             off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
             side = 1 if off <= low else -1 if off >= high else 0
             for shape in h.shapes(where):
-                for i in at:
-                    partner = names.index(h.of) if h.of else None
+                for i, other in at:
                     m_states = {s.name: ca.SX.sym(f"m{len(states)}_{s.name}") for s in law.states}
                     a = ca.SX.sym("a")
                     p = SimpleNamespace(**shape, **{amplitude.name: a})
-                    s = m.seen(law.place, i, partner, m_states)
+                    s = m.seen(law.place, i, other, m_states)
                     instance = law(h.at, {}, h.of)
                     new = instance.update(s, p)
                     s.__dict__.update(new)
@@ -225,7 +264,7 @@ class _Slopes:
                         ca.substitute(ca.SX(new[state.name]), a, off) if state.stepped else None for state in law.states
                     ]
                     clocks += [state.clock for state in law.states]
-                columns.append(_Column(h, shape, tuple(self.probe_index[law.place, i] for i in at), size, side))
+                columns.append(_Column(h, shape, tuple(self.probe_index[law.place, i] for i, _ in at), size, side))
         return columns, SimpleNamespace(terms=terms, states=states, rates=rates, stepped=stepped, clocks=clocks)
 
     def _motion(self, start: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

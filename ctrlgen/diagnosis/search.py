@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
 MOST_CAUSES = 6
-TRIALS = 6  # suspects fitted a round
+TRIALS = 6  # suspects fitted a round, and as many pairs
+SMALL = 5000  # samples up to which fits are cheap: four times as many are tried
 TRIAL_STEPS = 15
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
@@ -62,7 +63,7 @@ class Searcher:
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
         self.fitter, self.screen, self.step = fitter, screen, step
         self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
-        self.known: dict[tuple, Trial] = {}
+        self.trials = TRIALS * (4 if self.n_fit <= SMALL else 1)
 
     def trial(
         self,
@@ -87,6 +88,7 @@ class Searcher:
             if len(current.fit.structure.causes) >= MOST_CAUSES:
                 break
             trials = self._try(current, self._conspicuous(screened))
+            trials = tuple(sorted((*trials, *self._pairs(current, screened, trials)), key=lambda t: t.total))
             rounds.append(Round(screened, trials, current))
             better = [t for t in trials if self._justified(current, t)]
             if not better:
@@ -126,11 +128,42 @@ class Searcher:
             trials.append(self.trial(_warm(current.fit, s.hypothesis, s.start), s.hypothesis))
         return tuple(sorted(trials, key=lambda t: t.total))
 
+    def _pairs(self, current: Trial, screened: Screened, singles: tuple[Trial, ...]) -> list[Trial]:
+        """Pairs that promise more than any single suspect gave."""
+        best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
+        excess = current.fit.objective - self.n_fit
+        promising = [p for p in screened.pairs if p[0] > best + max(self._need(screened), 0.1 * (excess - best))]
+        trials, used = [], {}
+        for _, a, b in promising:
+            if len(trials) >= self.trials or max(used.get(a.hypothesis, 0), used.get(b.hypothesis, 0)) >= self.trials // 3:
+                continue
+            for s in (a, b):
+                used[s.hypothesis] = used.get(s.hypothesis, 0) + 1
+            self.step(f"trying {a.hypothesis.effect} at {a.hypothesis.location} with {b.hypothesis.effect} at {b.hypothesis.location}")
+            structure = _warm(current.fit, a.hypothesis, a.start).with_cause(b.hypothesis, b.start)
+            trials.append(self.trial(structure, b.hypothesis))
+        return trials
+
+    @staticmethod
+    def _meant(trial: Trial) -> bool:
+        """Whether every cause has an amplitude inside its bounds and, where one is expected, in that range."""
+        structure = trial.fit.structure
+        for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
+            if not unknown.amplitude:
+                continue
+            cause = structure.causes[unknown.cause]
+            span = 1e-6 * (unknown.high - unknown.low)
+            at_bound = value >= unknown.high - span or (value <= unknown.low + span and unknown.low != unknown.nominal)
+            expected = None if cause.effect == PARAMETER else cause.law.amplitude().expected
+            if at_bound or (expected and not expected[0] <= value <= expected[1]):
+                return False
+        return True
+
     def _justified(self, before: Trial, after: Trial) -> bool:
         gained = before.fit.objective - after.fit.objective
         added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
         needed = max(MATERIAL**2 * self.n_fit, 12.0 + added * np.log(max(self.n_fit, 2)))
-        return gained > needed and before.held - after.held > 2.0
+        return gained > needed and before.held - after.held > 2.0 and self._meant(after)
 
     def _swap(self, current: Trial) -> Trial:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""

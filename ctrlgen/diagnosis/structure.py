@@ -57,7 +57,8 @@ class Structure:
     def place(self, cause: Hypothesis) -> Where:
         """The channel at which a cause acts; the first one where it acts at all of them."""
         where = channels(self.device.links(self.device.values()), cause.law.place)
-        return where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
+        here = where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
+        return here if cause.of is None else here.beside(next(w for w in where if w.channel == cause.of))
 
     @cached_property
     def described(self) -> Device:
