@@ -29,8 +29,10 @@ from ctrlgen.recording import Record
 
 BLOCK = 5000  # samples worked on at a time
 OWN_LEFT = 1e-5  # of |s|^2: below, the hypothesis cannot be told from what is free already
-TOO_ALIKE = 0.04  # 1 - cos^2 of a pair below which its amplitudes mean nothing
-PAIRS = 4000  # considered, the best first
+TOO_ALIKE = 0.04  # of a slope left beside the others of a set, below which amplitudes mean nothing
+BEAM = 200  # sets kept at each size
+LARGEST_SET = 4
+LOOSE = 0.35  # how far beyond its bounds a linear estimate of an amplitude may lie, relative
 NULLS = 2000  # simulated records without mismatch
 SETTLED_LAG = 1e9
 
@@ -51,13 +53,14 @@ class Suspect:
 class Screened:
     """Suspects, the most conspicuous first; `cosine` between their projected slopes; `threshold` the |z| that a record
     without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
-    `pairs` of suspects that together would explain most, with the chi^2 they would: two causes can hide each other."""
+    `together` sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide
+    each other."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
     threshold: float
     amplitude_sd: dict[tuple[str, str], float]
-    pairs: tuple[tuple[float, Suspect, Suspect], ...] = ()
+    together: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
 
     def alike(self, a: Suspect, b: Suspect) -> float:
         """|cos| between two suspects."""
@@ -73,6 +76,7 @@ class _Column:
     probes: tuple[int, ...]
     size: float
     one_sided: int
+    range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
 
 
 class Screen:
@@ -129,40 +133,8 @@ class Screen:
             (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
             for j in order
         }
-        with np.errstate(divide="ignore", invalid="ignore"):
-            size = score / own
-        pairs = self._pairs(columns, seen, score / np.sqrt(np.where(own > 0, own, np.inf)), size, left, cosine)
-        return Screened(suspects, cosine, self._threshold(cosine[np.ix_(seen, seen)]), sds, pairs)
-
-    def _pairs(
-        self, columns: list[_Column], seen: np.ndarray, z: np.ndarray, size: np.ndarray, left: np.ndarray, cosine: np.ndarray
-    ) -> tuple[tuple[float, Suspect, Suspect], ...]:
-        """Pairs by the chi^2 that both amplitudes together explain, (z_1^2 + z_2^2 - 2 c z_1 z_2)/(1 - c^2)."""
-        c, a = cosine[np.ix_(seen, seen)], z[seen]
-        apart = 1 - c**2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            first = (a[:, None] - c * a[None, :]) / apart  # amplitude of the row's hypothesis, in its own deviations
-            gain = (a[:, None] ** 2 + a[None, :] ** 2 - 2 * c * np.outer(a, a)) / apart
-        side = np.array([columns[j].one_sided for j in seen])
-        wrong = (side[:, None] * first < 0) | (side[None, :] * first.T < 0)
-        names = np.unique([hash(columns[j].hypothesis) for j in seen], return_inverse=True)[1]
-        gain[(apart < TOO_ALIKE) | wrong | (names[:, None] == names[None, :])] = 0.0
-        upper = np.triu(gain, 1)
-        order = np.argsort(upper, axis=None)[::-1][:PAIRS]
-        found, known = [], set()
-        for flat in order:
-            i, j = np.unravel_index(flat, upper.shape)
-            names_ = frozenset((columns[seen[i]].hypothesis, columns[seen[j]].hypothesis))
-            if upper[i, j] <= 0 or names_ in known:
-                continue
-            known.add(names_)
-            scale_i, scale_j = first[i, j] / a[i], first[j, i] / a[j]
-            pair = tuple(
-                self._suspect(columns[seen[k]], z[seen[k]], size[seen[k]] * scale, left[seen[k]], int(seen[k]))
-                for k, scale in ((i, scale_i), (j, scale_j))
-            )
-            found.append((float(upper[i, j]), *pair))
-        return tuple(found)
+        together = _Together(columns, seen, score, own, left, cosine, self._suspect)
+        return Screened(suspects, cosine, self._threshold(cosine[np.ix_(seen, seen)]), sds, together.search())
 
     def _suspect(self, column: _Column, z: float, amplitude: float, left: float, j: int) -> Suspect:
         h = column.hypothesis
@@ -180,6 +152,73 @@ class Screen:
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = np.random.default_rng(self.seed).standard_normal((NULLS, len(cosine)))
         return float(np.quantile(np.abs(draws @ root.T).max(axis=1), 0.99))
+
+
+class _Together:
+    """Sets of hypotheses by the chi^2 that they explain jointly, from scores and cosines alone.
+
+    Adding hypothesis j to a set K raises it by (z_j - c_jK C_KK^-1 z_K)^2/(1 - c_jK C_KK^-1 c_Kj).
+    """
+
+    def __init__(self, columns, seen, score, own, left, cosine, suspect) -> None:  # noqa: ANN001
+        self.columns = [columns[j] for j in seen]
+        self.index = seen
+        self.root = np.sqrt(own[seen])
+        self.z = score[seen] / self.root
+        self.left, self.C, self.suspect = left[seen], cosine[np.ix_(seen, seen)], suspect
+        self.group = (
+            np.unique([hash(c.hypothesis) for c in self.columns], return_inverse=True)[1]
+            if len(seen)
+            else np.zeros(0, int)
+        )
+
+    def search(self) -> tuple[tuple[float, tuple[Suspect, ...]], ...]:
+        """Sets of every size from two, those whose amplitudes make sense, the best first."""
+        beam: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
+        found = []
+        for size in range(1, LARGEST_SET + 1):
+            beam = self._grown(beam)
+            if size > 1:
+                sets = [(gain, self._amplitudes(members), members) for gain, members in beam]
+                found += [(gain, self._suspects(members, b)) for gain, b, members in sets if self._sensible(members, b)]
+        return tuple(sorted(found, key=lambda f: -f[0]))
+
+    def _grown(self, beam: list[tuple[float, tuple[int, ...]]]) -> list[tuple[float, tuple[int, ...]]]:
+        grown: dict[frozenset, tuple[float, tuple[int, ...]]] = {}
+        for gain, members in beam:
+            K = list(members)
+            if K:
+                W = np.linalg.solve(self.C[np.ix_(K, K)], self.C[K])
+                rest = 1 - np.einsum("kj,kj->j", self.C[K], W)
+                score = self.z - W.T @ self.z[K]
+            else:
+                rest, score = np.ones(len(self.z)), self.z
+            more = np.where(rest > TOO_ALIKE, score**2 / np.maximum(rest, TOO_ALIKE), 0.0)
+            more[np.isin(self.group, self.group[K])] = 0.0
+            for j in np.argsort(-more)[:BEAM]:
+                if more[j] > 0:
+                    key = frozenset(self.group[[*K, j]])
+                    if key not in grown or grown[key][0] < gain + more[j]:
+                        grown[key] = (gain + float(more[j]), (*members, int(j)))
+        return sorted(grown.values(), key=lambda g: -g[0])[:BEAM]
+
+    def _amplitudes(self, members: tuple[int, ...]) -> np.ndarray:
+        K = list(members)
+        return np.linalg.solve(self.C[np.ix_(K, K)], self.z[K]) / self.root[K]
+
+    def _sensible(self, members: tuple[int, ...], b: np.ndarray) -> bool:
+        """Whether amplitudes are about inside their bounds, and in the range that the effect expects."""
+        for k, value in zip(members, b, strict=True):
+            low, high = self.columns[k].range
+            if not low - LOOSE * (high - low) * (low < 0) <= value <= high + LOOSE * (high - low):
+                return False
+        return True
+
+    def _suspects(self, members: tuple[int, ...], b: np.ndarray) -> tuple[Suspect, ...]:
+        return tuple(
+            self.suspect(self.columns[k], self.z[k], value, self.left[k], int(self.index[k]))
+            for k, value in zip(members, b, strict=True)
+        )
 
 
 class _Sums:
@@ -228,7 +267,7 @@ class _Slopes:
             i = free.index(h.path)
             value = self.p[i]
             size = max(abs(value), 1e-3) * 1e-3
-            self.columns.append(_Column(h, {"value": value}, (i,), size, 0))
+            self.columns.append(_Column(h, {"value": value}, (i,), size, 0, (-500.0, 500.0)))
 
     def _laws(self, hypotheses: list[Hypothesis], device: object) -> tuple[list[_Column], SimpleNamespace]:
         """Columns, and the terms' derivatives by amplitude as functions along the motion."""
@@ -264,7 +303,11 @@ class _Slopes:
                         ca.substitute(ca.SX(new[state.name]), a, off) if state.stepped else None for state in law.states
                     ]
                     clocks += [state.clock for state in law.states]
-                columns.append(_Column(h, shape, tuple(self.probe_index[law.place, i] for i, _ in at), size, side))
+                meant = amplitude.expected or (low - off, high - off)
+                span = (meant[0] / size, meant[1] / size)
+                columns.append(
+                    _Column(h, shape, tuple(self.probe_index[law.place, i] for i, _ in at), size, side, span)
+                )
         return columns, SimpleNamespace(terms=terms, states=states, rates=rates, stepped=stepped, clocks=clocks)
 
     def _motion(self, start: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
