@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -128,6 +129,8 @@ def check(
     for limit in model.limits:
         low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
         out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
+    for remark in device.remarks():
+        out.print(f"  note: {remark}", markup=False, soft_wrap=True)
 
 
 @app.command()
@@ -340,6 +343,11 @@ def _progress(stages: int) -> Iterator[Any]:
         yield advance
 
 
+def _show_warning(message: Warning | str, *_: Any) -> None:
+    """One line without the place in our code, which tells a user nothing."""
+    err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
+
+
 def execute(check: Callable[[], None] = lambda: None) -> int:
     """Parses and runs the command line; the exit status, with one clear message for everything that can go wrong.
 
@@ -347,6 +355,7 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     """
     try:
         CHECK.set(check)
+        warnings.showwarning = _show_warning
         status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
         return status if isinstance(status, int) else 0
     except Unreachable as error:

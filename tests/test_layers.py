@@ -13,7 +13,7 @@ LAYERS = [
     "files", "reference_models reference_models.hinge_fem", "measuring_chain",
     "physics.screw", "physics.flexure", "physics.circular_hinge", "physics.circular_hinge_table",
     "physics.thermal_actuator", "physics.xy_stage physics.hexapod physics.meso_hexapod",
-    "physics.rrr_hinge physics.piezo_stack", "physics.rrr_stage",
+    "physics.piezo_stack", "physics.rrr_stage",
     "effect", "effects",
     "devices.base", "devices.hinge", "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod", "devices",
     "calibration pose_errors",

@@ -109,6 +109,10 @@ class Device(Section):
         """The device's physics with the values `p` (numbers, or symbols where they are free)."""
         raise NotImplementedError
 
+    def remarks(self) -> list[str]:
+        """What a reader should know of the description, such as an equation used beyond its range."""
+        return []
+
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Every number of the device with its dotted path, such as 'struts.wire_length'."""
         yield from _leaves(self, "")

@@ -1,7 +1,7 @@
 """The planar 3-RRR stage: compliances at output and inputs from any three hinge compliances.
 
 Source: S3 appendix B. Displacements (dx, dy, dalpha) [m, m, rad], loads (F_x, F_y, M_z) [N, N, N m]. A hinge is a
-(3, 3) compliance about its free end, x along the hinge (`rrr_hinge.hinge_compliance`). Each hinge of Link 1
+(3, 3) compliance about its free end, x along the hinge (`circular_hinge_table.end_compliance`). Each hinge of Link 1
 is carried to the platform by the equilibrium of the links between, which gives (B.9)-(B.48) entry by entry.
 
 Misprints: B.8 row 3 is Delta-alpha; B.12 is with respect to M_o'z; B.42 has hinge 3; B.36-B.38 and B.46-B.48 are at o'; B.62
