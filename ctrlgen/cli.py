@@ -19,6 +19,7 @@ from rich.table import Table
 
 from ctrlgen import job, report
 from ctrlgen.devices import load_device
+from ctrlgen.devices.sensor import describe
 from ctrlgen.errors import CtrlgenError, Fault, InputError, Unreachable
 from ctrlgen.files import read_toml
 from ctrlgen.measures import in_unit
@@ -129,6 +130,9 @@ def check(
     for limit in model.limits:
         low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
         out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
+    units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
+    for sensor in device.sensor:
+        out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
     for remark in device.remarks():
         out.print(f"  note: {remark}", markup=False, soft_wrap=True)
 

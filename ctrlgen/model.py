@@ -18,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, Limit, Links, Signal
+from ctrlgen.devices.sensor import mounting_faults
 from ctrlgen.effect import Effect, Place
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.units import base_unit, same_dimension, show
@@ -233,7 +234,7 @@ class _Chain:
         self.effects = [(effect, p.effect[k], k) for k, effect in enumerate(device.effect)]
         self.members: list[tuple[Effect, SimpleNamespace, int, dict[str, ca.SX]]] = []
         names, scales, units_ = [], [], []
-        faults = []
+        faults = mounting_faults(device.sensor, links.components, links.pose_units)
         for effect, values, k in self.effects:
             channels, units = self._channels(effect.place)
             chosen = (

@@ -8,16 +8,12 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.effect import Effect
 from ctrlgen.units import Quantity
-
-
-class Section(BaseModel):
-    """A table of a device file. Unknown keys are faults; nothing changes after loading."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
 
 @dataclass(frozen=True)
@@ -99,6 +95,7 @@ class Device(Section):
     title: str
     source: str
     effect: tuple[Effect, ...] = ()
+    sensor: tuple[AnySensor, ...] = ()
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

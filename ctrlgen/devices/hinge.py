@@ -6,7 +6,7 @@ hinge = { kind = "circular", R = "1.1 mm", t = "0.84 mm", equation = "auto" }
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Literal
+from typing import Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -31,11 +31,21 @@ Group = Literal[
 
 
 class HingeEquations(Section):
-    """Whose equation gives each compliance, as in S3 Table 2."""
+    """Whose equation gives each compliance, as in S3 Table 2; one name in place of the table means all three."""
 
     alpha_z_per_M_z: Group = "auto"
     delta_y_per_F_y: Group = "auto"
     delta_x_per_F_x: Group = "auto"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_for_all(cls, given: Any) -> Any:
+        if not isinstance(given, str):
+            return given
+        known = get_args(Group)
+        if given not in known:
+            raise ValueError(f"{given!r} must be one of {', '.join(known)}, or a table with one of them per compliance")
+        return dict.fromkeys(table.PLANAR, given)
 
 
 class Hinge(Section):
@@ -49,7 +59,7 @@ class Hinge(Section):
     kind: Literal["circular"]
     R: Length
     t: Length
-    equation: Group | HingeEquations = "auto"
+    equation: HingeEquations = HingeEquations()
     outside: table.Outside = "refuse"
     shear_factor: quantity("1", low=0.0, high=2.0) | None = None
     b: Length | None = Field(default=None, description="width")
@@ -76,8 +86,6 @@ class Hinge(Section):
     @property
     def equations(self) -> dict[str, str]:
         """The group asked for, per compliance."""
-        if isinstance(self.equation, str):
-            return dict.fromkeys(table.PLANAR, self.equation)
         return {key: getattr(self.equation, key) for key in table.PLANAR}
 
     def notes(self) -> list[str]:
