@@ -172,15 +172,39 @@ def test_a_compiler_that_says_nothing_is_reported_with_its_command(scenario, tmp
     refused(ctrlgen("run", scenario, "--out", tmp_path / "out", PATH=f"{tools}:/bin/nowhere"), "gcc", "status 1")
 
 
-def test_devices_without_dynamics_or_height_are_refused_where_those_are_needed(tmp_path):
+def test_a_device_without_dynamics_has_no_frequency_response(tmp_path):
     devices = SCENARIOS / "devices"
     refused(
         ctrlgen("bode", devices / "meso_hexapod.toml", "--out", tmp_path / "b.svg", "--at", "delta_x=1um"),
         "there are none",
     )
-    refused(ctrlgen("workspace", devices / "rrr_case2.toml", "--out", tmp_path / "w"), "three translations")
     done = ctrlgen("bode", devices / "rrr_case2.toml", "--out", tmp_path / "b.png", "--at", "theta_z=-2mrad")
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "across", "says"),
+    [("mems_hexapod", "delta_z [um]", "delta_z 20 um"), ("meso_hexapod", "delta_z [um]", "delta_z 20 um"),
+     ("rrr_case2", "theta_z [urad]", "theta_z -2195 urad")],
+)  # fmt: skip
+def test_the_workspace_of_any_device_is_mapped_by_one_command(tmp_path, name, across, says):
+    out = tmp_path / "w"
+    done = ctrlgen("workspace", SCENARIOS / "devices" / f"{name}.toml", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert says in done.stdout and across in done.stdout and "anywhere" in done.stdout
+    drawn = (out / "workspace.svg").read_text()
+    assert across in drawn and "largest ball" in drawn
+    assert len(json.loads((out / "workspace.json").read_text())["alone"]) == 3
+
+
+def test_a_workspace_is_sliced_where_it_is_asked_for(tmp_path):
+    rrr = SCENARIOS / "devices" / "rrr_case2.toml"
+    out = tmp_path / "w"
+    done = ctrlgen("workspace", rrr, "--out", out, "--at", "theta_z=-2mrad,delta_x=1um")
+    assert done.returncode == 0 and "delta_x 1 um, theta_z -2000 urad" in done.stdout
+    refused(ctrlgen("workspace", rrr, "--out", out, "--at", "theta_z=2mrad"), "cannot be held")
+    refused(ctrlgen("workspace", rrr, "--out", out, "--at", "theta_z"), "channel=value")
+    refused(ctrlgen("workspace", rrr, "--out", out, "--at", "delta_z=1um"), "delta_z")
 
 
 def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path):

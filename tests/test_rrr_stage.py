@@ -17,6 +17,7 @@ from ctrlgen.devices import rrr_stage as device_module
 from ctrlgen.physics import circular_hinge_table, piezo_stack, rrr_stage
 from ctrlgen.reproduce import s3, s3_lengths, s3_tables
 from ctrlgen.reproduce.row import Row, Status, half_unit
+from ctrlgen.workspace import Workspace
 
 CASES = (1, 2)
 ROTATION_SCALE = np.array([1.0, 1.0, 30e-3])  # rotations as motion of a point 30 mm away
@@ -355,15 +356,21 @@ def test_a_stack_pushes_with_what_its_travel_leaves_of_the_blocking_force(case: 
 
 
 def test_the_workspace_is_as_far_as_the_voltages_reach(case: int) -> None:
-    device, p = s3_lengths.printed_device(case), s3_lengths.corrected(case)
-    M, limit = device_module.output_per_voltage(device, p), 150.0
-    corners = M @ (np.array(list(product((0.0, limit), repeat=3))).T - limit / 2)
-    ranges = device_module.workspace(device, p)
-    assert np.allclose(ranges["together"], corners.max(axis=1), rtol=1e-12)
-    for k, alone in enumerate(ranges["alone"]):
-        volts = limit / 2 + np.linalg.solve(M, alone * np.eye(3)[k])
-        assert np.isclose(np.abs(volts - limit / 2).max(), limit / 2, rtol=1e-12)  # one stack just at its end
-        assert alone <= ranges["together"][k] * (1 + 1e-12)
+    """The mapped workspace against the corners of the voltages' cube, seen through the static map."""
+    device = s3_lengths.printed_device(case)
+    M, limit = device_module.output_per_voltage(device), 150.0
+    workspace = Workspace(build_model(device))
+    _, middle, _ = workspace.bases()
+    assert np.allclose(middle, M @ np.full(3, limit / 2), rtol=0, atol=1e-6 * np.abs(M).max(axis=1) * limit)
+    corners = M @ np.array(list(product((0.0, limit), repeat=3))).T
+    extent = workspace.extent(middle)
+    size = np.ptp(corners, axis=1)
+    ends = np.column_stack([corners.min(axis=1), corners.max(axis=1)])
+    assert (np.abs(extent - ends).max(axis=1) < 2e-4 * size).all()
+    for k, (low, high) in enumerate(workspace.ranges(middle)):
+        for end in (low, high):
+            volts = limit / 2 + np.linalg.solve(M, (end - middle[k]) * np.eye(3)[k])
+            assert np.isclose(np.abs(volts - limit / 2).max(), limit / 2, rtol=1e-6)  # one stack just at its end
 
 
 def test_a_circle_is_solved_with_voltages_that_the_static_map_gives(tmp_path: Any) -> None:

@@ -64,6 +64,20 @@ def test_the_largest_ball_is_inside_and_touches_on_all_sides(workspace, model, c
         assert workspace.excess(moved + 1.002 * ball.radius * directions * scale).max() > 0
 
 
+def test_no_pose_lies_beyond_the_ends(workspace, model, rng):
+    """Boundary points in many directions stay inside the extent; the ends of each channel alone do not go as far."""
+    extent = workspace.extent(at(20))
+    directions = rng.normal(size=(3000, 6)) * np.array(model.signals["pose"].scale)
+    edge = at(20) + workspace.reach(at(20), directions)[:, None] * directions
+    size = np.diff(extent)[:, 0]
+    assert (edge.min(axis=0) >= extent[:, 0] - 1e-4 * size).all() and (
+        edge.max(axis=0) <= extent[:, 1] + 1e-4 * size
+    ).all()
+    alone = workspace.ranges(at(20))
+    assert (alone[:, 0] >= extent[:, 0] - 1e-4 * size).all() and (alone[:, 1] <= extent[:, 1] + 1e-4 * size).all()
+    assert np.diff(alone)[0, 0] < 0.9 * size[0]
+
+
 def test_a_base_that_cannot_be_held_is_refused(workspace):
     with pytest.raises(InputError, match="cannot be held"):
         workspace.ranges(np.array([0, 0, 0, 10 * UM, 0, 0]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -155,16 +155,6 @@ def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.
 def output_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
     """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]."""
     return ca.DM(stage(device, p).complete_J).full() @ input_per_voltage(device, p)
-
-
-def workspace(device: RrrStage, p: SimpleNamespace | None = None) -> dict[str, list[float]]:
-    """Half ranges of (dx, dy, dalpha) [m, m, rad] over stack voltages from 0 to their limit.
-
-    'alone': the other two stay at the centre; 'together': over the whole workspace.
-    """
-    M, u = ca.DM(output_per_voltage(device, p)), device.piezo.voltage_limit.si
-    ranges: dict[str, Any] = {"alone": rrr_stage.reach_alone(M, u), "together": rrr_stage.reach_together(M, u)}
-    return {name: [float(value) for value in values] for name, values in ranges.items()}
 
 
 def matrices(device: RrrStage) -> dict[str, np.ndarray]:

@@ -132,18 +132,3 @@ def kinetostatics(hinges: Sequence[Matrix], g: Any) -> Kinetostatics:
         C_inFin=ca.mtimes(C_oFin.T, F_eqv),  # (B.83)
         clamped=ca.mtimes([load.T, hinges[0], load]) - ca.mtimes(c_o.T, equivalent),
     )
-
-
-def reach_alone(M: Matrix, u: Scalar) -> list[Scalar]:
-    """Half the range of each output alone, the others at their centre, for y = M x with x in [0, u]^3, [SI of y].
-
-    x - u/2 = M^-1 e_k y stays within u/2 where |y| <= (u/2)/max|M^-1 e_k|.
-    """
-    N = ca.fabs(ca.inv(M))
-    return [u / 2 / ca.mmax(N[:, k]) for k in range(3)]
-
-
-def reach_together(M: Matrix, u: Scalar) -> list[Scalar]:
-    """Half the range of each output over all of [0, u]^3: the edges of the box around the workspace, [SI of y]."""
-    S = ca.fabs(M)
-    return [u / 2 * ca.sum2(S[k, :]) for k in range(3)]
