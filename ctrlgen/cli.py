@@ -251,6 +251,8 @@ def reproduce(
         return
     colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
     table = _table(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
+    for words in (table.columns[1], table.columns[-1]):
+        words.no_wrap = False  # long words break; the numbers never make way for them
     for row in rows:
         if differing and row.status is Status.REPRODUCED:
             continue

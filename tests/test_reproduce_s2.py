@@ -1,12 +1,33 @@
 from __future__ import annotations
 
+import re
 from collections import Counter
 
 import pytest
 
+from ctrlgen.measuring_chain import SENSORS
 from ctrlgen.physics import circular_hinge_table as table
+from ctrlgen.reproduce import all as everything
 from ctrlgen.reproduce.row import Row, Status
 from ctrlgen.reproduce.s2 import PRINTED_ERRORS, rows
+
+
+def test_the_page_of_s2_shows_its_measuring_chain_and_the_hinge_errors(tmp_path, found):
+    """The hinge errors are S3's figures; its Table 3 is among the rows of S2."""
+    page = tmp_path / "page.html"
+    everything.write_page(list(found.values()), page)
+    text = page.read_text()
+    for figure in (
+        "Figs. A.8 and A.9",
+        "Figs. A.3 and A.10",
+        "Fig. 3, alpha_z/M_z",
+        "Fig. 4, delta_y/F_y",
+        "Fig. 5, delta_x/F_x",
+    ):
+        assert text.count(f"<figcaption>{figure}") == 1
+    for name, sensor in SENSORS.items():
+        drawn = float(re.search(rf"{name}: ([\d.]+) um/V", text)[1])
+        assert drawn == pytest.approx(sensor.sensitivity * 1e6, rel=5e-4)  # of one recording of 12 s
 
 
 @pytest.fixture(scope="module")

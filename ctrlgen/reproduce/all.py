@@ -14,7 +14,7 @@ from ctrlgen.figures import STYLE, draw_path, draw_signal, draw_stage_force, svg
 from ctrlgen.files import write_text
 from ctrlgen.firmware import codegen_folder
 from ctrlgen.model import build_model
-from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s3
+from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s2_figures, s3
 from ctrlgen.reproduce.row import Row
 from ctrlgen.reproduce.s0_data import SCENARIOS
 from ctrlgen.scenario import load_scenario
@@ -50,7 +50,7 @@ def _s3_figures() -> dict[str, str]:
     }
 
 
-FIGURES = {"S0": s0_figures.figures, "S1": _s1_figures, "S3": _s3_figures}
+FIGURES = {"S0": s0_figures.figures, "S1": _s1_figures, "S2": s2_figures.figures, "S3": _s3_figures}
 
 
 def reproduce(sources: list[str]) -> list[Row]:
