@@ -259,7 +259,12 @@ def reproduce(
         ours = "" if row.ours is None else f"{row.ours:.6g}"
         status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
         table.add_row(
-            row.source, escape(row.where), escape(f"{row.printed} {row.unit}"), ours, status, escape(row.reason)
+            row.source,
+            escape(row.where),
+            escape(row.printed if row.unit == "1" else f"{row.printed} {row.unit}"),
+            ours,
+            status,
+            escape(row.reason),
         )
     out.print(table)
     counts = everything.counts(rows)

@@ -23,7 +23,8 @@ LAYERS = [
     "cprint", "firmware", "reference", "comparison",
     "measures", "figures", "bode report",
     "reproduce reproduce.row reproduce.rounding reproduce.s0_data", "reproduce.hinge_errors reproduce.s3_tables",
-    "reproduce.s3_lengths", "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s2_figures reproduce.s3",
+    "reproduce.s3_lengths",
+    "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s2_figures reproduce.s3 reproduce.s3_hinges",
     "reproduce.all",
     "job", "cli", "", "__main__",
 ]  # fmt: skip
