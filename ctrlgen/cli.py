@@ -152,21 +152,11 @@ def bode(
 
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
-    pose = Frame(signal_.channels, signal_.units).point(_channels(at), "--at")
+    pose = Frame(signal_.channels, signal_.units).pose(at, "--at")
     if picture.suffix not in (".svg", ".png"):
         raise InputError("--out", [Fault(str(picture), "must end in .svg or .png")])
     draw_bode(model, pose, picture)
     out.print(str(picture), soft_wrap=True, markup=False)
-
-
-def _channels(at: str) -> dict[str, str]:
-    """'delta_x=5um,delta_z=20um' by its channels."""
-    pairs = [part.partition("=") for part in at.split(",") if part.strip()]
-    if any(not value for _, _, value in pairs):
-        raise InputError(
-            "--at", [Fault(at, "write channel=value, separated by commas, such as delta_x=5um,delta_z=20um")]
-        )
-    return {name.strip(): value.strip() for name, _, value in pairs}
 
 
 @app.command()
@@ -187,7 +177,7 @@ def workspace(
 
     Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
     """
-    found = job.map_workspace(load_device(device), [_channels(text) for text in at or []], out_folder)
+    found = job.map_workspace(load_device(device), at or [], out_folder)
     signal_ = found.workspace.model.signals["pose"]
     named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
 

@@ -117,10 +117,10 @@ class WorkspaceSummary:
     everything: Ball
 
 
-def map_workspace(device: Device, poses: list[dict[str, str]], out: Path) -> WorkspaceSummary:
+def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSummary:
     """Ranges of each degree of freedom alone at some poses and anywhere, slices, the largest balls; workspace.json and a figure.
 
-    `poses` channel -> value with unit, others zero; without any those of `Workspace.bases`. The one in the middle of the
+    `poses` such as "delta_x=5um,delta_z=20um", channels left out zero; without any those of `Workspace.bases`. The one in the middle of the
     list is where the balls and the ends are looked for.
     """
     model = build_model(device)
@@ -130,7 +130,7 @@ def map_workspace(device: Device, poses: list[dict[str, str]], out: Path) -> Wor
             device.name, [Fault("workspace", "is mapped for platforms with a translation and another channel")]
         )
     frame = Frame(signal.channels, signal.units)
-    bases = [frame.point(pose, "--at") for pose in poses] or workspace.bases()
+    bases = [frame.pose(pose, "--at") for pose in poses] or workspace.bases()
     ranges = [workspace.ranges(base) for base in bases]
     middle = bases[len(bases) // 2]
     balls = workspace.ball(middle, workspace.translations), workspace.ball(middle, tuple(range(len(signal.channels))))

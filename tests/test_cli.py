@@ -148,6 +148,14 @@ def test_an_interruption_at_any_moment_leaves_nothing_behind(tmp_path, stop, aft
         assert list(tmp_path.iterdir()) == []
 
 
+def test_a_device_in_place_of_a_scenario_and_the_reverse_is_named(tmp_path):
+    refused(ctrlgen("run", DEVICE, "--out", tmp_path / "out"), "describes a device")
+    for scenario in (SCENARIOS / "circle20", SCENARIOS / "circle20" / "scenario.toml"):
+        refused(
+            ctrlgen("workspace", scenario, "--out", tmp_path / "out"), "is a scenario", "../devices/mems_hexapod.toml"
+        )
+
+
 def test_titles_with_brackets_are_printed_as_they_are(scenario, tmp_path):
     text = (scenario / "scenario.toml").read_text().replace('title = "t"', 'title = "scan [/raster] 20 [um] */ x"')
     (scenario / "scenario.toml").write_text(text)
@@ -204,7 +212,7 @@ def test_a_workspace_is_sliced_where_it_is_asked_for(tmp_path):
     assert done.returncode == 0 and "delta_x 1 um, theta_z -2000 urad" in done.stdout
     refused(ctrlgen("workspace", rrr, "--out", out, "--at", "theta_z=2mrad"), "cannot be held")
     refused(ctrlgen("workspace", rrr, "--out", out, "--at", "theta_z"), "channel=value")
-    refused(ctrlgen("workspace", rrr, "--out", out, "--at", "delta_z=1um"), "delta_z")
+    refused(ctrlgen("workspace", rrr, "--out", out, "--at", "delta_z=1um"), "error: --at", "delta_z: is not a channel")
 
 
 def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path):

@@ -47,7 +47,7 @@ class Cube(Section):
 
 
 class Workspace(Section):
-    """Largest rotation and translation of any axis."""
+    """Largest rotation and translation of any axis that the paper states; no limit of the model, `travel` is."""
 
     rotation: quantity("deg", positive=True)
     translation: quantity("um", positive=True)
@@ -85,8 +85,8 @@ class MesoHexapod(Device):
             drive=drive,
             state=None,
             rest=(),
-            displacement_scale=1e-5,
-            force_scale=1e-5,
+            displacement_scale=travel,
+            force_scale=travel,
             force=lambda u, x, d: u,
             resistance=lambda d: d,
             force_unit="um",

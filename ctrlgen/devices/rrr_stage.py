@@ -152,11 +152,6 @@ def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.
     return ca.DM(ca.inv(K) * piezo_stack.blocked_force(1.0, p.piezo)).full()
 
 
-def output_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
-    """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]."""
-    return ca.DM(stage(device, p).complete_J).full() @ input_per_voltage(device, p)
-
-
 def matrices(device: RrrStage) -> dict[str, np.ndarray]:
     """The matrices the paper prints, as (3, 3) arrays in SI, by their symbol, and those of the whole model."""
     k = stage(device)
