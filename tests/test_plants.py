@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from ctrlgen.physics import xy_stage as linear_stage
 
 pytest.importorskip("exudyn", reason="no Exudyn: the independent models were not built; pip install ctrlgen[plant]")
 
+import plants.__main__ as program
 from plants.cases import COUPLED, circle, coupled_poses
 from plants.mems_hexapod import MemsHexapod, bar_force, temperature_for, temperatures
 from plants.numbers import read
@@ -234,6 +237,16 @@ def test_circle(whole):
     assert len(case.command) == 100
     assert np.hypot(case.command[:, 3], case.command[:, 4]) == pytest.approx(10.0, abs=1e-9)
     assert np.mean(list(case.mean_errors().values())) == pytest.approx(3.97, abs=0.05)
+    assert list(case.parasitic().values()) == pytest.approx([5.67e-6, 5.66e-6, 4.36e-6], rel=0.03)
+
+
+def test_the_program_prints_table_3_and_the_circle(monkeypatch, capsys):
+    monkeypatch.setattr(program, "stage_forces", lambda: None)  # seconds, and nothing of the two tables
+    monkeypatch.setattr("sys.argv", ["plants"])
+    program.main()
+    printed = capsys.readouterr().out
+    assert re.search(r"theta_z +-4\.0 mrad +-3\.89\d +2\.8\d % +4\.56 %", printed)
+    assert re.search(r"mean of the three +3\.9\d % +printed 3\.38 %", printed)
 
 
 def _simpson(force: np.ndarray, travel: np.ndarray) -> float:
