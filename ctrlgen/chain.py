@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, Links, Signal
+from ctrlgen.devices.sensor import mounting_faults
 from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.units import base_unit, same_dimension
@@ -29,7 +30,7 @@ class Chain:
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
         self.members: list[_Member] = []
-        self.faults: list[Fault] = []
+        self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
             self._place(k, effect, p.effect[k])
         if self.faults:

@@ -160,7 +160,7 @@ class _Together:
     Adding hypothesis j to a set K raises it by (z_j - c_jK C_KK^-1 z_K)^2/(1 - c_jK C_KK^-1 c_Kj).
     """
 
-    def __init__(self, columns, seen, score, own, left, cosine, suspect) -> None:  # noqa: ANN001
+    def __init__(self, columns, seen, score, own, left, cosine, suspect) -> None:
         self.columns = [columns[j] for j in seen]
         self.index = seen
         self.root = np.sqrt(own[seen])
