@@ -28,7 +28,7 @@ LAYERS = [
     "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s2_figures reproduce.s3 reproduce.s3_hinges",
     "reproduce.all",
     "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise", "diagnosis.structure", "diagnosis.fit",
-    "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis", "diagnosis",
+    "diagnosis.slopes", "diagnosis.together", "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis", "diagnosis",
     "job", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}
