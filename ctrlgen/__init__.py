@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ctrlgen.firmware import generate
     from ctrlgen.job import Outcome, run
     from ctrlgen.model import Model, build_model
+    from ctrlgen.readings import Record, record_readings
     from ctrlgen.scenario import load_scenario
     from ctrlgen.simulation import Trace, simulate
     from ctrlgen.solution import Solution, solve
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 _HOME = {
     "comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
     "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware": ("generate",),
-    "job": ("Outcome", "run"), "model": ("Model", "build_model"), "scenario": ("load_scenario",),
+    "job": ("Outcome", "run"), "model": ("Model", "build_model"), "readings": ("Record", "record_readings"), "scenario": ("load_scenario",),
     "simulation": ("Trace", "simulate"), "solution": ("Solution", "solve"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
@@ -44,6 +45,7 @@ __all__ = [
     "InputError",
     "Model",
     "Outcome",
+    "Record",
     "Solution",
     "SolverError",
     "Status",
@@ -56,6 +58,7 @@ __all__ = [
     "generate",
     "load_device",
     "load_scenario",
+    "record_readings",
     "run",
     "simulate",
     "solve",

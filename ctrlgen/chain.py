@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, Links, Signal
+from ctrlgen.devices.sensor import mounting_faults
 from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.units import base_unit, same_dimension
@@ -24,11 +25,12 @@ class Chain:
     ) -> None:
         self.device, self.links, self.ambient, self.sample_time = device, links, ambient, sample_time
         self.z = ca.SX.sym("d", len(links.axes))
+        self.resisting = links.resistance(self.z)
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
         self.members: list[_Member] = []
-        self.faults: list[Fault] = []
+        self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
             self._place(k, effect, p.effect[k])
         if self.faults:
@@ -45,11 +47,20 @@ class Chain:
             self.faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(names)}, all"))
         if effect.of is not None and effect.of not in names:
             self.faults.append(Fault(f"effect[{k}].of", f"{effect.of!r} is not one of {', '.join(names)}"))
-        for i in chosen:
-            self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in effect.faults_at(places[i])]
+            return
+        other = None if effect.of is None else names.index(effect.of)
+        pairs = [(i, other) for i in chosen]
+        if effect.mutual:
+            pairs += [(other, i) for i in chosen]
+        for i, partner in pairs:
+            where = places[i] if partner is None else places[i].beside(places[partner])
+            if not effect.fits(where):
+                if effect.at != "all":
+                    self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} has no meaning at {names[i]}"))
+                continue
+            self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in effect.faults_at(where)]
             states = {s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") for s in effect.states}
-            partner = names.index(effect.of) if effect.of in names else None
-            self.members.append(_Member(effect, values, places[i], i, partner, states))
+            self.members.append(_Member(effect, values, where, i, partner, states))
 
     def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
         """`before` plus every term of the effects at `place`; their rates are noted on the way."""
@@ -73,6 +84,9 @@ class Chain:
             s.velocity = self.velocity[i] if self.velocity.numel() else None
             s.state = None if self.links.state is None else self.links.state.expr[i]
             s.rest = None if self.links.state is None else self.links.rest[i]
+            s.force = self.resisting[i]
+        where = channels(self.links, place)[s.index]
+        s.scale, s.travel = where.scale, where.travel_scale
         return s
 
     def parts(self, p: ca.SX, p_nominal: np.ndarray) -> dict[str, Any]:
@@ -245,6 +259,7 @@ def channels(links: Links, place: Place) -> list[Where]:
 def available(links: Links, sample_time: float | None = None) -> frozenset[str]:
     """What a device gives an effect's law to read, in the words of `Effect.needs`."""
     present = {
+        "unheated": links.heat_signal is None, "bipolar": links.bipolar, "actuator": not links.imposed,
         "velocity": links.mass is not None or links.imposed, "state": links.heat_signal is not None,
         "heat": links.heat_signal is not None, "ambient": True, "sample_time": sample_time is not None,
         "force": same_dimension(links.force_unit, "N"), "spatial": len(links.components) == 6,

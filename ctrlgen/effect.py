@@ -7,7 +7,8 @@ inversion, solving and generated C all read it from there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from enum import Enum
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -17,6 +18,8 @@ from pydantic import GetCoreSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from ctrlgen.units import Quantity, power_of, read_quantity, same_dimension, show, to_si, written_unit
+
+MARKERS = {"channel": "candela", "travel": "mole", "partner": "ampere"}  # base units that no law is written in
 
 
 class Place(Enum):
@@ -34,9 +37,10 @@ class Place(Enum):
 class Param:
     """One number of a law, with `bounds` in its `unit`; at `off` the whole effect vanishes.
 
-    In `unit` the word `channel` stands for the unit of the signal the effect acts on, and `travel` for that of the
-    stage displacement; `bounds` and `grid` then count in typical sizes of those signals, so that one law serves
-    micrometres and degrees. `grid` are the values tried when a shape is unknown and the effect is only suspected.
+    In `unit` the word `channel` stands for the unit of the signal the effect acts on, `travel` for that of the stage
+    displacement and `partner` for that of the other channel of a pair; `bounds` and `grid` then count in typical
+    sizes of those signals, so that one law serves micrometres and degrees. `grid` are the values tried when a shape
+    is unknown and the effect is only suspected.
     """
 
     name: str
@@ -45,11 +49,12 @@ class Param:
     doc: str
     off: float | None = None
     grid: tuple[float, ...] = ()
+    expected: tuple[float, float] | None = None
 
     @property
     def relative(self) -> bool:
         """Whether the unit depends on where the effect acts."""
-        return "channel" in self.unit or "travel" in self.unit
+        return any(word in self.unit for word in MARKERS)
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,7 @@ class State:
     @property
     def relative(self) -> bool:
         """Whether the unit depends on where the effect acts."""
-        return "channel" in self.unit or "travel" in self.unit
+        return any(word in self.unit for word in MARKERS)
 
 
 @dataclass(frozen=True)
@@ -80,30 +85,46 @@ class Where:
     scale: float
     travel_unit: str
     travel_scale: float
+    partner: str | None = None
+    partner_unit: str = "1"
+    partner_scale: float = 1.0
+
+    def beside(self, other: Where) -> Where:
+        """The same channel as one of a pair."""
+        return replace(self, partner=other.channel, partner_unit=other.unit, partner_scale=other.scale)
 
     def unit_of(self, number: Param | State) -> str:
         """The unit here, such as 'N/um^3'."""
-        channel, travel = (u if u.isalpha() else f"({u})" for u in (self.unit, self.travel_unit))
-        return number.unit.replace("channel", channel).replace("travel", travel)
+        unit = number.unit
+        for word, here in (("channel", self.unit), ("travel", self.travel_unit), ("partner", self.partner_unit)):
+            unit = unit.replace(word, here if here.isalnum() else f"({here})")
+        return unit
 
     def si(self, value: float, number: Param | State) -> float:
         """A bound, a grid value or a scale in SI, here."""
         if not number.relative:
             return to_si(value, number.unit)
-        marked = number.unit.replace("channel", "candela").replace("travel", "mole")
-        sizes = self.scale ** power_of(marked, "candela") * self.travel_scale ** power_of(marked, "mole")
-        return float(to_si(value, marked) * sizes)
+        marked, size = number.unit, 1.0
+        for word, marker in MARKERS.items():
+            marked = marked.replace(word, marker)
+        for marker, scale in zip(MARKERS.values(), (self.scale, self.travel_scale, self.partner_scale), strict=True):
+            size *= scale ** power_of(marked, marker)
+        return float(to_si(value, marked) * size)
 
 
 class Effect:
     """Base of every effect: one subclass per file in `ctrlgen/effects/`.
 
     `term(s, p)` is the contribution, in the unit of the place. `s` gives `value` (the signal at this place and
-    channel before any effect), `all` (the same for every channel, a vector), `index` (of this channel), the
-    effect's own states, `ambient` (rise of the surroundings [K]), `sample_time` [s] where it is needed and, for
-    axis channels, `displacement` (and `displacements` of all axes), `velocity` (None for a device without inertia),
-    and the actuator's `state`, such as its temperature, with its `rest`. An effect of `pairs` couples two channels:
-    `partner` is the index of the other one. `p` gives the parameters in SI.
+    channel before any effect), `all` (the same for every channel, a vector), `index` (of this channel), `scale` and
+    `travel` (typical sizes of the signal and of the stage displacement), the effect's own states, `ambient` (rise of
+    the surroundings [K]), `sample_time` [s] where it is needed and, for axis channels, `displacement` (and
+    `displacements` of all axes), `velocity` (None for a device without inertia), `force` (that the stage takes at
+    this displacement) and the actuator's `state`, such as its temperature, with its `rest`. `p` gives the parameters
+    in SI.
+
+    An effect of `pairs` couples two channels: `partner` is the index of the other one; a `mutual` one acts on both.
+    `channel_unit` and `partner_unit` restrict it to channels of that dimension (`channel`: that of its own).
     """
 
     library: ClassVar[dict[str, type[Effect]]] = {}
@@ -112,8 +133,12 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
-    needs: ClassVar[frozenset[str]] = frozenset()  # of velocity, state, heat, force, spatial, sample_time
+    # of actuator, ambient, bipolar, force, heat, sample_time, spatial, state, unheated, velocity
+    needs: ClassVar[frozenset[str]] = frozenset()
     pairs: ClassVar[bool] = False
+    mutual: ClassVar[bool] = False
+    channel_unit: ClassVar[str | None] = None
+    partner_unit: ClassVar[str | None] = None
     active: ClassVar[bool] = False  # may put energy into the stage
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 
@@ -136,6 +161,16 @@ class Effect:
     def amplitude(cls) -> Param:
         """The parameter that switches the effect off."""
         return next(p for p in cls.params if p.off is not None)
+
+    @classmethod
+    def fits(cls, where: Where) -> bool:
+        """Whether the law makes sense at this channel (for an effect of pairs: `beside` the other one)."""
+        if cls.channel_unit is not None and not same_dimension(where.unit, cls.channel_unit):
+            return False
+        if not cls.pairs:
+            return True
+        wanted = where.unit if cls.partner_unit == "channel" else cls.partner_unit or where.partner_unit
+        return where.partner not in (None, where.channel) and same_dimension(where.partner_unit, wanted)
 
     def term(self, s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
         """The contribution at this place and channel."""
@@ -171,7 +206,7 @@ class Effect:
         values = {}
         for param in chosen.params:
             if param.name not in given:
-                example = param.unit.replace("channel", "um").replace("travel", "um")
+                example = re.sub("channel|travel|partner", "um", param.unit)
                 faults.append(
                     f'{param.name} is missing ({param.doc}); write for example {param.name} = "{param.bounds[1]:g} {example}"'
                 )

@@ -72,6 +72,8 @@ def examine(record: Record, kind: str, model: Model, names: Names, where: str) -
     faults = faults or _nothing_happens(record, where)
     if faults:
         return Judged(faults=tuple(faults))
+    if record.role != "rest" and (record.drive == record.drive[0]).all():
+        notes.append(f"{record.name}: no drive moves; what the reading does is drift, noise, or what came before.")
     marked = []
     for piece in pieces:
         piece, said = _mark(piece, kind, names, spoken)
@@ -153,7 +155,7 @@ def _clock(record: Record, where: str) -> tuple[float, list[str], list[Fault]]:
     if len(back):
         k = int(back[0])
         what = (
-            f"does not rise from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {len(back)} times in all; "
+            f"does not rise from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {len(back)} such in all; "
             "sort the rows, remove doubled ones, or give sample_rate if the samples are evenly spaced"
         )
         return np.nan, [], [Fault(f"{where}.time", what)]

@@ -59,8 +59,13 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
         for e in (model.signals[follow].expr, model.balance, model.rates_of_heat, model.heat_of_drive)
     )
     if sample_time is None:
-        motion = rates
-        reached = ca.substitute(_solve(known, rates, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
+        motion = rates[:]
+        for i in (*model.stepped, *model.clocks):  # nothing rests there: an equilibrium starts its record anew
+            motion[i] = x_1[i]
+        reached = ca.substitute(_solve(known, motion, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
+        here = ca.vertcat(reached, z, u_1, ca.DM(model.p_nominal))
+        for i, value in model.stepped.items():
+            reached[i] = ca.substitute(value, now, here)
     else:
         reached = ca.substitute(model.step(sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
         motion = x_1 - reached

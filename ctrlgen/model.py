@@ -137,7 +137,7 @@ class Model:
     def _lag(self, sample_time: float, rates: ca.SX) -> ca.SX:
         A = ca.jacobian(rates, self.x)
         h = sample_time
-        if A.sparsity().is_diag():
+        if (A.sparsity() + ca.Sparsity.diag(A.size1())).is_diag():
             rate = ca.diag(A)
             gain = ca.vertcat(*(_phi_1(rate[i], h) for i in range(self.x.numel())))
             return self.x + gain * rates

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +88,7 @@ def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
     parts = gate.hold_out([record for _, record in records], read[0].written.kind) if not faults else gate.Judged()
     if faults or parts.faults:
         raise InputError(source, [*faults, *parts.faults])
-    noise, said = _noise(channels, written, model)
+    noise, said = _noise(channels, written)
     return Recording(
         title=" + ".join(dict.fromkeys(file.written.title for file in read)),
         device=model.device.name,
@@ -107,7 +107,7 @@ def _names(model: Model, channels: tuple[str, ...], units: tuple[str, ...]) -> g
 
 
 def _noise(
-    channels: tuple[str, ...], written: Sequence[tuple[str, Column]], model: Model
+    channels: tuple[str, ...], written: Sequence[tuple[str, Column]]
 ) -> tuple[tuple[float | None, ...], tuple[str, ...]]:
     """The stated noise of each channel [SI]; where records differ the largest, with a note."""
     stated, notes = [], []
@@ -152,6 +152,7 @@ class _File:
             faults += reader.faults
             if raw is None:
                 continue
+            raw = replace(raw, name=f"{self.path.resolve().parent.name}/{raw.name}") if self.prefix else raw
             found = gate.examine(raw, self.written.kind, self.model, names, where)
             records += [(where, piece) for piece in found.records]
             notes += found.notes

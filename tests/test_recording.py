@@ -245,6 +245,7 @@ def test_two_recordings_are_joined_channel_by_channel(tmp_path, model):
     recording = load_recordings([a, b], model)
     assert recording.channels == ("reading.delta_x", "reading.theta_y") and recording.noise[1] is None
     assert [r.valid[:, 1].all() for r in recording.records] == [False, False, True]
+    assert [r.name for r in recording.records] == ["a/fit.csv", "a/held.csv", "b/c.csv"]
     assert np.isnan(recording.records[0].observed[:, 1]).all()
     assert any("given twice" in what for what in refused([a, a], model).values())
 
@@ -335,6 +336,13 @@ def test_a_record_in_which_nothing_happens_is_refused(tmp_path, model):
     assert "nothing can be learnt" in refused([two(tmp_path, still)], model)["record[0]"]
 
 
+def test_a_drive_that_never_moves_is_noted(tmp_path, model):
+    fit = {**samples(), **{f"u{a}": np.full(N, 0.2) for a in AXES}}
+    assert load_recordings([two(tmp_path, fit)], model).notes == (
+        "fit.csv: no drive moves; what the reading does is drift, noise, or what came before.",
+    )
+
+
 def test_rest_is_the_drive_at_rest(tmp_path, model):
     two(tmp_path, samples())
     records = [{"file": "fit.csv", "role": "rest"}, {"file": "held.csv", "role": "fit"}]
@@ -403,6 +411,7 @@ def test_spikes_are_marked(tmp_path, model):
     fit["x"][200:203] -= 0.3
     recording = load_recordings([two(tmp_path, fit)], model)
     assert np.array_equal(np.flatnonzero(~recording.records[0].valid[:, 0]), [100, 200, 201, 202])
+    assert np.isnan(recording.records[0].observed[[100, 200, 201, 202], 0]).all()
     assert "4 of 400 samples are spikes" in recording.notes[0]
 
 
@@ -430,15 +439,22 @@ def test_coloured_noise_has_no_spikes(rng):
         assert not spikes(lfilter([1], denominator, rng.standard_normal(20_000)), drive).any()
 
 
-def test_clipped_and_frozen_stretches_are_marked(tmp_path, model):
+def test_frozen_stretches_are_marked(tmp_path, model):
     fit = samples()
-    fit["x"] = np.minimum(fit["x"], 1.5)
-    clipped = fit["x"] == 1.5
-    fit["x"][10:40] = fit["x"][10]
+    fit["x"][60:90] = fit["x"][60]
     recording = load_recordings([two(tmp_path, fit)], model)
-    bad = ~recording.records[0].valid[:, 0]
-    assert bad[10:40].all() and bad[clipped].mean() > 0.9 and not bad[~clipped & (np.arange(N) >= 40)].any()
-    assert "stuck or clipped" in recording.notes[0]
+    assert np.array_equal(np.flatnonzero(~recording.records[0].valid[:, 0]), np.arange(60, 90))
+    assert "30 of 400 samples are in stretches that repeat themselves" in recording.notes[0]
+
+
+def test_a_channel_that_runs_into_its_end_is_clipped(rng):
+    t = np.arange(4000)
+    drive = np.sin(0.3 * t)[:, None]  # too fast to stay in the end for the eight samples of a frozen channel
+    reading = np.sin(0.3 * t) + 1e-3 * rng.standard_normal(4000)
+    clipped = np.minimum(reading, 0.7)
+    marked = stuck(clipped, drive)
+    assert not marked[reading < 0.7].any() and marked[reading >= 0.7].mean() > 0.6  # runs of four are left
+    assert not stuck(reading, drive).any()
 
 
 def test_a_coarse_sensor_at_rest_is_not_stuck():

@@ -8,23 +8,12 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.effect import Effect
 from ctrlgen.units import Quantity
-
-
-class Section(BaseModel):
-    """A table of a device file. Unknown keys are faults; nothing changes after loading.
-
-    `domain` is where a report places its numbers; `tolerance` is how far they may be off, relative, where the file
-    states no standard deviation: None where a number off its nominal would be a finding.
-    """
-
-    domain: ClassVar[str] = "mechanism"
-    tolerance: ClassVar[float | None] = None
-
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
 
 @dataclass(frozen=True)
@@ -78,7 +67,7 @@ class Links:
     With a `mass` per axis the displacement has inertia, mass d'' = force - resistance(d) - `drag`(d'), instead of
     standing in balance. With `feedback` (u, reading, d', x) -> drive the loop is closed: u is the reference, and
     `heat` (u - reading) drives the states. An `imposed` device is moved by its drive (displacement, velocity,
-    acceleration) and reads the force that takes.
+    acceleration) and reads the force that takes. `bipolar` says whether the drive has both signs.
     """
 
     axes: tuple[str, ...]
@@ -105,6 +94,7 @@ class Links:
     feedback: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX] | None = None
     command_signal: tuple[str, str, str, float] | None = None
     imposed: bool = False
+    bipolar: bool = True
 
 
 class Device(Section):
@@ -117,6 +107,7 @@ class Device(Section):
     title: str
     source: str
     effect: tuple[Effect, ...] = ()
+    sensor: tuple[AnySensor, ...] = ()
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -126,6 +117,10 @@ class Device(Section):
     def links(self, p: SimpleNamespace) -> Links:
         """The device's physics with the values `p` (numbers, or symbols where they are free)."""
         raise NotImplementedError
+
+    def remarks(self) -> list[str]:
+        """What a reader should know of the description, such as an equation used beyond its range."""
+        return []
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Every number of the device with its dotted path, such as 'struts.wire_length'."""

@@ -13,7 +13,7 @@ from ctrlgen.diagnosis.experiment import Experiment, next_experiment
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.profile import profiles
 from ctrlgen.diagnosis.proposal import files
-from ctrlgen.diagnosis.search import Search, Trial
+from ctrlgen.diagnosis.search import Round, Search, Trial
 from ctrlgen.diagnosis.unknown import unknown
 from ctrlgen.diagnosis.where import where
 
@@ -24,7 +24,7 @@ REST = 1.1  # noise: what is left above it is looked into although causes were f
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """`where`, `detectable`, `next_experiment`, `history` and `extra` (profiles, unknown, files of the next experiment)
-    as plain numbers and words, in the reader's units; `objects` the same as they were computed, for figures."""
+    as plain numbers and words, in the reader's units."""
 
     where: dict[str, Any]
     detectable: dict[str, Any]
@@ -64,33 +64,33 @@ def history(search: Search) -> tuple[dict[str, Any], ...]:
     rows = []
     following = [r.before for r in search.rounds[1:]] + [search.chosen]
     for number, (round_, then) in enumerate(zip(search.rounds, following, strict=True), 1):
-        grew = len(then.fit.structure.causes) > len(round_.before.fit.structure.causes)
         rows.append(
             {
                 "round": number,
                 "threshold": float(round_.screened.threshold),
                 "suspects": len(round_.screened.suspects),
                 "total_before": float(round_.before.total),
-                "tried": [_tried(t, round_.screened.suspects, then) for t in round_.trials],
+                "tried": [_tried(t, round_, then) for t in round_.trials],
                 "kept": [[c.effect, c.location] for c in then.fit.structure.causes],
-                "decision": _decision(round_.before, then, grew, bool(round_.trials)),
+                "decision": _decision(round_.before, then, bool(round_.trials)),
             }
         )
     return tuple(rows)
 
 
-def _tried(trial: Trial, suspects: tuple, then: Trial) -> dict[str, Any]:
-    z = next((s.z for s in suspects if s.hypothesis == trial.cause), float("nan"))
-    kept = trial.cause in then.fit.structure.causes
-    return plain(
-        {
-            "effect": trial.cause.effect, "location": trial.cause.location, "z": z, "total": trial.total,
-            "held_out": trial.held, "kept": kept,
-        }
-    )  # fmt: skip
+def _tried(trial: Trial, round_: Round, then: Trial) -> dict[str, Any]:
+    """The causes that one trial added, alone or together."""
+    earlier = round_.before.fit.structure.causes
+    z = {s.hypothesis: s.z for s in round_.screened.suspects}
+    causes = [
+        {"effect": c.effect, "location": c.location, "z": z.get(c), "kept": c in then.fit.structure.causes}
+        for c in trial.fit.structure.causes
+        if c not in earlier
+    ]
+    return plain({"causes": causes, "total": trial.total, "objective": trial.fit.objective, "held_out": trial.held})
 
 
-def _decision(before: Trial, then: Trial, grew: bool, tried: bool) -> str:
+def _decision(before: Trial, then: Trial, tried: bool) -> str:
     if not tried:
         return "nothing stands out: stopped"
     added = [c for c in then.fit.structure.causes if c not in before.fit.structure.causes]

@@ -13,7 +13,7 @@ class Creep(Effect):
     source = "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), standard solid"
     params = (
         Param("gain", "1", (0.0, 0.2), "extra travel after infinite time, per travel", off=0.0),
-        Param("tau", "s", (1e-3, 1e5), "relaxation time"),
+        Param("tau", "s", (1e-3, 1e5), "relaxation time", grid=(0.03, 0.3, 3.0, 30.0, 300.0)),
     )
     states = (State("z", "travel", 1.0),)
 

@@ -1,0 +1,20 @@
+"""A sensor that does not stand in line with the point it should measure."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class AbbeArm(Effect):
+    """Delta y = a theta: the arm a between sensor and point times the rotation `of`.
+
+    First order: the error is a theta^2/2. Holds for angles below 50 mrad.
+    """
+
+    place = Place.SENSOR
+    pairs = True
+    channel_unit = "m"
+    partner_unit = "rad"
+    source = "J. B. Bryan, Precision Engineering 1 (1979) 129: the Abbe principle revisited"
+    params = (Param("arm", "channel/partner", (-10.0, 10.0), "distance between sensor and point", off=0.0),)
+
+    def term(self, s, p):
+        return p.arm * s.all[s.partner]

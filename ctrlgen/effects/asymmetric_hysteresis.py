@@ -1,0 +1,32 @@
+"""Hysteresis that is stronger on one side of home than on the other."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place, State
+
+
+class AsymmetricHysteresis(Effect):
+    """F = -k z w', w(d) = d + a (sqrt(d^2 + L^2) - L), w' = 1 + a d/sqrt(d^2 + L^2), dz = dw (1 - sgn(dw) z/r).
+
+    Dahl's law in the warped displacement w, L the typical travel. As F dd = -k z dw it dissipates as Dahl's does.
+    """
+
+    place = Place.FORCE
+    needs = frozenset({"force"})
+    source = "P. R. Dahl, AIAA Journal 14 (1976) 1675; the warp is ours"
+    params = (
+        Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal at home", off=0.0),
+        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles", grid=(0.01, 0.03, 0.1, 0.3, 1.0)),
+        Param("skew", "1", (-0.95, 0.95), "a: how much stronger far on the positive side", grid=(-0.6, 0.6)),
+    )
+    states = (State("z", "travel", 0.1, stepped=True), State("w", "travel", 1.0, stepped=True))
+
+    def term(self, s, p):
+        slope = 1 + p.skew * s.displacement / ca.sqrt(s.displacement**2 + s.travel**2)
+        return -p.stiffness * s.z * slope
+
+    def update(self, s, p):
+        w = s.displacement + p.skew * (ca.sqrt(s.displacement**2 + s.travel**2) - s.travel)
+        step = w - s.w
+        settled = 1 - ca.exp(-ca.fabs(step) / p.reach)
+        return {"z": s.z + (ca.sign(step) * p.reach - s.z) * settled, "w": w}

@@ -1,0 +1,20 @@
+"""Damping that differs between the two directions."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class AsymmetricViscous(Effect):
+    """Delta F = -(c |v| + |c| v)/2: damping |c| forward only (c > 0) or backward only (c < 0).
+
+    It always dissipates. Holds beside the damping of the device; the slope in c at 0 leaves out -|c| v/2, which that takes up.
+    """
+
+    place = Place.FORCE
+    needs = frozenset({"velocity"})
+    source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: direction-dependent friction"
+    params = (Param("damping", "channel*s/travel", (-10.0, 10.0), "forward minus backward damping", off=0.0),)
+
+    def term(self, s, p):
+        return -(p.damping * ca.fabs(s.velocity) + ca.fabs(p.damping) * s.velocity) / 2

@@ -1,0 +1,23 @@
+"""Play in a gear, a nut or a joint."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place, State
+
+
+class Backlash(Effect):
+    """w = max(min(w, d + b/2), d - b/2), Delta d = w - d: what is carried stands still until the gap b is crossed.
+
+    Holds where friction keeps the carried side at rest inside the gap.
+    """
+
+    place = Place.DISPLACEMENT
+    source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash"
+    params = (Param("gap", "travel", (0.0, 1.0), "whole play", off=0.0),)
+    states = (State("w", "travel", 1.0, stepped=True),)
+
+    def term(self, s, p):
+        return s.w - s.value
+
+    def update(self, s, p):
+        return {"w": ca.fmax(ca.fmin(s.w, s.value + p.gap / 2), s.value - p.gap / 2)}

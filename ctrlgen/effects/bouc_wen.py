@@ -1,0 +1,36 @@
+"""Hysteresis of a material or joint that yields smoothly."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place, State
+
+
+class BoucWen(Effect):
+    """F = -k z, dz = dd (1 - (b sgn(dd z) + 1 - b) |z|/r), n = 1; b = beta/(beta + gamma), r = 1/(beta + gamma).
+
+    Solved exactly over the way from sample to sample, hence independent of rate; z is at most r. It dissipates
+    for every b in its bounds. b = 1/2 unloads straight, b = 1 is Dahl's law. Holds for reversals farther apart than a sample.
+    """
+
+    place = Place.FORCE
+    needs = frozenset({"force"})
+    source = "Y. K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249; R. Bouc (1967)"
+    params = (
+        Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
+        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles", grid=(0.01, 0.03, 0.1, 0.3, 1.0)),
+        Param("loop", "1", (0.55, 1.0), "share b of the law that depends on direction", grid=(0.55, 0.9)),
+    )
+    states = (State("z", "travel", 0.1, stepped=True), State("d", "travel", 1.0, stepped=True))
+
+    def term(self, s, p):
+        return -p.stiffness * s.z
+
+    def update(self, s, p):
+        step = s.displacement - s.d
+        way, zeta = ca.fabs(step) / p.reach, ca.sign(step) * s.z / p.reach
+        c = 2 * p.loop - 1
+        below, above = ca.fmax(-zeta, 0), ca.fmax(zeta, 0)
+        to_zero = ca.log(1 + c * below) / c
+        back, on = ca.fmin(way, to_zero), ca.fmax(way - to_zero, 0)
+        change = (1 + c * below) * (1 - ca.exp(-c * back)) / c + (1 - above) * (1 - ca.exp(-on))
+        return {"z": s.z + ca.sign(step) * p.reach * change, "d": s.displacement}

@@ -1,0 +1,14 @@
+"""A sensor that is not straight: the first even term of its nonlinearity."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Bow(Effect):
+    """Delta y = b y^2. Holds while the sensor's nonlinearity is a few per cent of the reading."""
+
+    place = Place.SENSOR
+    source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
+    params = (Param("curvature", "1/channel", (-0.3, 0.3), "nonlinearity per reading squared", off=0.0),)
+
+    def term(self, s, p):
+        return p.curvature * s.value**2

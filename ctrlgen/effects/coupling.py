@@ -1,0 +1,16 @@
+"""One stage carries its neighbour along."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Coupling(Effect):
+    """Delta d_i = g d_j: a share of the travel of the axis `of`. Holds for nested or parallel stages, first order."""
+
+    place = Place.DISPLACEMENT
+    pairs = True
+    partner_unit = "channel"
+    source = "S. Awtar, A. H. Slocum, J. Mech. Des. 129 (2007) 816: cross-axis error of XY flexures"
+    params = (Param("gain", "1", (-0.3, 0.3), "travel per travel of the other axis", off=0.0),)
+
+    def term(self, s, p):
+        return p.gain * s.all[s.partner]

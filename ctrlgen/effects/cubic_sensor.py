@@ -1,0 +1,14 @@
+"""A sensor that flattens, or steepens, toward both ends of its range."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class CubicSensor(Effect):
+    """Delta y = c y^3. Holds while the sensor's nonlinearity is a few per cent of the reading."""
+
+    place = Place.SENSOR
+    source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
+    params = (Param("curvature", "1/channel^2", (-0.3, 0.3), "nonlinearity per reading cubed", off=0.0),)
+
+    def term(self, s, p):
+        return p.curvature * s.value**3

@@ -1,0 +1,26 @@
+"""An error that repeats along the path: interferometer fringe, resolver or encoder pitch, screw pitch."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Cyclic(Effect):
+    """Delta y = A sin(2 pi y/Lambda + phi). One harmonic; use several for a distorted one.
+
+    Holds for A below Lambda/2 pi, so that the reading still rises with the position.
+    """
+
+    place = Place.SENSOR
+    source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
+    params = (
+        Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
+        Param(
+            "period", "channel", (1e-4, 8.0), "path of one period",
+            grid=(4.0, 2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05),
+        ),
+        Param("phase", "deg", (-360.0, 360.0), "phase at home", grid=(0.0, 90.0)),
+    )  # fmt: skip
+
+    def term(self, s, p):
+        return p.amplitude * ca.sin(2 * ca.pi * s.value / p.period + p.phase)

@@ -1,0 +1,36 @@
+"""Hysteresis of a piezo stack: the displacement lags behind the voltage."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place, State
+
+ELEMENTS = 4
+
+
+class DriveHysteresis(Effect):
+    """Delta u = g (sum_j w_j P_j - u), j = 1..4: P_j the play of u with radius r j/4, w_j ~ j^-q, sum w_j = 1.
+
+    Prandtl-Ishlinskii with play operators, independent of rate. Holds for congruent loops through the origin.
+    """
+
+    place = Place.DRIVE
+    needs = frozenset({"actuator"})
+    source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
+    params = (
+        Param("share", "1", (0.0, 0.5), "part of the drive that lags", off=0.0),
+        Param("reach", "channel", (1e-3, 2.0), "change of drive that all follow", grid=(0.03, 0.1, 0.3, 1.0)),
+        Param("taper", "1", (-1.0, 2.0), "q: how much more of the narrow ones", grid=(0.0,)),
+    )
+    states = tuple(State(f"play{j}", "channel", 1.0, stepped=True) for j in range(1, ELEMENTS + 1))
+
+    def term(self, s, p):
+        weights = [float(j) ** -p.taper for j in range(1, ELEMENTS + 1)]
+        late = [w * (getattr(s, f"play{j}") - s.value) for j, w in enumerate(weights, start=1)]
+        return p.share * sum(late) / sum(weights)
+
+    def update(self, s, p):
+        new = {}
+        for j in range(1, ELEMENTS + 1):
+            name, radius = f"play{j}", p.reach * j / ELEMENTS
+            new[name] = ca.fmax(ca.fmin(getattr(s, name), s.value + radius), s.value - radius)
+        return new

@@ -1,0 +1,19 @@
+"""A heater whose resistance changes as it gets hot, under an amplifier set for the cold one."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class HeaterResistance(Effect):
+    """R = R_0 (1 + a (T - T_rest)) at given voltage: Delta P = P (1/(1 + a (T - T_rest)) - 1).
+
+    Holds for 1 + a (T - T_rest) > 0: metals and doped silicon up to 800 K. At given current a has the other sign, to first order.
+    """
+
+    place = Place.HEAT
+    needs = frozenset({"heat", "state"})
+    source = "definition: linear temperature coefficient of resistance"
+    params = (Param("slope", "1/K", (-1e-3, 1e-2), "relative change of resistance per kelvin", off=0.0),)
+
+    def term(self, s, p):
+        rise = p.slope * (s.state - s.rest)
+        return -s.value * rise / (1 + rise)

@@ -1,0 +1,17 @@
+"""A joint or strut that gives way: the platform tilts when it is moved."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class LinkCompliance(Effect):
+    """Delta theta = c delta: the joint's moment, in proportion to the motion `of`, over its stiffness. Elastic, first order."""
+
+    place = Place.POSE
+    pairs = True
+    channel_unit = "rad"
+    partner_unit = "m"
+    source = "L. L. Howell, Compliant Mechanisms (2001), chapter 5: pseudo-rigid-body joints"
+    params = (Param("tilt", "channel/partner", (-3.0, 3.0), "rotation per motion", off=0.0),)
+
+    def term(self, s, p):
+        return p.tilt * s.all[s.partner]

@@ -1,0 +1,17 @@
+"""Drag of a fluid or an air film at speed."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class QuadraticDamping(Effect):
+    """Delta F = -c v |v|. Holds for turbulent flow."""
+
+    place = Place.FORCE
+    needs = frozenset({"velocity"})
+    source = "definition: drag at constant drag coefficient"
+    params = (Param("damping", "channel*s^2/travel^2", (0.0, 10.0), "force per speed squared", off=0.0),)
+
+    def term(self, s, p):
+        return -p.damping * s.velocity * ca.fabs(s.velocity)

@@ -1,0 +1,22 @@
+"""A converter, counter or encoder of coarse steps."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Quantisation(Effect):
+    """Delta y = s (q floor(y/q + 1/2) - y), s = 1 for true rounding to steps q.
+
+    Linear in s; in q and y it jumps, so its slope says nothing of the jumps: search q, do not descend.
+    """
+
+    place = Place.SENSOR
+    source = "B. Widrow, I. Kollar, Quantization Noise (2008)"
+    params = (
+        Param("share", "1", (0.0, 1.5), "1 where every reading is rounded", off=0.0),
+        Param("quantum", "channel", (1e-7, 1.0), "step", grid=(1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1)),
+    )
+
+    def term(self, s, p):
+        return p.share * (p.quantum * ca.floor(s.value / p.quantum + 0.5) - s.value)

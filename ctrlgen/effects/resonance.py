@@ -1,0 +1,30 @@
+"""A second mass on a spring: a payload, a cable, the frame."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place, State
+
+
+class Resonance(Effect):
+    """q'' = w^2 (d - q) + 2 zeta w (d' - q'), Delta F = k (q - d) + 2 zeta k/w (q' - d'), w = 2 pi f: k/w^2 is its mass.
+
+    Memories q and p = q'/w. Holds for one mode; sampling must resolve f.
+    """
+
+    place = Place.FORCE
+    needs = frozenset({"velocity"})
+    source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: two degrees of freedom"
+    params = (
+        Param("stiffness", "channel/travel", (0.0, 1e2), "spring of the second mass", off=0.0),
+        Param("frequency", "Hz", (0.5, 2e3), "with the stage held", grid=(10.0, 20.0, 40.0, 80.0, 160.0, 320.0)),
+        Param("damping", "1", (1e-3, 1.0), "damping ratio", grid=(0.02, 0.2)),
+    )
+    states = (State("q", "travel", 1.0), State("p", "travel", 1.0))
+
+    def term(self, s, p):
+        w = 2 * ca.pi * p.frequency
+        return p.stiffness * (s.q - s.displacement + 2 * p.damping * (s.p - s.velocity / w))
+
+    def rates(self, s, p):
+        w = 2 * ca.pi * p.frequency
+        return {"q": w * s.p, "p": w * (s.displacement - s.q + 2 * p.damping * (s.velocity / w - s.p))}

@@ -1,0 +1,16 @@
+"""An actuator connected the wrong way round."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Reversed(Effect):
+    """Delta u = -2 g u: the other sign for g = 1. Below 1/2 a weak drive, which `drive_gain` says better."""
+
+    place = Place.DRIVE
+    needs = frozenset({"actuator", "bipolar"})
+    domain = "mechanism"
+    source = "definition"
+    params = (Param("share", "1", (0.0, 1.2), "1 where the sign is wrong", off=0.0, expected=(0.9, 1.1)),)
+
+    def term(self, s, p):
+        return -2 * p.share * s.value

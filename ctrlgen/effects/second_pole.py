@@ -1,0 +1,25 @@
+"""A second thermal mass between heater and beams: part of the heat comes late."""
+
+from ctrlgen.effect import Effect, Param, Place, State
+
+
+class SecondPole(Effect):
+    """dw/dt = (P - w)/tau, Delta P = g (w - P): a share g of the power reaches the actuator through a second lag.
+
+    Holds for one more thermal mass; the model needs at least one sample per tau.
+    """
+
+    place = Place.HEAT
+    needs = frozenset({"heat"})
+    source = "J. H. Lienhard, A Heat Transfer Textbook (2019), chapter 5: lumped bodies"
+    params = (
+        Param("share", "1", (-0.5, 1.0), "part of the power that comes late", off=0.0),
+        Param("tau", "s", (1e-3, 1e4), "time constant", grid=(2e-3, 0.01, 0.05, 0.3, 2.0, 20.0)),
+    )
+    states = (State("w", "channel", 1.0),)
+
+    def term(self, s, p):
+        return p.share * (s.w - s.value)
+
+    def rates(self, s, p):
+        return {"w": (s.value - s.w) / p.tau}

@@ -1,0 +1,17 @@
+"""A dead channel: it reports a number, whatever happens."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Stuck(Effect):
+    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Between 0 and 1 a loose contact, on average."""
+
+    place = Place.SENSOR
+    source = "R. Isermann, Fault-Diagnosis Systems (2006): sensor faults"
+    params = (
+        Param("share", "1", (0.0, 1.0), "1 where nothing of the motion is seen", off=0.0),
+        Param("level", "channel", (-1e3, 1e3), "what is reported", grid=(0.0, 1.0)),
+    )
+
+    def term(self, s, p):
+        return -p.share * (s.value - p.level)

@@ -1,0 +1,19 @@
+"""Two actuators whose leads are exchanged."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class Swapped(Effect):
+    """Delta u_i = g (u_j - u_i) and Delta u_j = g (u_i - u_j): exchanged for g = 1; in between, crosstalk of the leads."""
+
+    place = Place.DRIVE
+    pairs = True
+    mutual = True
+    needs = frozenset({"actuator"})
+    partner_unit = "channel"
+    domain = "mechanism"
+    source = "definition"
+    params = (Param("share", "1", (0.0, 1.2), "1 where the two are exchanged", off=0.0, expected=(0.9, 1.1)),)
+
+    def term(self, s, p):
+        return p.share * (s.all[s.partner] - s.value)

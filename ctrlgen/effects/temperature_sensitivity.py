@@ -1,0 +1,15 @@
+"""A reading that moves with the temperature of the surroundings."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class TemperatureSensitivity(Effect):
+    """Delta y = c (T_room - T_room at rest). Holds for changes slow against the instrument's thermal time constant."""
+
+    place = Place.SENSOR
+    needs = frozenset({"ambient"})
+    source = "definition"
+    params = (Param("slope", "channel/K", (-10.0, 10.0), "reading per rise of the surroundings", off=0.0),)
+
+    def term(self, s, p):
+        return p.slope * s.ambient

@@ -1,0 +1,25 @@
+"""One line of vibration in what is read."""
+
+import casadi as ca
+
+from ctrlgen.effect import Effect, Param, Place, State
+
+
+class Vibration(Effect):
+    """Delta y = A sin(2 pi f t + phi), t from the common zero of the records' clock.
+
+    Holds for a steady source, such as mains or a pump; one line at a time.
+    """
+
+    place = Place.SENSOR
+    domain = "disturbance"
+    source = "definition"
+    params = (
+        Param("amplitude", "channel", (-1.0, 1.0), "of the line", off=0.0),
+        Param("frequency", "Hz", (1e-3, 1e5), "of the line", grid=(10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
+        Param("phase", "deg", (-360.0, 360.0), "at time zero", grid=(0.0, 90.0)),
+    )
+    states = (State("t", "s", 1.0, clock=True),)
+
+    def term(self, s, p):
+        return p.amplitude * ca.sin(2 * ca.pi * p.frequency * s.t + p.phase)
