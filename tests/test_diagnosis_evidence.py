@@ -1,0 +1,364 @@
+"""What stands beside the verdict, on recordings simulated without ctrlgen: exact steps of m, c, k, finer than a sample."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from conftest import SCENARIOS
+from scipy.signal import cont2discrete, lfilter
+
+from ctrlgen import build_model, load_device, load_scenario
+from ctrlgen.diagnosis.along import along
+from ctrlgen.diagnosis.detectable import detectable
+from ctrlgen.diagnosis.evidence import evidence
+from ctrlgen.diagnosis.experiment import separate
+from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.free import free
+from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.lines import lines
+from ctrlgen.diagnosis.noise import Noise, estimate
+from ctrlgen.diagnosis.profile import ABOVE, BOUNDED, FLAT, profiles, sandwich_over_model
+from ctrlgen.diagnosis.proposal import files
+from ctrlgen.diagnosis.response import Response
+from ctrlgen.diagnosis.screen import Screen
+from ctrlgen.diagnosis.search import Searcher
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.diagnosis.unknown import unknown
+from ctrlgen.diagnosis.where import where
+from ctrlgen.recording import Record, Recording, load_recordings
+
+H, N, NOISE = 1e-3, 2500, 5e-9
+M, C, K, KF = 0.5, 30.0, 2e5, 10.0
+AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
+CREEP, DRIFT, CUBIC = (
+    Hypothesis("creep", "stage:axis", "axis"),
+    Hypothesis("drift", "sensor:axis", "axis"),
+    Hypothesis("stiffening", "stage:axis", "axis"),
+)
+CACHE: dict = {}  # compiled responses of the axis, the same in every test
+
+
+def move(u, force=None, fine=10, numbers=(M, C, K, KF)):
+    """Position [m] of the axis under `u` [V], held, plus force(t, q, v, memory) -> (N, memory)."""
+    m, c, stiffness, k_f = numbers
+    A, B = np.array([[0, 1], [-stiffness / m, -c / m]]), np.array([[0], [1 / m]])
+    Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / fine)
+    x, memory, out = np.zeros(2), 0.0, np.zeros(len(u))
+    for k, volts in enumerate(u):
+        out[k] = x[0]
+        for j in range(fine):
+            extra, memory = (0.0, 0.0) if force is None else force((k + j / fine) * H, x[0], x[1], memory)
+            x = Ad @ x + Bd[:, 0] * (k_f * volts + extra)
+    return out
+
+
+def drive(n=N, slow=1.5, fast=0.3):
+    t = np.arange(n) * H
+    return (
+        slow * np.sin(2 * np.pi * 2.3 * t) + fast * np.sin(2 * np.pi * 13.1 * t + 1) + 0.2 * np.sin(2 * np.pi * 41 * t)
+    )
+
+
+def record(u, y, role, first=0.0, h=H):
+    n = len(u)
+    u, y = (np.reshape(v, (n, -1)) for v in (u, y))
+    time = first + np.arange(n) * (h if np.isfinite(h) else 1.0)
+    return Record(role, role, time, h, u, y, False, None, np.ones(y.shape, bool))
+
+
+def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=None, numbers=(M, C, K, KF)):
+    """A record to fit and one to hold out, of another drive, with white noise or what `white` makes of it."""
+    rng = np.random.default_rng(seed)
+    fit_u, held_u = (drive(n), 1.2 * np.sin(2 * np.pi * 1.7 * np.arange(n) * H)) if u is None else (u, u)
+    n, parts = len(fit_u), []
+    for role, given in (("fit", fit_u), ("hold_out", held_u)):
+        e = rng.standard_normal(n)
+        y = change(move(given, force, numbers=numbers), given) + NOISE * (e if white is None else white(e))
+        parts.append(record(given, y, role, first=0.0 if role == "fit" else n * H))
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
+    fitter = Fitter(recording, estimate(recording))
+    fitter.cache = CACHE
+    return fitter
+
+
+def mapped(fitter, structure=None):
+    """The fit, its linearisations and the map of what it leaves."""
+    fit = fitter.fit(structure or Structure(AXIS))
+    left = [along(fitter, fit, r) for r in (*fitter.to_fit, *fitter.held)]
+    return fit, left, where(left, fitter.recording.channels, fitter.recording.units)
+
+
+def stop(t, q, v, memory):
+    return -4e4 * max(q - 55e-6, 0.0), memory
+
+
+def coulomb(t, q, v, memory):
+    return -0.05 * np.tanh(v / 1e-4), memory
+
+
+def cubic(t, q, v, memory):
+    return -2e10 * q**3, memory
+
+
+def detent(t, q, v, memory):
+    return 0.2 * np.sin(2 * np.pi * q / 30e-6), memory
+
+
+def creeping(t, q, v, memory, gain=0.02, tau=0.6, fine=10):
+    """The stage yields by gain of the displacement, with the time constant tau: as a force of k times that."""
+    return K * gain * memory, memory + H / fine / tau * (q - memory)
+
+
+def test_a_stop_is_placed_at_the_end_of_the_travel_where_it_stands():
+    region = mapped(axis_fitter(stop))[2].region["axis"]
+    assert max(region, key=lambda s: s.share) is region[-1]
+    assert region[-1].share > 0.5 and region[-1].ci95[0] > 10
+
+
+def test_a_clean_record_has_nothing_to_place():
+    found = mapped(axis_fitter())[2]
+    assert found.output[0].ci95[0] < 0 < found.output[0].ci95[1]
+    assert found.coordinates.lives_in == "there is nothing left to place"
+    assert not any("direction" in said for said in found.said)
+
+
+def test_friction_differs_by_direction_and_a_cubic_spring_does_not():
+    rubbed = mapped(axis_fitter(coulomb))[2].direction["axis"]
+    sprung = mapped(axis_fitter(cubic))[2].direction["axis"]
+    assert rubbed[0].label == "forward" and rubbed[0].mean_ci95[1] < 0 < rubbed[1].mean_ci95[0]
+    assert sprung[0].mean_ci95[1] > sprung[1].mean_ci95[0] and sprung[1].mean_ci95[1] > sprung[0].mean_ci95[0]
+
+
+def test_a_vibration_is_placed_in_its_band_and_owes_nothing_to_the_drive():
+    bands = mapped(axis_fitter(change=lambda y, u: y + 30e-9 * np.sin(2 * np.pi * 70 * np.arange(len(y)) * H)))[2].band
+    worst = max(bands, key=lambda b: b.excess)
+    assert worst.low < 70 < worst.high and worst.ci95[0] > 1
+    assert worst.coherence < 0.5
+
+
+def test_a_step_is_placed_in_time():
+    def late(y, u):
+        return y + 40e-9 * (np.arange(len(y)) > 0.8 * len(y))
+
+    time = mapped(axis_fitter(change=late))[2].time
+    loud = [k for k, s in enumerate(time[:10]) if s.excess > 20]
+    assert loud and min(loud) >= 8  # tenths of the record to fit
+
+
+@pytest.mark.parametrize(
+    ("law", "word"), [(lambda q: q, "only where it is driven"), (lambda q: q + 40 * q**2, "even"), (lambda q: q + 4e6 * q**3, "odd")]
+)  # fmt: skip
+def test_the_lines_of_a_periodic_drive_tell_the_class_of_the_nonlinearity(law, word):
+    t = np.arange(3000) * H
+    u = sum(0.5 * np.cos(2 * np.pi * k * t + k**2) for k in (1, 3, 7))
+    y = law(move(u)) + NOISE * np.random.default_rng(1).standard_normal(len(u))
+    said = lines(record(u, y, "fit"), 0, "reading.axis", "um").said
+    assert word in said and ("even" in said) == (word == "even")
+
+
+@pytest.fixture(scope="module")
+def meso():
+    device = load_device(SCENARIOS / "devices" / "meso_hexapod.toml")
+    channels = tuple(f"reading.{c}" for c in build_model(device).signals["reading"].channels)
+    return device, channels, Response(device, (), channels, np.inf, False)
+
+
+def pose_fitter(meso, on_drive, on_pose):
+    """40 poses to fit and 20 to hold out; what the device does wrong is done here, outside its model."""
+    device, channels, response = meso
+    rng = np.random.default_rng(5)
+    u = rng.uniform(-2e-4, 2e-4, (60, 6))
+    noise = np.repeat([2e-6, 2e-7], 3)
+    blank = record(u, np.zeros((60, 6)), "fit", h=np.inf)
+    blank = Record(**{**blank.__dict__, "drive": u * on_drive})
+    y = response.outputs(blank, np.zeros(0)) * on_pose + noise * rng.standard_normal((60, 6))
+    parts = [record(u[a], y[a], role, h=np.inf) for role, a in (("fit", slice(0, 40)), ("hold_out", slice(40, 60)))]
+    units = ("deg",) * 3 + ("um",) * 3
+    recording = Recording("t", device.name, "poses", channels, units, tuple(noise), tuple(parts), ())
+    return Fitter(recording, estimate(recording))
+
+
+def test_a_weak_actuator_and_a_wrong_reading_are_told_apart(meso):
+    device = meso[0]
+    weak, wrong = np.ones(6), np.ones(6)
+    weak[2], wrong[3] = 0.97, 0.97
+    for on_drive, on_pose, kind, name in (
+        (weak, 1.0, "actuator", "2y"), (1.0, wrong, "reading", "reading.delta_x"),
+    ):  # fmt: skip
+        found = mapped(pose_fitter(meso, on_drive, on_pose), Structure(device))[2]
+        assert found.coordinates.lives_in == kind
+        alone = found.coordinates.alone[kind]
+        assert max(alone, key=alone.get) == name and alone[name] > 0.9
+        other = {"actuator": "reading", "reading": "actuator"}[kind]
+        assert found.coordinates.carried_by[kind] < 1.2 < found.coordinates.carried_by[other]
+
+
+def test_the_free_force_is_the_hidden_one():
+    def bumps(t, q, v, memory):
+        return 0.08 * np.exp(-(((t - 0.9) / 0.04) ** 2)) - 0.05 * np.exp(-(((t - 1.8) / 0.1) ** 2)), memory
+
+    fitter = axis_fitter(bumps)
+    left = mapped(fitter)[1]
+    found = free(left[0], fitter.noise, np.array([0.05]))
+    true = np.array([bumps(t, 0, 0, 0)[0] for t in left[0].record.time])
+    assert np.sqrt(np.mean((found.f[:, 0] - true) ** 2)) < 0.1 * np.abs(true).max()
+    assert np.corrcoef(found.f[:, 0], true)[0, 1] > 0.95
+
+
+def test_unknown_physics_is_mapped_and_described_but_not_named():
+    fitter = axis_fitter(detent)
+    fit, left, _ = mapped(fitter)
+    found = unknown(fitter, fit, left)
+    share = {m.of: m.share for m in found.maps["axis"]}
+    assert found.quantity == "force" and found.unit == "N"
+    assert share["position"] > 3 * max(share["time"], share["velocity"])
+    slow = axis_fitter(stop)
+    fit, left, _ = mapped(slow)
+    term = unknown(slow, fit, left).empirical
+    assert term.label == "empirical" and term.held_out_gain > 0.7
+    clean = axis_fitter()
+    fit, left, _ = mapped(clean)
+    assert unknown(clean, fit, left).empirical is None
+
+
+def test_profiles_are_finite_and_cover():
+    """Ten records; 95 % intervals that cover in seven or fewer of them would have a chance of 1e-3."""
+    covered = 0
+    for seed in range(10):
+        off = 1 + np.array([0.05, 0.2, 0.05, 0.02]) * np.random.default_rng(seed).standard_normal(4)  # as stated
+        fitter = axis_fitter(cubic, n=1500, seed=seed, numbers=(M, C, K, KF) * off)
+        fit = fitter.fit(Structure(AXIS).with_cause(CUBIC, {"k3": 1e10}))
+        (found,) = profiles(fitter, fit)
+        low, high = found.ci95
+        assert found.verified and found.shape == BOUNDED
+        assert low < found.value < high and high - low < 0.2 * found.value
+        covered += low <= 2e10 * 1e-18 <= high  # N/um^3
+    assert covered >= 8
+
+
+def test_a_shape_without_amplitude_is_not_bounded():
+    fitter = axis_fitter(n=1500)
+    fit = fitter.fit(Structure(AXIS).with_cause(CREEP, {"gain": 1e-4, "tau": 0.3}))
+    found = {p.parameter: p for p in profiles(fitter, fit)}
+    assert found["tau"].shape in (ABOVE, FLAT)
+
+
+def test_noise_with_memory_taken_as_white_widens_the_interval():
+    def red(e):
+        return lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], e)
+
+    ratios = []
+    for white in (None, red):
+        fitter = axis_fitter(white=white)
+        assert len(fitter.noise.ar[0]) == 0
+        fit = fitter.fit(Structure(AXIS).with_cause(DRIFT, {"rate": 1e-9}))
+        ratios.append(sandwich_over_model(fitter, fit)[-1])
+        (found,) = profiles(fitter, fit)
+        width = found.ci95[1] - found.ci95[0]
+        assert width > 1.9 * 1.96 * np.sqrt(fit.covariance[-1, -1]) * 1e6 * max(ratios[-1] / 1.25, 1)
+    assert ratios[0] < 1.25 < 2 < ratios[1]
+
+
+def rivals():
+    """A short slow record of a stage that creeps, fitted with creep and with drift."""
+    u = 1.5 * np.minimum(np.arange(600) * H / 0.05, 1.0)
+    fitter = axis_fitter(lambda *a: creeping(*a, gain=4e-4, tau=2.0), u=u)
+    creep = fitter.fit(Structure(AXIS).with_cause(CREEP, {"gain": 1e-3, "tau": 1.0}))
+    drift = fitter.fit(Structure(AXIS).with_cause(DRIFT, {"rate": 1e-8}))
+    return fitter, creep, drift
+
+
+def test_drift_and_creep_get_an_experiment_that_separates_them():
+    fitter, creep, drift = rivals()
+    found = separate(fitter, creep, drift, "both explain this recording alike")
+    assert found.before < 3 < found.after and found.after > 2 * found.before
+    assert found.settles and found.candidates[0].separation == max(c.separation for c in found.candidates)
+    u = found.record.drive[:, 0]
+    y = move(u, lambda *a: creeping(*a, gain=4e-4, tau=2.0))
+    y = y + NOISE * np.random.default_rng(9).standard_normal(len(u))
+    new = Record(**{**found.record.__dict__, "observed": y[:, None]})
+    parts = (*fitter.recording.records, new)
+    both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise)
+    both.cache = CACHE
+    gained = both.fit(drift.structure).objective - both.fit(creep.structure).objective
+    assert gained > 9  # the proposal, measured, does settle it
+
+
+def test_the_proposal_is_a_recording_to_fill_in(tmp_path):
+    fitter, creep, drift = rivals()
+    for name, text in files(fitter, creep, separate(fitter, creep, drift, ""), "../device.toml").items():
+        (tmp_path / name).write_text(text)
+    lines_ = (tmp_path / "drive.csv").read_text().splitlines()
+    rng = np.random.default_rng(0)
+    filled = [lines_[0] + ",reading.axis [um]", *(f"{line},{rng.standard_normal():.6g}" for line in lines_[1:])]
+    (tmp_path / "drive.csv").write_text("\n".join(filled))
+    read = load_recordings([tmp_path], build_model(AXIS))
+    assert [r.role for r in read.records] == ["fit", "hold_out"] and not (tmp_path / "scenario.toml").exists()
+
+
+def test_the_proposal_for_a_hexapod_is_a_scenario(meso, tmp_path):
+    device = meso[0]
+    fitter = pose_fitter(meso, 1.0, 1.0)
+    bare = fitter.fit(Structure(device))
+    pair = [
+        fitter.fit(bare.structure.with_cause(Hypothesis("drive_gain", f"actuator:{at}", at), {"gain": 1e-3}))
+        for at in ("2y", "3x")
+    ]
+    for name, text in files(
+        fitter, bare, separate(fitter, *pair, ""), str(SCENARIOS / "devices/meso_hexapod.toml")
+    ).items():
+        (tmp_path / name).write_text(text)
+    scenario = load_scenario(tmp_path)
+    assert scenario.command(build_model(device)).shape[1] == 6
+
+
+def test_what_is_called_detectable_is_seen_and_half_of_it_is_not():
+    clean = axis_fitter()
+    fit = clean.fit(Structure(AXIS))
+    open_ = [CUBIC, CREEP, DRIFT]
+    found = detectable(fit, Screen(clean, open_).run(fit), fit.n).smallest["stiffening"]
+    seen = {0.5: 0, 1.5: 0}
+    for share in seen:
+        for seed in range(3):
+            k3 = share * found.seen_from * 1e18  # N/um^3
+            fitter = axis_fitter(lambda t, q, v, memory, k3=k3: (-k3 * q**3, memory), seed=20 + seed)
+            screened = Screen(fitter, open_).run(fitter.fit(Structure(AXIS)))
+            z = next(s.z for s in screened.suspects if s.hypothesis == CUBIC)
+            seen[share] += abs(z) > screened.threshold
+    assert seen == {0.5: 0, 1.5: 3}
+
+
+def test_what_a_record_at_one_place_hides_is_said():
+    fitter = axis_fitter(u=np.full(600, 1e-9))
+    fit = fitter.fit(Structure(AXIS))
+    found = detectable(fit, Screen(fitter, [CUBIC, DRIFT]).run(fit), fit.n)
+    assert [h.effect for h in found.hidden] == ["stiffening"] and "drift" in found.smallest
+
+
+def test_evidence_is_numbers_that_json_knows():
+    fitter = axis_fitter(detent, n=1000)
+    searcher = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None)
+    search = searcher.run(Structure(AXIS))
+    found = evidence(fitter, search, explained=False)
+    text = json.dumps(
+        [found.where, found.detectable, found.next_experiment, found.history, found.extra], allow_nan=False
+    )
+    assert len(text) < 1e6
+    assert found.extra["unknown"] and set(found.where) == {"nominal", "left"}
+    assert [row["round"] for row in found.history] == list(range(1, len(search.rounds) + 1))
+    assert "stopped" in found.history[-1]["decision"]
+
+
+def test_noise_of_one_colour_is_taken_at_its_density():
+    """Free force of pure red noise stays within its own intervals."""
+    e = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], np.random.default_rng(4).standard_normal(N)) * NOISE
+    parts = (record(drive(), move(drive()) + e, "fit"), record(drive(), move(drive()) + e[::-1], "hold_out", N * H))
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), parts, ())
+    noise = Noise(np.array([NOISE * np.sqrt(1 - 0.9**2)]), (np.array([0.9]),), np.array([True]), ("given",))
+    fitter = Fitter(recording, noise)
+    fitter.cache = CACHE
+    left = mapped(fitter)[1]
+    found = free(left[0], noise, np.array([K * NOISE]))
+    assert np.mean(np.abs(found.f) < 1.96 * found.sd) > 0.9
