@@ -31,7 +31,7 @@ class Along:
 
     `residual` (n, n_y) observed - predicted, zero where not valid; `white` the same as unit white noise, zero where not
     `usable`; `displacement` and `velocity` (n, n_axes); `F_S`, `F_f`, `H_S`, `H_f` (n, ., .) with one column of f for
-    each axis at `place`.
+    each axis at `place`; `start_sd` (n_s,) how far the state may start from rest, `state_scale` its typical size.
     """
 
     record: Record
@@ -49,6 +49,7 @@ class Along:
     H_S: np.ndarray
     H_f: np.ndarray
     start_sd: np.ndarray
+    state_scale: np.ndarray
 
     @property
     def settled(self) -> bool:
@@ -89,12 +90,14 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
     links = fit.structure.device.links(fit.structure.device.values())
     place = acts_at(links)
     response, p, chosen = _probed(fitter, fit, record, place)
-    before, after = motion(response, record, p, _start(fitter, fit, record))
+    start = _start(fitter, fit, record)
+    before, after, y = motion(response, record, p, start)
+    if start is None:
+        y = fitter.predicted(fit, record)
     F_S, F_f, H_S, H_f = _linearised(response, record, p, chosen, before)
     at = before if np.isfinite(record.sample_time) else after
     m = response.model
     z = at[:, response.n_x :]
-    y = fitter.predicted(fit, record)
     noise = fitter.noise
     residual = np.where(record.valid, record.observed - y, 0.0)
     probes = m.device.effect[len(fit.structure.described.effect) :]
@@ -106,7 +109,7 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
         tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), links.travel_unit,
         residual,
         noise.whiten(residual, record.valid), noise.usable(record.valid), z, _velocity(response, record, at, z),
-        F_S, F_f, H_S, H_f, sd,
+        F_S, F_f, H_S, H_f, sd, np.concatenate([m.x_scale, m.z_scale]),
     )  # fmt: skip
 
 
@@ -132,16 +135,16 @@ def _start(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray | None:
 
 def motion(
     r: Response, record: Record, p: np.ndarray, start: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """S before and after each sample, (n, n_s)."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """S before and after each sample, (n, n_s), and the readings (n, n_y)."""
     constants, sample = r._kernel
     S, u, u_1, e = (
         ca.MX.sym(k, n) for k, n in (("S", r.n_s), ("u", r.model.u.numel()), ("u1", r.model.u.numel()), ("e", 1))
     )
-    one = ca.Function("one", [S, u, u_1, e], [sample(S, u, u_1, e, constants(p)[0])[0]])
+    one = ca.Function("one", [S, u, u_1, e], sample(S, u, u_1, e, constants(p)[0])[:2])
     begin = r._start(record, p, start)
-    after = one.mapaccum(len(record.time))(begin, *r._inputs(record)).full().T
-    return np.vstack([begin, after[:-1]]), after
+    after, y = (value.full().T for value in one.mapaccum(len(record.time))(begin, *r._inputs(record)))
+    return np.vstack([begin, after[:-1]]), after, y
 
 
 def _linearised(

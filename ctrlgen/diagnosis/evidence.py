@@ -62,8 +62,9 @@ def evidence(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> 
 def history(search: Search) -> tuple[dict[str, Any], ...]:
     """The rounds in order: what was tried, with T before and after and the z of the screen, and what was decided."""
     rows = []
-    following = [r.before for r in search.rounds[1:]] + [search.chosen]
-    for number, (round_, then) in enumerate(zip(search.rounds, following, strict=True), 1):
+    following = [*(r.before for r in search.rounds[1:]), search.chosen]
+    for number, round_ in enumerate(search.rounds, 1):
+        then = following[number - 1]
         rows.append(
             {
                 "round": number,

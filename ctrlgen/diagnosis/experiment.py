@@ -16,13 +16,12 @@ import numpy as np
 
 from ctrlgen.diagnosis.drives import admissible, poses, shapes
 from ctrlgen.diagnosis.fit import START_SIZE, Fit, Fitter
-from ctrlgen.diagnosis.search import Search, _warm
+from ctrlgen.diagnosis.search import Search
 from ctrlgen.recording import Record
 
-MOST_SAMPLES = 6000  # of a proposed series
+MOST_SAMPLES = 4000  # of a proposed series
 MOST_POSES = 100
 MOST_RIVALS = 2
-STEPS = 10  # of the fit of a suspect that the search left out
 SUSPECTS = 2
 SETTLES = 3.0  # standard deviations that settle a doubt
 
@@ -74,17 +73,13 @@ def _open(fitter: Fitter, search: Search, explained: bool) -> tuple[list[tuple[F
     chosen = search.chosen.fit
     if rivals:
         return [(chosen, t.fit) for t in rivals[:MOST_RIVALS]], "both explain this recording alike"
-    if explained:
+    if explained or not search.rounds or search.rounds[-1].before.fit is not chosen:
         return [], ""
-    suspects, effects = [], set()
-    for s in search.last.suspects:
-        if s.z**2 > search.last.threshold**2 and s.hypothesis.effect not in effects:
-            suspects.append(s)
-            effects.add(s.hypothesis.effect)
-    fits = [fitter.fit(_warm(chosen, s.hypothesis, s.start), None, STEPS) for s in suspects[:SUSPECTS]]
-    return (
-        [tuple(fits)] if len(fits) == SUSPECTS else []
-    ), "neither explains this recording; they describe the rest best"
+    tried: dict[str, Fit] = {}
+    for trial in search.rounds[-1].trials:  # none of them was good enough
+        tried.setdefault(trial.cause.effect, trial.fit)
+    fits = [*list(tried.values())[:SUSPECTS], chosen][:SUSPECTS]
+    return ([tuple(fits)] if len(fits) == SUSPECTS else []), "neither explains this recording; they come closest"
 
 
 def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:

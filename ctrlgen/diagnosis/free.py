@@ -43,15 +43,18 @@ def free(left: Along, noise: Noise, size: np.ndarray) -> Free:
 
 
 class _Problem:
-    """The augmented linear system of one record."""
+    """The augmented linear system of one record, in numbers of order one."""
 
     def __init__(self, left: Along, noise: Noise, size: np.ndarray) -> None:
         self.n = min(len(left.white), LONGEST)
         self.m, self.k = left.F_S.shape[1], left.F_f.shape[2]
         self.left, self.size = left, size
         density = noise.sd / np.array([1 - min(np.sum(a), 0.99) for a in noise.ar])  # coloured noise counts as white of
-        self.variance = np.maximum(density, noise.floor) ** 2  # its density at rest, so that slow noise is no force
-        self.P_0 = np.diag(np.concatenate([left.start_sd, size]) ** 2)
+        self.sd = np.maximum(density, noise.floor)  # its density at rest, so that slow noise is no force
+        self.residual = left.residual / self.sd
+        scale = np.concatenate([np.where(left.start_sd > 0, left.start_sd, left.state_scale), size])
+        self.up, self.down = scale, 1 / scale
+        self.P_0 = np.diag(np.concatenate([left.start_sd > 0, np.ones(self.k)]).astype(float))
 
     def _step(self, k: int) -> tuple[np.ndarray, np.ndarray]:
         """A from sample k to k + 1, and H at k."""
@@ -60,55 +63,59 @@ class _Problem:
         if not self.left.settled:
             A[:m, :m], A[:m, m:] = self.left.F_S[k], self.left.F_f[k]
             A[m:, m:] = np.eye(self.k)
-        return A, np.hstack([self.left.H_S[k], self.left.H_f[k]])
+        H = np.hstack([self.left.H_S[k], self.left.H_f[k]])
+        return self.down[:, None] * A * self.up, H * self.up / self.sd[:, None]
 
     def _noise(self, k: int) -> np.ndarray:
-        return np.diag(np.where(self.left.record.valid[k], self.variance, MISSING * self.variance))
+        return np.where(self.left.record.valid[k], 1.0, MISSING)
 
     def _change(self, speed: float | np.ndarray) -> np.ndarray:
         Q = np.zeros((*np.shape(speed), self.m + self.k, self.m + self.k))
         i = np.arange(self.m, self.m + self.k)
-        Q[..., i, i] = np.multiply.outer(speed, self.size**2)
+        Q[..., i, i] = np.asarray(speed)[..., None]
         return Q
+
+    def _update(self, k: int, x: np.ndarray, P: np.ndarray, H: np.ndarray) -> tuple[np.ndarray, ...]:
+        """v, S^-1, S, I - K H and x, P after the reading (Joseph's form), for one filter or several."""
+        R = self._noise(k)
+        S = H @ P @ H.T + np.diag(R)
+        inverse = np.linalg.inv(S)
+        v = self.residual[k] - x @ H.T
+        K = P @ H.T @ inverse
+        C = np.eye(len(self.up)) - K @ H
+        P = C @ P @ np.swapaxes(C, -1, -2) + K * R @ np.swapaxes(K, -1, -2)
+        return v, inverse, S, C, x + (K @ v[..., None])[..., 0], P
 
     def likelihood(self, speeds: np.ndarray, first: int, last: int) -> np.ndarray:
         """Log likelihood of each speed on samples `first` ... `last`, all filters side by side."""
         Q = self._change(speeds)
-        P = np.broadcast_to(self.P_0, Q.shape) + (Q if self.left.settled else 0.0)
-        x, total = np.zeros((len(speeds), len(self.P_0))), np.zeros(len(speeds))
+        P = Q if self.left.settled else np.broadcast_to(self.P_0, Q.shape)
+        x, total = np.zeros((len(speeds), len(self.up))), np.zeros(len(speeds))
         for k in range(first, last):
             A, H = self._step(k)
-            S = H @ P @ H.T + self._noise(k)
-            PH = P @ H.T
-            inverse = np.linalg.inv(S)
-            v = self.left.residual[k] - x @ H.T
+            v, inverse, S, _, x, P = self._update(k, x, P, H)
             total -= 0.5 * (np.einsum("qi,qij,qj->q", v, inverse, v) + np.linalg.slogdet(S)[1])
-            K = PH @ inverse
-            x = (x + np.einsum("qij,qj->qi", K, v)) @ A.T
-            P = A @ (P - K @ np.swapaxes(PH, 1, 2)) @ A.T + Q
+            x, P = x @ A.T, A @ P @ A.T + Q
         return total
 
     def smoothed(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """f (n, n_axes) and its standard deviation, given the whole record."""
-        n, m, total, Q = self.n, self.m, self.m + self.k, self._change(speed)
-        x, P = np.zeros(total), self.P_0 + (Q if self.left.settled else 0.0)
+        """f (n, n_axes) and its standard deviation [SI], given the whole record."""
+        n, m, total, Q = self.n, self.m, len(self.up), self._change(speed)
+        x, P = np.zeros(total), Q if self.left.settled else self.P_0
         xs, Ps, kept = np.empty((n, total)), np.empty((n, total, total)), []
         for k in range(n):
             A, H = self._step(k)
             xs[k], Ps[k] = x, P
-            inverse = np.linalg.inv(H @ P @ H.T + self._noise(k))
-            v, K = self.left.residual[k] - H @ x, P @ H.T @ inverse
-            kept.append((A, H, inverse, v, K))
-            x, P = A @ (x + K @ v), A @ (P - K @ H @ P) @ A.T + Q
-            P = (P + P.T) / 2
+            v, inverse, _, C, x, P = self._update(k, x, P, H)
+            kept.append((A, H.T @ inverse, H, v, C))
+            x, P = A @ x, A @ P @ A.T + Q
         score, information = np.zeros(total), np.zeros((total, total))
         f, sd = np.empty((n, self.k)), np.empty((n, self.k))
         for k in reversed(range(n)):
-            A, H, inverse, v, K = kept[k]
-            C = np.eye(total) - K @ H
-            score, information = C.T @ (A.T @ score), C.T @ (A.T @ information @ A) @ C
-            score, information = score - H.T @ inverse @ v, information + H.T @ inverse @ H
+            A, weight, H, v, C = kept[k]
+            AC = A @ C
+            score, information = AC.T @ score - weight @ v, AC.T @ information @ AC + weight @ H
             f[k] = (xs[k] - Ps[k] @ score)[m:]
             variance = np.diag(Ps[k] - Ps[k] @ information @ Ps[k])[m:]
             sd[k] = np.sqrt(np.maximum(variance, 0.0))
-        return f, sd
+        return f * self.size, sd * self.size

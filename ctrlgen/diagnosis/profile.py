@@ -21,7 +21,8 @@ FIRST = 2.0  # standard deviations at which the profile is looked at
 FARTHER = 3  # times it is looked at twice as far, while it is flat
 STEEP = 1.4  # times the quadratic rise, above which the others are fitted once more
 OVERSHOT, SECANTS = 1.5, 4  # of CI, beyond which the end is looked for again, so many times at most
-COST = 4e7  # samples x states x slopes that all profiles together may take
+COST = 2e7  # samples x states x slopes that all profiles together may take
+ADEQUATE = 2.0  # squares over the noise's, above which the objective is no likelihood and only the sandwich speaks
 BLOCKS = 40  # of the sandwich
 FEWEST_BLOCKS = 3  # times the free numbers: fewer blocks say nothing
 DISAGREES = 1.25  # sandwich over model deviation, above which the noise model is not believed
@@ -132,7 +133,8 @@ class _Surface:
         J = fit.J * self.scale
         self.H, self.best = J.T @ J, fit.objective
         states = max(len(s) for s in self.problem.sizes) + fit.J.shape[1]
-        self.left = max(int(COST / (fit.n * states * fit.J.shape[1])), 4)
+        affordable = max(int(COST / (fit.n * states * fit.J.shape[1])), 4)
+        self.left = affordable if fit.chi2 < ADEQUATE * fit.n else 0
 
     def affords(self) -> bool:
         """Whether another point may be looked at."""
