@@ -51,7 +51,11 @@ class Detectable:
 
 
 def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
-    """What would have been seen besides the causes of `fit`, by the screen of its residual over `n` samples."""
+    """What would have been seen besides the causes of `fit`, by the screen of its residual over `n` samples.
+
+    Where `fit` leaves more than the noise, that counts as noise here.
+    """
+    louder = max(1.0, (fit.chi2 / max(n, 1)) ** 0.5)
     need = max(screened.threshold, MATERIAL * n**0.5)
     nominal = {path: number for path, _, number in numbers(fit.structure.device)}
     kinds: dict[str, dict[Hypothesis, tuple[float, float, str]]] = {}
@@ -59,7 +63,7 @@ def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
         h = suspect.hypothesis
         if h.effect != PARAMETER and h.law.amplitude().expected:
             continue  # it is so or it is not: it has no size
-        sd = screened.amplitude_sd[h.effect, h.location]
+        sd = louder * screened.amplitude_sd[h.effect, h.location]
         if h.effect == PARAMETER:
             unit, weight = written_unit(nominal[h.path].text), 1 / max(abs(nominal[h.path].si), 1e-300)
         else:
@@ -69,7 +73,10 @@ def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
     beyond = [h for places in kinds.values() for h, (_, weight, _) in places.items() if screened.threshold * weight > 1]
     kinds = {kind: left for kind, p in kinds.items() if (left := {h: row for h, row in p.items() if h not in beyond})}
     smallest = {kind: _smallest(kind, places, screened, need) for kind, places in sorted(kinds.items())}
-    hidden = tuple(Hidden(h.effect, h.location, _behind(fit, k)) for h, k in screened.hidden.items())
+    free = {u.path for u in fit.structure.unknowns}
+    hidden = tuple(
+        Hidden(h.effect, h.location, _behind(fit, k)) for h, k in screened.hidden.items() if h.path not in free
+    )
     too_small = tuple(Hidden(h.effect, h.location, "the noise: it would show only beyond its bounds") for h in beyond)
     return Detectable(smallest, hidden + too_small)
 

@@ -15,7 +15,7 @@ from ctrlgen.diagnosis.along import motion
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.recording import Record
 
-STRENGTHS = (1.0, 0.8, 0.6, 0.4, 0.25, 0.1)  # of the range of the drives, tried downward until every limit is kept
+STRENGTHS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)  # of the range of the drives; the largest that keeps every limit
 SLACK = 1e-6  # of a limit's own size
 LINES = 15
 LEVELS = (0.0, 1.0, 0.0, -1.0, 0.0, 0.5, 0.0, -0.5)
@@ -82,9 +82,11 @@ def admissible(
     high = np.where(np.isfinite(high), high, template.drive.max(axis=0))
     n = len(shape.values)
     h = template.sample_time if np.isfinite(template.sample_time) else 1.0
-    for strength in STRENGTHS:
-        one_sided = low >= 0
-        half = strength * np.where(one_sided, (high - low) / 2, np.minimum(high, -low))
+    one_sided, best = low >= 0, None
+    first_left, last_left = 0, len(STRENGTHS) - 1
+    while first_left <= last_left:
+        middle = (first_left + last_left + 1) // 2
+        half = STRENGTHS[middle] * np.where(one_sided, (high - low) / 2, np.minimum(high, -low))
         centre = np.where(one_sided, low + half, 0.0)
         drive = np.clip(centre + half * shape.values, low, high)
         record = Record(
@@ -93,8 +95,10 @@ def admissible(
             np.ones((n, template.observed.shape[1]), bool),
         )  # fmt: skip
         if _kept(response, p, record):
-            return record, strength
-    return None
+            best, first_left = (record, STRENGTHS[middle]), middle + 1
+        else:
+            last_left = middle - 1
+    return best
 
 
 def _kept(response: Response, p: np.ndarray, record: Record) -> bool:

@@ -41,11 +41,13 @@ def empirical(fitter: Fitter, fit: Fit, left: list[Along], i: int) -> Empirical 
     size = sizes(to_fit, i)
     parts = [_slopes(fitter, a, i, size) for a in to_fit]
     names, S = parts[0][1], np.vstack([values for values, _ in parts])
-    S = np.vstack([S, np.zeros((len(fit.residual) - len(S), S.shape[1]))])  # the prior knows no feature
     scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
-    into = np.linalg.lstsq(fit.J / scale, S, rcond=1e-10)[0]
-    a = _sparse(S, S - fit.J / scale @ into, fit.residual, max(fit.chi2 - fit.n, 0.0), fit.n)
+    J, n = fit.J / scale, len(S)  # below the n readings stands the prior, which knows no feature
+    into = np.linalg.pinv(J.T @ J, rcond=1e-12) @ (J[:n].T @ S)
+    G = S.T @ S - (J[:n].T @ S).T @ into
+    c = S.T @ fit.residual[:n] - into.T @ (J.T @ fit.residual)
+    a = _sparse(np.diag(S.T @ S), G, c, max(fit.chi2 - fit.n, 0.0), fit.n)
     if not np.any(a):
         return None
     delta = (into @ a / scale)[: len(fit.theta)]
@@ -68,11 +70,11 @@ def _slopes(fitter: Fitter, a: Along, i: int, size: Sizes) -> tuple[np.ndarray, 
     return np.nan_to_num(fitter.noise.whiten(y, a.record.valid).reshape(-1, len(given))), list(given)
 
 
-def _sparse(S: np.ndarray, S_perp: np.ndarray, r: np.ndarray, excess: float, n: int) -> np.ndarray:
-    """Coefficients by forward selection on the projected slopes; zero where a feature was not chosen."""
-    size = np.linalg.norm(S, axis=0)
-    size[size == 0] = 1.0
-    G, c = (S_perp / size).T @ (S_perp / size), (S_perp / size).T @ r
+def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n: int) -> np.ndarray:
+    """Coefficients by forward selection, zero where a feature was not chosen; `G`, `c` the inner products of projected
+    slopes with one another and with the residual, `squares` of the slopes before projection."""
+    size = np.sqrt(np.where(squares > 0, squares, 1.0))
+    G, c = G / np.outer(size, size), c / size
     chosen: list[int] = []
     explained, need = 0.0, max(12.0 + np.log(max(n, 2)), WORTH * excess)
     while len(chosen) < MOST_TERMS:

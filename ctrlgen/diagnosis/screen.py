@@ -99,7 +99,8 @@ class Screen:
             for j in order
         }
         together = Together(columns, seen, score, own, left, cosine, self._suspect)
-        resembles = np.argmax(np.abs(project) * scale[:, None], axis=0) if len(project) else np.full(len(columns), -1)
+        own_size = np.sqrt(np.maximum(np.diag(sums.JJ), 1e-300))[:, None]
+        resembles = np.argmax(np.abs(sums.JS) / own_size, axis=0) if len(project) else np.full(len(columns), -1)
         hidden = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
         hidden = {h: k for h, k in hidden.items() if h not in best}
         threshold = self._threshold(cosine[np.ix_(seen, seen)])

@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.free import Free, free
 from ctrlgen.diagnosis.where import projected
 from ctrlgen.units import difference
 
-BINS = 12
+BINS = 24
 FEWEST = 5  # samples in a bin that is shown
 MOST_AXES = 2  # for which a term is sought
 CI = 1.959964
