@@ -208,6 +208,28 @@ def test_the_free_force_is_the_hidden_one():
     assert np.corrcoef(found.f[:, 0], true)[0, 1] > 0.99
 
 
+def test_the_free_force_is_the_conditional_mean_with_its_deviation():
+    """Against the Gaussian posterior written out as one dense system."""
+    fitter = axis_fitter(stop, n=150)
+    left = mapped(fitter)[1][0]
+    size, n = 0.05, len(left.white)
+    found = free(left, fitter.noise, np.array([size]))
+    D = np.hstack([np.eye(2), np.zeros((2, n))])  # of the state, by what it starts with and every f
+    G = np.zeros((n, n + 2))
+    for k in range(n):
+        own = np.zeros(n + 2)
+        own[2 + k] = 1.0
+        G[k] = left.H_S[k, 0] @ D + left.H_f[k, 0, 0] * own
+        D = left.F_S[k] @ D + np.outer(left.F_f[k, :, 0], own)
+    prior = np.zeros((n + 2, n + 2))
+    prior[:2, :2] = np.diag(left.start_sd**2)
+    prior[2:, 2:] = size**2 * (1 + found.speed * np.minimum.outer(np.arange(n), np.arange(n)))
+    gain = prior @ G.T @ np.linalg.inv(G @ prior @ G.T + NOISE**2 * np.eye(n))
+    np.testing.assert_allclose(found.f[:, 0], (gain @ left.residual[:, 0])[2:], atol=1e-4 * size)
+    posterior = prior - gain @ G @ prior
+    np.testing.assert_allclose(found.sd[:, 0], np.sqrt(np.diag(posterior)[2:]), rtol=1e-3)
+
+
 def test_unknown_physics_is_mapped_and_described_but_not_named():
     fitter = axis_fitter(detent)
     fit, left, _ = mapped(fitter)
