@@ -132,7 +132,10 @@ class Model:
             gain = ca.vertcat(*(_phi_1(rate[i], h) for i in range(self.x.numel())))
             return self.x + gain * rates
         norm = float(
-            ca.norm_inf(ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal))
+            ca.norm_inf(
+                ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal)
+                * (self.x_scale[None, :] / self.x_scale[:, None])
+            )
         )
         if h * norm > 1:
             raise InputError(
