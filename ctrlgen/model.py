@@ -68,6 +68,14 @@ class Model:
         """dx/dt (n_x,) as a function of x, z, u and p."""
         return ca.substitute(self.rates_of_heat, self.heat, self.heat_of_drive)
 
+    @cached_property
+    def settling(self) -> ca.SX:
+        """What is zero (n_x,) at an equilibrium: the rates; of memories by samples and clocks, which never rest, themselves."""
+        rows = self.rates[:]
+        for i in (*self.stepped, *self.clocks):
+            rows[i] = self.x[i]
+        return rows
+
     @property
     def ambient_symbol(self) -> ca.SX:
         """`ambient` as an argument of a function: the symbol, or one that nothing depends on."""
