@@ -16,6 +16,8 @@ from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.units import base_unit, same_dimension
 
+REACH = 10.0  # typical travels up to which a law is told the stage's force: beyond, a search may look but no stage goes
+
 
 class Chain:
     """Joins a device's links and its effects' terms, place by place."""
@@ -25,7 +27,8 @@ class Chain:
     ) -> None:
         self.device, self.links, self.ambient, self.sample_time = device, links, ambient, sample_time
         self.z = ca.SX.sym("d", len(links.axes))
-        self.resisting = links.resistance(self.z)
+        reach = REACH * links.displacement_scale
+        self.resisting = links.resistance(ca.fmin(ca.fmax(self.z, -reach), reach))
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}

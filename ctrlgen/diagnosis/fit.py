@@ -1,4 +1,4 @@
-"""Steps 2 and 7: the free numbers of a structure from the records to fit, by trust-region least squares.
+"""Steps 2 and 7: the free numbers of a structure from the records to fit, by damped least squares.
 
 min |W (y - y(p))|^2 + sum ((p - p_0)/sd)^2: W whitens with the noise, the second sum holds the device's own numbers
 within what is stated of them. Every parameter of every cause is fitted jointly with them.
@@ -10,14 +10,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ctrlgen.diagnosis.noise import Noise
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.recording import Record, Recording
 
 STEPS = 40
+NEGLIGIBLE = 0.01
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
+FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
 
 
@@ -70,19 +71,8 @@ class Fitter:
     def fit(self, structure: Structure, theta: np.ndarray | None = None, steps: int = STEPS) -> Fit:
         """The optimum from `theta`, or from the structure's own start."""
         problem = _Problem(self, structure)
-        low, high = problem.bounds
-        begin = (
-            np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)]) / problem.scale
-        )
-        begin = np.clip(begin, low + 1e-12 * (high - low), high - 1e-12 * (high - low))
-        if len(begin):
-            found = least_squares(
-                problem.residual, begin, problem.slopes, bounds=(low, high), method="trf", x_scale="jac", max_nfev=steps,
-                ftol=1e-7, xtol=1e-9, gtol=1e-9,
-            ).x  # fmt: skip
-        else:
-            found = begin
-        return problem.result(found * problem.scale)
+        begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)])
+        return problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
 
     def learn_noise(self, fit: Fit) -> None:
         """Where nothing but the misfit tells the noise: what `fit` leaves over, alike for all channels of one unit."""
@@ -106,23 +96,24 @@ class Fitter:
         if len(start) == 0:
             return response.outputs(record, fit.theta)
         sizes = _start_sizes(response)
-        for _ in range(2):  # readings are close to linear in what a record starts with
-            y, slopes = response.sensitivities(record, fit.theta, start)
-            white = self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
-            J = self.noise.whiten(slopes[:, :, len(fit.theta) :], record.valid).reshape(len(white), len(start)) * sizes
-            with_prior = np.vstack([J, np.eye(len(start))])
-            step = np.linalg.lstsq(with_prior, np.concatenate([white, -start / sizes]), rcond=None)[0]
-            start = start + step * sizes
+        y, slopes = response.sensitivities(record, fit.theta, start)  # close to linear in what a record starts with
+        white = self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
+        J = self.noise.whiten(slopes[:, :, len(fit.theta) :], record.valid).reshape(len(white), len(start)) * sizes
+        if not (np.isfinite(white).all() and np.isfinite(J).all()):
+            return y
+        with_prior = np.vstack([J, np.eye(len(start))])
+        start = sizes * np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(start))]), rcond=None)[0]
         return response.outputs(record, fit.theta, start)
 
     def whitened(self, fit: Fit, record: Record) -> np.ndarray:
         """The whitened residual (n, n_y) on any record; zero where a sample is not usable."""
         y = self.predicted(fit, record)
-        return self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid)
+        left = np.where(record.valid, record.observed - y, 0.0)
+        return _finite(self.noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid))
 
     def held_out(self, fit: Fit) -> tuple[float, int]:
         """Whitened sum of squares on the held-out records, and the number of usable samples."""
-        total = sum(float(np.sum(_finite(self.whitened(fit, r)) ** 2)) for r in self.held)
+        total = sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)
         return total, int(sum(self.noise.usable(r.valid).sum() for r in self.held))
 
 
@@ -133,6 +124,36 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _start_sizes(response: object) -> np.ndarray:
     m = response.model
     return START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(response.initial)]
+
+
+def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndarray:
+    """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431), steps clipped at the bounds.
+
+    Ends when a step promises less than `NEGLIGIBLE` of one squared standard deviation.
+    """
+    low, high = problem.bounds
+    x, damping = np.clip(x, low, high), 1e-6
+    r, J = problem.evaluate(x)
+    for _ in range(steps):
+        gradient, H = J.T @ r, J.T @ J
+        open_ = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))) & (np.diag(H) > 0)
+        if not open_.any():
+            break
+        H, g = H[np.ix_(open_, open_)], gradient[open_]
+        step = np.zeros_like(x)
+        step[open_] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]
+        promised = -(g @ step[open_] + 0.5 * step[open_] @ H @ step[open_])
+        if promised < NEGLIGIBLE:
+            break
+        tried = np.clip(x + step, low, high)
+        r_tried, J_tried = problem.evaluate(tried)
+        if r_tried @ r_tried < r @ r:
+            x, r, J, damping = tried, r_tried, J_tried, max(damping / 10, 1e-9)
+        else:
+            damping = max(damping * 30, 1e-4)
+            if damping > 1e8:
+                break
+    return x
 
 
 class _Problem:
@@ -168,9 +189,10 @@ class _Problem:
             own = slice(first, first + len(sizes))
             first += len(sizes)
             y, Y = response.sensitivities(record, values[:k], values[own])
-            white = noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
+            left = np.where(record.valid, record.observed - y, 0.0)
+            white = noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid).ravel()
             J = np.zeros((len(white), len(scaled)))
-            W = noise.whiten(Y, record.valid).reshape(len(white), Y.shape[2])
+            W = noise.whiten(np.clip(np.nan_to_num(Y), -FAR, FAR), record.valid).reshape(len(white), Y.shape[2])
             J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
             rows.append(white)
             slopes.append(J * self.scale)
@@ -189,11 +211,9 @@ class _Problem:
         )
         return self.at
 
-    def residual(self, scaled: np.ndarray) -> np.ndarray:
-        return self._evaluate(scaled)[1]
-
-    def slopes(self, scaled: np.ndarray) -> np.ndarray:
-        return self._evaluate(scaled)[2]
+    def evaluate(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residual and slopes."""
+        return self._evaluate(scaled)[1:]
 
     def result(self, values: np.ndarray) -> Fit:
         _, rows, J = self._evaluate(values / self.scale)

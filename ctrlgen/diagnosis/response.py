@@ -23,6 +23,7 @@ from ctrlgen.recording import Record
 
 START_NEWTON_STEPS = 12  # from home to the first displacement; later ones start from the sample before
 POSE_NEWTON_STEPS = 8
+WORTH = 500  # operations on parameters alone, from which on they are done once a record
 
 
 class Response:
@@ -66,9 +67,10 @@ class Response:
             y = self._observed
         else:  # a settled pose is read after it has settled
             y = ca.substitute(self._observed, ca.vertcat(m.x, m.z, m.u), ca.vertcat(after.x, after.z, after.u_next))
-        (following, y), symbols, parametric = ca.extract_parametric([following, y], m.p, {"extract_trivial": True})
-        c = ca.vertcat(ca.SX(0, 1), *symbols)
-        value = ca.vertcat(ca.SX(0, 1), *parametric)
+        c, value = m.p, m.p
+        rows, symbols, parametric = ca.extract_parametric([following, y], m.p, {"extract_trivial": True})
+        if ca.Function("work", [m.p], parametric).n_instructions() > WORTH:
+            (following, y), c, value = rows, ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
         constants = ca.Function("constants", [m.p], [value, ca.densify(ca.jacobian(value, m.p))])
         slopes = [ca.jacobian(a, b) for a in (following, y) for b in (S, c)]
         sample = ca.Function(
@@ -93,40 +95,63 @@ class Response:
 
     def outputs(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
         """Readings (n, n_y), SI; `start` is added to what a record may start with."""
+        return self.motion(record, p, start)[1]
+
+    def motion(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """S after each sample (n, n_s) and the readings (n, n_y), SI."""
         constants, sample = self._kernel
-        c = constants(p)[0]
-        S, u, u_1, e = (
-            ca.MX.sym(k, n)
-            for k, n in (("S", self.n_s), ("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1))
-        )
-        following, y = sample(S, u, u_1, e, c)[:2]
-        one = ca.Function("one", [S, u, u_1, e], [following, y])
-        values = one.mapaccum(len(record.time))(self._start(record, p, start), *self._inputs(record))
-        return values[1].full().T
+        n = len(record.time)
+        if ("motion", n) not in self._runs:
+            S, *others = self._symbols
+            following, y = sample(S, *others)[:2]
+            self._runs["motion", n] = ca.Function("one", [S, *others], [following, y]).mapaccum(n)
+        c = np.tile(constants(p)[0].full(), (1, n))
+        following, y = self._runs["motion", n](self._start(record, p, start), *self._inputs(record), c)
+        return following.full().T, y.full().T
 
     def sensitivities(
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings (n, n_y) and their derivatives (n, n_y, n_p + len(initial)) by `free`, then by what the record starts with."""
-        constants, sample = self._kernel
-        c, by_p = constants(p)
-        k, n_i, n_y = len(self.free), len(self.initial), len(self.channels)
-        seed = ca.horzcat(by_p, ca.DM(by_p.shape[0], n_i))
-        S, D = ca.MX.sym("S", self.n_s), ca.MX.sym("D", self.n_s, k + n_i)
-        u, u_1, e = (
-            ca.MX.sym(name, n) for name, n in (("u", self.model.u.numel()), ("u1", self.model.u.numel()), ("e", 1))
-        )
-        following, y, F_S, F_c, H_S, H_c = sample(S, u, u_1, e, c)
-        D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
-        one = ca.Function(
-            "one", [ca.vertcat(S, ca.vec(D)), u, u_1, e], [ca.vertcat(following, ca.vec(D_next)), ca.vertcat(y, ca.vec(Y))]
-        )  # fmt: skip
+        constants, _ = self._kernel
+        c, by_p = (value.full() for value in constants(p))
+        k, n_i, n_y, n = len(self.free), len(self.initial), len(self.channels), len(record.time)
         D_0 = np.zeros((self.n_s, k + n_i))
         D_0[list(self.initial), k + np.arange(n_i)] = 1.0
         begin = np.concatenate([self._start(record, p, start), D_0.ravel(order="F")])
-        values = one.mapaccum(len(record.time))(begin, *self._inputs(record))[1].full()
-        slopes = values[n_y:].reshape(k + n_i, n_y, values.shape[1])
+        values = self._sensitive(n, by_p)(begin, *self._inputs(record), np.tile(c, (1, n)))[1].full()
+        slopes = values[n_y:].reshape(k + n_i, n_y, n)
         return values[:n_y].T, np.moveaxis(slopes, 2, 0).transpose(0, 2, 1)
+
+    def _sensitive(self, n: int, by_p: np.ndarray) -> ca.Function:
+        """The sample map with its derivatives carried along; where constants are plain parameters it is made once."""
+        plain = np.array_equal(by_p, np.eye(*by_p.shape))
+        if plain and ("sensitive", n) in self._runs:
+            return self._runs["sensitive", n]
+        k, n_i = len(self.free), len(self.initial)
+        seed = ca.horzcat(ca.sparsify(ca.DM(by_p)), ca.DM(by_p.shape[0], n_i))
+        symbol = ca.SX if plain else ca.MX  # expanded where it is made once, whole calls where it is made for each p
+        S, *others = (symbol.sym(s.name(), s.numel()) for s in self._symbols)
+        D = symbol.sym("D", self.n_s, k + n_i)
+        following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
+        D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
+        one = ca.Function(
+            "one", [ca.vertcat(S, ca.vec(D)), *others], [ca.vertcat(following, ca.vec(D_next)), ca.vertcat(y, ca.vec(Y))]
+        )  # fmt: skip
+        run = one.mapaccum(n)
+        if plain:
+            self._runs["sensitive", n] = run
+        return run
+
+    @cached_property
+    def _runs(self) -> dict:
+        return {}
+
+    @cached_property
+    def _symbols(self) -> list[ca.MX]:
+        """S, u, u+, ambient, constants."""
+        n_u, n_c = self.model.u.numel(), self._kernel[0].size1_out(0)
+        return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
 
     def _start(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
         S = self.begin(record, p)

@@ -19,9 +19,9 @@ from ctrlgen.diagnosis.structure import Structure
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
 MOST_CAUSES = 12
-TRIALS = 6  # suspects fitted a round, and as many sets of each size
-SMALL = 5000  # samples up to which fits are cheap: four times as many are tried
-TRIAL_STEPS = 15
+TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
+
+TRIAL_STEPS = 8
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
 
@@ -63,7 +63,7 @@ class Searcher:
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
         self.fitter, self.screen, self.step = fitter, screen, step
         self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
-        self.trials = TRIALS * (4 if self.n_fit <= SMALL else 1)
+        self.trials = TRIALS * (3 if fitter.recording.kind == "poses" else 1)
 
     def trial(
         self,
@@ -94,10 +94,14 @@ class Searcher:
             if not better:
                 break
             current = better[0]
-            current = self._measured(self._prune(self._swap(current)))
+            current = self._measured(self._polished(self._prune(self._swap(self._polished(current)))))
         nominal = self.trial(structure, steps=40)
         rivals = tuple(self._rivals(current, k) for k in range(len(current.fit.structure.causes)))
         return Search(nominal, current, rivals, tuple(rounds), screened, self.fitter.held_out(current.fit)[1])
+
+    def _polished(self, trial: Trial) -> Trial:
+        """The same fit driven to its end; trials stop early."""
+        return self.trial(_cooled(trial.fit), trial.cause, steps=40)
 
     def _measured(self, trial: Trial) -> Trial:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import expm
 
 from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
@@ -21,6 +22,7 @@ from ctrlgen.recording import Record
 
 BLOCK = 5000  # samples worked on at a time
 SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
+LOST = 1e100
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class Slopes:
         """Columns, and the terms' derivatives by amplitude as functions along the motion."""
         m, structure = self.response.model, self.fit.structure
         links = device.links(device.values())
-        columns, terms, states, rates, stepped, clocks = [], [], [], [], [], []
+        columns, terms, states, rates, stepped, clocks, blocks = [], [], [], [], [], [], []
         for h in hypotheses:
             law, where = h.law, structure.place(h)
             names = [w.channel for w in channels(links, law.place)]
@@ -112,6 +114,7 @@ class Slopes:
                     change = {state.name: ca.SX(float(state.clock)) for state in law.states} | instance.rates(s, p)
                     term = ca.substitute(ca.jacobian(ca.SX(instance.term(s, p)), a), a, off)
                     terms.append(term * size)
+                    blocks.append(list(range(len(states), len(states) + len(m_states))))
                     states += list(m_states.values())
                     rates += [ca.substitute(ca.SX(change[state.name]), a, off) for state in law.states]
                     stepped += [
@@ -121,21 +124,15 @@ class Slopes:
                 meant = amplitude.expected or (low - off, high - off)
                 span = (meant[0] / size, meant[1] / size)
                 columns.append(Column(h, shape, tuple(self.probe_index[law.place, i] for i, _ in at), size, side, span))
-        return columns, SimpleNamespace(terms=terms, states=states, rates=rates, stepped=stepped, clocks=clocks)
+        return columns, SimpleNamespace(
+            terms=terms, states=states, rates=rates, stepped=stepped, clocks=clocks, blocks=blocks
+        )
 
     def _motion(self, start: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """S (n, n_s) at which terms are evaluated, and S before each sample (n, n_s)."""
         r, record = self.response, self.record
-        constants, sample = r._kernel
-        c = constants(self.p)[0]
-        S, u, u_1, e = (
-            ca.MX.sym(k, n) for k, n in (("S", r.n_s), ("u", r.model.u.numel()), ("u1", r.model.u.numel()), ("e", 1))
-        )
-        following, y = sample(S, u, u_1, e, c)[:2]
-        one = ca.Function("one", [S, u, u_1, e], [following, y])
-        begin = r._start(record, self.p, start)
-        after = one.mapaccum(len(record.time))(begin, *r._inputs(record))[0].full().T
-        before = np.vstack([begin, after[:-1]])
+        after, _ = r.motion(record, self.p, start)
+        before = np.vstack([r._start(record, self.p, start), after[:-1]])
         return (before if np.isfinite(r.sample_time) else after), before
 
     def _terms(self, at: np.ndarray) -> np.ndarray:
@@ -154,30 +151,34 @@ class Slopes:
         if memory.numel():
             values = self._memories(memory, heated(dx), given, inputs)
         f = ca.Function("terms", [*given, memory], [heated(ca.vertcat(*law.terms))], {"cse": True})
-        return f.map(n)(*inputs, values).full().T
+        found = f.map(n)(*inputs, values).full().T
+        lost = ~np.all(np.abs(found) < LOST, axis=0)  # memories that have left the numbers say nothing
+        found[:, lost] = 0.0
+        return found
 
     def _memories(self, memory: ca.SX, rates: ca.SX, given: list[ca.SX], inputs: list[np.ndarray]) -> np.ndarray:
-        """The laws' own states before each sample, (n_memory, n): lags exactly, stepped ones by their update."""
+        """The laws' own states before each sample, (n_memory, n): linear ones exactly, stepped ones by their update."""
         h = self.response.sample_time
         settled = not np.isfinite(h)
-        A = ca.jacobian(rates, memory)
-        rate = ca.diag(A)
-        updates = []
-        for i, new in enumerate(self.evaluators.stepped):
+        h = SETTLED_LAG if settled else h
+        law, m = self.evaluators, self.response.model
+        after = list(ca.vertsplit(memory + h * rates))
+        for block in law.blocks:
+            A = ca.jacobian(rates[block], memory[block])
+            if not ca.symvar(A):  # rates of linear memories: m + h phi_1(h A) rates
+                phi = _phi_1(h * ca.DM(A).full())
+                for k, i in enumerate(block):
+                    after[i] = memory[i] + h * ca.DM(phi[k : k + 1]) @ rates[block]
+        for i, new in enumerate(law.stepped):
             if new is not None:
-                updates.append(ca.substitute(new, self.response.model.heat, self.response.model.heat_of_drive))
-            elif self.evaluators.clocks[i]:
-                updates.append(memory[i] + (1.0 if settled else h))
-            else:
-                step = SETTLED_LAG if settled else h
-                slope = rate[i] if not rate[i].is_zero() else ca.SX(-1e-12)
-                gain = ca.if_else(ca.fabs(slope * step) < 1e-9, step, (ca.exp(ca.fmax(slope * step, -700)) - 1) / slope)
-                updates.append(memory[i] + gain * rates[i])
-        step_function = ca.Function("memories", [memory, *given], [ca.vertcat(*updates)], {"cse": True})
+                after[i] = ca.substitute(new, m.heat, m.heat_of_drive)
+            elif law.clocks[i]:
+                after[i] = memory[i] + (1.0 if settled else h)
+        step = ca.Function("memories", [memory, *given], [ca.vertcat(*after)], {"cse": True})
         start = np.zeros(memory.numel())
-        start[[i for i, clock in enumerate(self.evaluators.clocks) if clock]] = 0.0 if settled else self.record.time[0]
-        after = step_function.mapaccum(inputs[0].shape[1])(start, *inputs).full()
-        return after if settled else np.hstack([start[:, None], after[:, :-1]])
+        start[[i for i, clock in enumerate(law.clocks) if clock]] = 0.0 if settled else self.record.time[0]
+        values = step.mapaccum(inputs[0].shape[1])(start, *inputs).full()
+        return values if settled else np.hstack([start[:, None], values[:, :-1]])
 
     def accumulate(self, sums: Sums, white: np.ndarray, J: np.ndarray, index: int, start: np.ndarray | None) -> None:
         """Adds this record's inner products, block by block."""
@@ -253,3 +254,11 @@ def _stacked(flat: ca.DM, n: int) -> np.ndarray:
     """(rows, n * columns) as CasADi's map gives it -> (n, rows, columns)."""
     dense = flat.full()
     return dense.reshape(dense.shape[0], n, -1).transpose(1, 0, 2)
+
+
+def _phi_1(M: np.ndarray) -> np.ndarray:
+    """M^-1 (e^M - 1), also where M is singular: the upper right block of exp [[M, 1], [0, 0]]."""
+    n = len(M)
+    if n == 1:
+        return np.expm1(M) / M if M[0, 0] else np.ones((1, 1))
+    return expm(np.block([[M, np.eye(n)], [np.zeros((n, 2 * n))]]))[:n, n:]
