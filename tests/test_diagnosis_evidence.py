@@ -371,7 +371,7 @@ def test_a_gain_hides_behind_the_number_that_does_the_same():
 
 
 def test_evidence_is_numbers_that_json_knows():
-    fitter = axis_fitter(detent, n=1000)
+    fitter = axis_fitter(lambda t, q, v, memory: (cubic(t, q, v, 0)[0] + 0.02 * detent(t, q, v, 0)[0], 0), n=1000)
     searcher = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None)
     search = searcher.run(Structure(AXIS))
     found = evidence(fitter, search, explained=False)
@@ -383,7 +383,7 @@ def test_evidence_is_numbers_that_json_knows():
     assert [row["round"] for row in found.history] == list(range(1, len(search.rounds) + 1))
     first, last = found.history[0], found.history[-1]
     assert first["decision"] == "added stiffening at stage:axis" and first["tried"][0]["causes"][0]["kept"]
-    assert last["decision"] == "nothing tried is justified on the held-out records: stopped"
+    assert last["decision"].endswith("stopped")
     assert not any(cause["kept"] for trial in last["tried"] for cause in trial["causes"])
     assert plain({"a": np.array([np.nan, 1.0]), "b": np.bool_(True)}) == {"a": [None, 1.0], "b": True}
 

@@ -137,14 +137,8 @@ def motion(
     r: Response, record: Record, p: np.ndarray, start: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """S before and after each sample, (n, n_s), and the readings (n, n_y)."""
-    constants, sample = r._kernel
-    S, u, u_1, e = (
-        ca.MX.sym(k, n) for k, n in (("S", r.n_s), ("u", r.model.u.numel()), ("u1", r.model.u.numel()), ("e", 1))
-    )
-    one = ca.Function("one", [S, u, u_1, e], sample(S, u, u_1, e, constants(p)[0])[:2])
-    begin = r._start(record, p, start)
-    after, y = (value.full().T for value in one.mapaccum(len(record.time))(begin, *r._inputs(record)))
-    return np.vstack([begin, after[:-1]]), after, y
+    after, y = r.motion(record, p, start)
+    return np.vstack([r._start(record, p, start), after[:-1]]), after, y
 
 
 def _linearised(

@@ -150,14 +150,15 @@ class _Surface:
         x[rest] = np.clip(x, self.low, self.high)[rest]
         rise = self._objective(x) - self.best
         if rise > STEEP * expected and self.affords():
-            r, J = self.problem.residual(x), self.problem.slopes(x)[:, rest]
+            r, J = self.problem.evaluate(x)
+            J = J[:, rest]
             x[rest] = np.clip(x[rest] - np.linalg.lstsq(J, r, rcond=1e-10)[0], self.low[rest], self.high[rest])
             rise = min(rise, self._objective(x) - self.best)
         return float(rise)
 
     def _objective(self, x: np.ndarray) -> float:
         self.left -= 1
-        r = self.problem.residual(x)
+        r, _ = self.problem.evaluate(x)
         return float(r @ r)
 
 

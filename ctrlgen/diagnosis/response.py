@@ -131,7 +131,7 @@ class Response:
         k, n_i = len(self.free), len(self.initial)
         seed = ca.horzcat(ca.sparsify(ca.DM(by_p)), ca.DM(by_p.shape[0], n_i))
         symbol = ca.SX if plain else ca.MX  # expanded where it is made once, whole calls where it is made for each p
-        S, *others = (symbol.sym(s.name(), s.numel()) for s in self._symbols)
+        S, *others = (symbol.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols))  # an empty one has no name
         D = symbol.sym("D", self.n_s, k + n_i)
         following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
         D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
