@@ -13,16 +13,20 @@ if TYPE_CHECKING:
     from ctrlgen.comparison import Comparison, compare
     from ctrlgen.controller import Controller, Status
     from ctrlgen.devices import load_device
+    from ctrlgen.diagnosis.diagnosis import Diagnosis
+    from ctrlgen.diagnosis.job import diagnose
     from ctrlgen.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.firmware import generate
     from ctrlgen.job import Outcome, run
     from ctrlgen.model import Model, build_model
+    from ctrlgen.recording import load_recordings
     from ctrlgen.scenario import load_scenario
     from ctrlgen.simulation import Trace, simulate
     from ctrlgen.solution import Solution, solve
 
 _HOME = {
     "comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
+    "diagnosis.diagnosis": ("Diagnosis",), "diagnosis.job": ("diagnose",), "recording": ("load_recordings",),
     "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware": ("generate",),
     "job": ("Outcome", "run"), "model": ("Model", "build_model"), "scenario": ("load_scenario",),
     "simulation": ("Trace", "simulate"), "solution": ("Solution", "solve"),
@@ -41,6 +45,7 @@ __all__ = [
     "Comparison",
     "Controller",
     "CtrlgenError",
+    "Diagnosis",
     "InputError",
     "Model",
     "Outcome",
@@ -53,8 +58,10 @@ __all__ = [
     "__version__",
     "build_model",
     "compare",
+    "diagnose",
     "generate",
     "load_device",
+    "load_recordings",
     "load_scenario",
     "run",
     "simulate",

@@ -27,7 +27,9 @@ LAYERS = [
     "reproduce.s3_lengths", "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s3", "reproduce.all",
     "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise", "diagnosis.structure", "diagnosis.fit",
     "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis", "diagnosis",
-    "job", "cli", "", "__main__",
+    "diagnosis.words diagnosis.record", "diagnosis.writeback diagnosis.picture_maps diagnosis.picture_sure",
+    "diagnosis.pictures", "diagnosis.page", "diagnosis.job",
+    "job", "terminal", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}
 MODULES = sorted(PACKAGE.rglob("*.py"))

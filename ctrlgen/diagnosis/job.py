@@ -40,7 +40,11 @@ def diagnose(
 
 
 def diagnose_into(
-    device: Path | str, recordings: Sequence[Path | str], out: Path | str, seed: int = 0, progress: Progress | None = None
+    device: Path | str,
+    recordings: Sequence[Path | str],
+    out: Path | str,
+    seed: int = 0,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """The same, reported into the folder `out`, which is replaced whole or left alone. Raises InputError."""
     step = progress or (lambda _: None)

@@ -12,18 +12,25 @@ from ctrlgen.diagnosis.diagnosis import Diagnosis, Finding
 from ctrlgen.diagnosis.hypotheses import PARAMETER, numbers, written
 from ctrlgen.diagnosis.pictures import draw_all
 from ctrlgen.diagnosis.record import as_dict
-from ctrlgen.diagnosis.words import gathered, interval, next_steps, number, plain_name, sentence
+from ctrlgen.diagnosis.words import gathered, hard, interval, next_steps, number, plain_name, sentence
 from ctrlgen.report import render
 from ctrlgen.units import show
 
 CAPTIONS = {
-    "residuals": "What the model leaves of the held-out records: left before and after, right after alone. A gap is a marked sample.",
+    "residuals": "What the model leaves of the held-out records: left before and after, right after alone. "
+    "A gap is a marked sample.",
     "spectrum": "The same by frequency. Where a curve lies on the noise, nothing more can be learnt from this recording.",
     "where": "Where the mismatch is: excess of squares over the noise's with 95 % intervals, part by part.",
-    "rivals": "Each round fits the most conspicuous suspects and keeps the best. Blue: in the final answer; orange: explains alike; grey: worse.",
-    "confusability": "How alike two suspects look in this recording, |cos| of what they do to the readings once the device's own "
-    "uncertain numbers are free: 1 cannot be told apart, 0 cannot be confused. |z|: how conspicuous, in standard deviations.",
+    "unknown": "The disturbance that would explain the rest, with 95 % intervals: its shape is a hint at the law.",
     "intervals": "An interval that reaches zero would mean that the cause may be absent.",
+    "profiles": "The objective with one number held and the others fitted again; below the dotted line lies the 95 % "
+    "interval (shaded).",
+    "rivals": "Each round fits the most conspicuous suspects and keeps the best. T: squares left on the records to fit "
+    "and on the held-out ones, in units of the noise, and a price for every number. Blue: in the final answer; orange: "
+    "explains alike; grey: worse.",
+    "confusability": "How alike two suspects look in this recording: |cos| of what they do to the readings once the "
+    "device's own uncertain numbers are free; 1 cannot be told apart, 0 cannot be confused. Each with one shape; "
+    "fitted shapes can make two more alike. |z|: how conspicuous, in standard deviations.",
 }
 NEGLIGIBLE = 1e-3  # of its standard deviation: numbers that moved less are left out of the table
 
@@ -57,6 +64,7 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         seed=provenance.seed,
         version=__version__,
         number=number,
+        hard=hard,
     )
 
 
@@ -76,7 +84,7 @@ def _row(f: Finding) -> dict[str, Any]:
         "plain": plain_name(f.effect), "effect": f.effect, "location": f.location, "of": f.cause.of,
         "numbers": [(name, interval(e)) for name, e in f.parameters.items()],
         "alternatives": [{"effect": effect, "location": location} for effect, location in f.alternatives],
-        "gain": f"{100 * f.held_out_gain:.3g} %" if np.isfinite(f.held_out_gain) else "–", "source": f.source,
+        "gain": f"{100 * f.held_out_gain:.3g} %" if np.isfinite(f.held_out_gain) else "not known", "source": f.source,
     }  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from ctrlgen.effect import Effect
 
 NAMED = 3  # findings spelt out in the first sentence
 WIDE = 1.0  # a plain number with its whole interval below is shown in percent
+HARD_SPACE = "\u00a0"
 EDGE = 1e-6  # of an interval: nearer to its end, a number stands on its bound
 HEADLINE = {
     EXPLAINED: "Explained",
@@ -174,7 +175,10 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
         return [use]
     if verdict == AMBIGUOUS:
         first = f"{experiment} to settle which of the alternatives it is; name no cause until then."
-        return [first, "device.next.toml holds the best of them; it predicts records of this kind as well as any." + rest]
+        return [
+            first,
+            "device.next.toml holds the best of them; it predicts records of this kind as well as any." + rest,
+        ]
     if verdict == PARTLY:
         left = "Something remains: see where below." if known else f"Whether something remains cannot be said.{rest}"
         return [f"{use} It is better than before.", left]
@@ -182,6 +186,11 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
         "Not a cause I know. Look below at where the mismatch lives, and check the set-up: wiring, units, clocks.",
         "device.next.toml is the best fit found, not an explanation: do not build on its numbers.",
     ]
+
+
+def hard(text: str) -> str:
+    """`text` with numbers and units that no line break parts."""
+    return re.sub(r"(?<=\d) (?=[^\W\d]|%)", HARD_SPACE, text)
 
 
 def gathered(notes: tuple[str, ...]) -> list[str]:

@@ -20,14 +20,13 @@ from ctrlgen._version import __version__
 from ctrlgen.diagnosis.diagnosis import UNEXPLAINED, Diagnosis
 from ctrlgen.diagnosis.hypotheses import PARAMETER, numbers
 from ctrlgen.diagnosis.structure import Unknown
-from ctrlgen.diagnosis.words import channel_sentence, sentence
+from ctrlgen.diagnosis.words import HARD_SPACE, channel_sentence, hard, sentence
 from ctrlgen.files import read_text, write_text
 from ctrlgen.units import from_si, to_si
 
 DIGITS = 12  # nine would leave 5e-9 of a number, more than the prediction may differ by
 SD_DIGITS = 3
 WIDTH = 110
-HARD_SPACE = "\u00a0"  # keeps a number and its unit on one line
 MOVED = 1e-12  # of a number: less is not written
 
 
@@ -54,9 +53,7 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
     return text + "".join(_table(table) for table in effects)
 
 
-def _change_numbers(
-    document: Any, diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]
-) -> list[str]:
+def _change_numbers(document: Any, diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]) -> list[str]:
     """Puts the device's own numbers that moved into the document; their paths."""
     known = {path: number for path, _, number in numbers(diagnosis.device)}
     causes, changed = diagnosis.search.chosen.fit.structure.causes, []
@@ -154,8 +151,6 @@ def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
         lines.append(f"Numbers changed above: {', '.join(changed)}.")
     if diagnosis.verdict == UNEXPLAINED:
         lines.append("This does NOT explain the recording: take the numbers as the best fit, not as physics.")
-    kept = (re.sub(r"(?<=\d) (?=[^\W\d]|%)", HARD_SPACE, " ".join(line.split())) for line in lines)
+    kept = (hard(" ".join(line.split())) for line in lines)
     wrapped = (part for line in kept for part in textwrap.wrap(line, WIDTH, break_long_words=False))
     return "".join(f"# {part}\n" for part in wrapped).replace(HARD_SPACE, " ")
-
-

@@ -78,7 +78,6 @@ def write_page(rows: list[Row], path: Path) -> None:
     sources = list(dict.fromkeys(row.source for row in rows))
     figures = {source: FIGURES[source]() for source in sources if source in FIGURES}
     page = render(
-        "reproduce.html.j2",
-        rows=as_json(rows), sources=sources, titles=TITLES, counts=counts(rows), figures=figures
+        "reproduce.html.j2", rows=as_json(rows), sources=sources, titles=TITLES, counts=counts(rows), figures=figures
     )
     write_text(path, page)
