@@ -17,8 +17,7 @@ from ctrlgen.report import render
 from ctrlgen.units import show
 
 CAPTIONS = {
-    "residuals": "What the model leaves of the held-out records: left before and after, right after alone. "
-    "A gap is a marked sample.",
+    "residuals": "What the model leaves of the held-out records. A gap is a marked sample.",
     "spectrum": "The same by frequency. Where a curve lies on the noise, nothing more can be learnt from this recording.",
     "where": "Where the mismatch is: excess of squares over the noise's with 95 % intervals, part by part.",
     "unknown": "The disturbance that would explain the rest, with 95 % intervals: its shape is a hint at the law.",
@@ -32,6 +31,7 @@ CAPTIONS = {
     "device's own uncertain numbers are free; 1 cannot be told apart, 0 cannot be confused. Each with one shape; "
     "fitted shapes can make two more alike. |z|: how conspicuous, in standard deviations.",
 }
+TINY = 1e-4  # p below which its size says nothing more
 NEGLIGIBLE = 1e-3  # of its standard deviation: numbers that moved less are left out of the table
 
 
@@ -93,7 +93,9 @@ def _tested(diagnosis: Diagnosis) -> str:
     gate = diagnosis.adequacy
     if any(e.noise_floor is None for e in diagnosis.held_out.values()):
         return "The noise is not known, so these errors cannot be judged against it."
-    tests = ", ".join(f"{name} p = {number(p, 2)}" for name, p in gate.p_values.items())
+    tests = ", ".join(
+        f"{name} p {'= ' + number(p, 2) if p >= TINY else '< ' + number(TINY)}" for name, p in gate.p_values.items()
+    )
     result = "passes" if gate.passed else "does not pass"
     return f"What is left {result} the test against the noise" + (f" ({tests})." if tests else ".")
 

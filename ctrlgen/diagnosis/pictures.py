@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.signal import freqz, welch
 
@@ -72,36 +73,37 @@ class Residuals:
 
 
 def draw_residuals(left: Residuals) -> Figure:
-    """Channel by channel: before with after, and after alone on its own scale with the noise."""
-    channels, n = left.recording.channels, len(left.recording.channels)
-    figure, axes = plt.subplots(n, 2, figsize=(WIDTH, 0.9 + 1.55 * n), sharex=True, squeeze=False)
-    style: dict[str, Any] = {"lw": 0.9} if not left.settled else {"ls": "", "marker": "o", "ms": 3}
+    """Channel by channel: before with after, and after alone on its own scale with the noise; one panel where both are one."""
+    channels, wide = left.recording.channels, 1 + left.changed
+    size = (WIDTH, 0.9 + 1.55 * len(channels))
+    figure, axes = plt.subplots(len(channels), wide, figsize=size, sharex=True, squeeze=False)
     for i, (channel, unit) in enumerate(zip(channels, left.recording.units, strict=True)):
-        for k, x in left.spans():
-            for panel in axes[i] if not left.changed else axes[i, :1]:
-                panel.plot(*thinned(x, left.before[k][:, i]), color=BEFORE, label="before" if k == 0 else None, **style)
-            if left.changed:
-                for panel in axes[i]:
-                    panel.plot(
-                        *thinned(x, left.after[k][:, i]), color=AFTER, label="after" if k == 0 else None, **style
-                    )
-            if k > 0:
-                for panel in axes[i]:
-                    panel.axvline(x[0], color="#999999", lw=0.7, ls=":")
+        if left.changed:
+            _curve(axes[i, 0], left, left.before, i, BEFORE, "before")
+        for panel in axes[i]:
+            _curve(panel, left, left.after, i, AFTER, "after")
         axes[i, 0].set_ylabel(f"{short(channel)} [{unit}]")
         floor = left.floor(i)
         if floor is not None:
-            axes[i, 1].axhspan(-2 * floor, 2 * floor, color=NOISE, zorder=0)
-    axes[0, 0].set_title("before and after" if left.changed else "what is left", fontsize=9)
-    known = all(left.floor(i) is not None for i in range(n))
-    title = "after, on its own scale" if left.changed else "the same"
-    axes[0, 1].set_title(title + (" (grey: noise, ± 2 sd)" if known else ""), fontsize=9)
+            axes[i, -1].axhspan(-2 * floor, 2 * floor, color=NOISE, zorder=0)
+    known = all(left.floor(i) is not None for i in range(len(channels)))
+    title = "after, on its own scale" if left.changed else "what is left"
+    axes[0, -1].set_title(title + (" (grey: noise, ± 2 sd)" if known else ""), fontsize=9)
     for panel in axes[-1]:
         panel.set_xlabel("held-out pose" if left.settled else "time in the held-out records [s]")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
     if left.changed:
-        figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=8)
+        axes[0, 0].set_title("before and after", fontsize=9)
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize=8)
     return figure
+
+
+def _curve(panel: Axes, left: Residuals, parts: list[np.ndarray], i: int, colour: str, label: str) -> None:
+    """One channel over all held-out records, with a line between two of them."""
+    style: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3} if left.settled else {"lw": 0.9}
+    for k, x in left.spans():
+        panel.plot(*thinned(x, parts[k][:, i]), color=colour, label=label if k == 0 else None, **style)
+        if k > 0:
+            panel.axvline(x[0], color="#999999", lw=0.7, ls=":")
 
 
 def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +130,8 @@ def draw_spectrum(left: Residuals) -> Figure | None:
     figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.8 + 2.3 * rows), squeeze=False)
     for i, channel in enumerate(left.recording.channels):
         panel, unit = axes.flat[i], left.recording.units[i]
-        for parts, colour, label in ((left.before, BEFORE, "before"), (left.after, AFTER, "after"))[: 1 + left.changed]:
+        curves = ((left.before, BEFORE, "before"), (left.after, AFTER, "after" if left.changed else "what is left"))
+        for parts, colour, label in curves[not left.changed :]:
             f, density = _density(left, parts, records, i)
             panel.loglog(f, density, color=colour, lw=1.1, label=label)
         noise = _noise_density(left, i, f)
@@ -136,7 +139,8 @@ def draw_spectrum(left: Residuals) -> Figure | None:
             panel.loglog(f, noise, color="#777777", lw=1.1, ls="--", label="noise")
         panel.set_ylabel(f"{short(channel)} [{unit}/√Hz]")
         panel.set_xlabel("frequency [Hz]")
-        panel.set_ylim(bottom=0.2 * np.min(density[density > 0], initial=np.inf))
+        lowest = density if noise is None else np.concatenate([density, noise])
+        panel.set_ylim(bottom=0.4 * np.min(lowest[lowest > 0], initial=np.inf))
         panel.legend(fontsize=8)
     for panel in axes.flat[n:]:
         panel.set_visible(False)

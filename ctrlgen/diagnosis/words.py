@@ -89,10 +89,10 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def channel_sentence(channel: str, error: ChannelError) -> str:
-    """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5.0 nm.'"""
-    floor = "not known" if error.noise_floor is None else f"{number(error.noise_floor, 3)} {error.unit}"
-    before, after = (f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after))
-    return f"Held-out error of {short(channel)}: {before} -> {after}, noise {floor}."
+    """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm.'"""
+    noise = "not known" if error.noise_floor is None else f"{number(error.noise_floor, 3)} {error.unit}"
+    shown = [f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after)]
+    return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}."
 
 
 def short(channel: str) -> str:
@@ -137,7 +137,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     found, verdict = diagnosis.findings, diagnosis.verdict
     head = HEADLINE[verdict]
     if verdict == CONSISTENT:
-        said = f"{head}: nothing that this recording can show is missing in {diagnosis.device.title}."
+        said = f"{head}: nothing that this recording can show is missing from the description of the {diagnosis.device.title}."
     elif not found:
         said = f"{head}: the recording differs from {diagnosis.device.title}, and no cause I know explains it."
     else:
@@ -170,7 +170,8 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     known = all(e.noise_floor is not None for e in diagnosis.held_out.values())
     rest = "" if known else " Record a rest (drive off) or repeat poses, so that the noise is known."
     if verdict == CONSISTENT:
-        return [f"Nothing to correct. Effects smaller than those listed as detectable would not have been seen.{rest}"]
+        unseen = " Effects smaller than those listed below would not have been seen." if diagnosis.detectable else ""
+        return [f"Nothing to correct.{unseen}{rest}"]
     if verdict == EXPLAINED:
         return [use]
     if verdict == AMBIGUOUS:

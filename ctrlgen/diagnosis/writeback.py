@@ -84,14 +84,16 @@ def _replace(document: Any, path: str, fields: dict[str, str]) -> None:
         node[parts[-1]] = _inline(fields)
 
 
-def _inline(fields: dict[str, str]) -> Item:
-    """{ key = "value", ... } with the spaces that device files have."""
-    text = ", ".join(f"{key} = {_quoted(value)}" for key, value in fields.items())
-    return tomlkit.parse(f"q = {{ {text} }}")["q"]
+def _inline(fields: dict[str, Any]) -> Item:
+    """{ key = "value", ... } as an item of a document."""
+    return tomlkit.parse(f"q = {_toml(fields)}")["q"]
 
 
-def _quoted(text: str) -> str:
-    return tomlkit.string(text).as_string()
+def _toml(value: str | dict[str, Any]) -> str:
+    """A text in quotes, or an inline table with the spaces that device files have."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_toml(member)}' for key, member in value.items())} }}"
+    return tomlkit.string(value).as_string()
 
 
 def _effects(diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]) -> list[dict[str, Any]]:
@@ -103,21 +105,16 @@ def _effects(diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]
         table: dict[str, Any] = {"kind": cause.effect, "at": cause.at} | ({"of": cause.of} if cause.of else {})
         for unknown, value, sd in found:
             if unknown.cause == k:
-                shown = _within(value, unknown)
-                table[unknown.path.rpartition(".")[2]] = {"value": shown, "sd": _written_sd(sd, unknown.unit)}
+                shown, spread = _within(value, unknown), _written_sd(sd, unknown.unit)
+                table[unknown.path.rpartition(".")[2]] = {"value": shown, "sd": spread} if spread else shown
         tables.append(table)
     return tables
 
 
 def _table(fields: dict[str, Any]) -> str:
-    """[[effect]] with one line a key; numbers without a deviation as plain text."""
-    lines = ["\n[[effect]]"]
+    """[[effect]] with one line a key."""
     width = max(map(len, fields))
-    for key, value in fields.items():
-        plain = value["value"] if isinstance(value, dict) and not value["sd"] else value
-        shown = tomlkit.dumps({"q": _inline(plain)})[4:].strip() if isinstance(plain, dict) else _quoted(plain)
-        lines.append(f"{key:{width}} = {shown}")
-    return "\n".join(lines) + "\n"
+    return "\n[[effect]]\n" + "".join(f"{key:{width}} = {_toml(value)}\n" for key, value in fields.items())
 
 
 def _written(si: float, unit: str, digits: int = DIGITS) -> str:
