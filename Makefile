@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long bench lint clean
+.PHONY: run test test-long bench battery lint clean
 
 run: $(VENV)/installed
 	$(BIN)/ctrlgen run scenarios/circle20 --out out/circle20
@@ -17,6 +17,14 @@ test-long: $(VENV)/installed-test
 
 bench: $(VENV)/installed-test
 	$(BIN)/python -m benchmarks
+
+# make battery SIZE=ci|small|full SEED=1: concealed cases (hours for full), diagnosed and scored; goes on where it was stopped
+SIZE ?= small
+SEED ?= 1
+OPPONENTS ?= 4
+battery: $(VENV)/installed-test
+	test -e out/battery_$(SIZE)_$(SEED)/battery.json || $(BIN)/python -m battery make --out out/battery_$(SIZE)_$(SEED) --seed $(SEED) --size $(SIZE)
+	$(BIN)/python -m battery score out/battery_$(SIZE)_$(SEED) --run "$(BIN)/ctrlgen diagnose" --opponents $(OPPONENTS)
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ctrlgen.firmware import generate
     from ctrlgen.job import Outcome, run
     from ctrlgen.model import Model, build_model
+    from ctrlgen.readings import Record, record_readings
     from ctrlgen.recording import load_recordings
     from ctrlgen.scenario import load_scenario
     from ctrlgen.simulation import Trace, simulate
@@ -28,7 +29,7 @@ _HOME = {
     "comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
     "diagnosis.diagnosis": ("Diagnosis",), "diagnosis.job": ("diagnose",), "recording": ("load_recordings",),
     "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware": ("generate",),
-    "job": ("Outcome", "run"), "model": ("Model", "build_model"), "scenario": ("load_scenario",),
+    "job": ("Outcome", "run"), "model": ("Model", "build_model"), "readings": ("Record", "record_readings"), "scenario": ("load_scenario",),
     "simulation": ("Trace", "simulate"), "solution": ("Solution", "solve"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
@@ -49,6 +50,7 @@ __all__ = [
     "InputError",
     "Model",
     "Outcome",
+    "Record",
     "Solution",
     "SolverError",
     "Status",
@@ -63,6 +65,7 @@ __all__ = [
     "load_device",
     "load_recordings",
     "load_scenario",
+    "record_readings",
     "run",
     "simulate",
     "solve",

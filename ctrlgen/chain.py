@@ -11,9 +11,12 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, Links, Signal
+from ctrlgen.devices.sensor import mounting_faults
 from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.units import base_unit, same_dimension
+
+REACH = 10.0  # typical travels up to which a law is told the stage's force: beyond, a search may look but no stage goes
 
 
 class Chain:
@@ -24,12 +27,13 @@ class Chain:
     ) -> None:
         self.device, self.links, self.ambient, self.sample_time = device, links, ambient, sample_time
         self.z = ca.SX.sym("d", len(links.axes))
-        self.resisting = links.resistance(self.z)
+        reach = REACH * links.displacement_scale
+        self.resisting = links.resistance(ca.fmin(ca.fmax(self.z, -reach), reach))
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
         self.members: list[_Member] = []
-        self.faults: list[Fault] = []
+        self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
             self._place(k, effect, p.effect[k])
         if self.faults:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.markup import escape
 
 from ctrlgen import job
 from ctrlgen.devices import load_device
+from ctrlgen.devices.sensor import describe
 from ctrlgen.errors import CtrlgenError, Fault, InputError, Unreachable
 from ctrlgen.files import read_toml
 from ctrlgen.model import build_model
@@ -29,9 +32,10 @@ from ctrlgen.terminal import (
     print_recording,
     print_solution,
     progress,
+    show_warning,
     table_of,
 )
-from ctrlgen.units import from_si, parse, show
+from ctrlgen.units import from_si, show
 
 app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
@@ -143,6 +147,11 @@ def check(
     for limit in model.limits:
         low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
         out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
+    units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
+    for sensor in device.sensor:
+        out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
+    for remark in device.remarks():
+        out.print(f"  note: {remark}", markup=False, soft_wrap=True)
 
 
 @app.command()
@@ -159,14 +168,7 @@ def bode(
 
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
-    pairs = [part.partition("=") for part in at.split(",") if part.strip()]
-    if any(not value for _, _, value in pairs):
-        raise InputError(
-            "--at", [Fault(at, "write channel=value, separated by commas, such as delta_x=5um,delta_z=20um")]
-        )
-    pose = Frame(signal_.channels, signal_.units).point(
-        {name.strip(): value.strip() for name, _, value in pairs}, "--at"
-    )
+    pose = Frame(signal_.channels, signal_.units).pose(at, "--at")
     if picture.suffix not in (".svg", ".png"):
         raise InputError("--out", [Fault(str(picture), "must end in .svg or .png")])
     draw_bode(model, pose, picture)
@@ -177,37 +179,42 @@ def bode(
 def workspace(
     device: DevicePath,
     out_folder: OutFolder,
-    height: Annotated[
+    at: Annotated[
         list[str] | None,
-        typer.Option(help="Height (last translation) of a slice; repeat for more.", show_default="10, 20 and 30 um"),
+        typer.Option(
+            help="Pose of a slice, channel=value, separated by commas; repeat for more.",
+            show_default="delta_z at 10, 20 and 30 um; without a third translation the middle of the drives",
+        ),
     ] = None,
 ) -> None:
     """Map the poses a device can hold under all its limits: ranges, slices, the largest ball inside.
 
     Leaves workspace.svg and workspace.json in --out.
 
-    Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --height "20 um"
+    Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
     """
-    height = height or ["10 um", "20 um", "30 um"]
-    try:
-        heights = [parse(text, "um") for text in height]
-    except ValueError as error:
-        raise InputError("--height", [Fault("value", str(error))]) from None
-    found = job.map_workspace(load_device(device), heights, out_folder)
+    found = job.map_workspace(load_device(device), at or [], out_folder)
     signal_ = found.workspace.model.signals["pose"]
-    table = table_of(("alone", "left"), *((f"at {text}", "right") for text in height))
-    for i, (channel, unit) in enumerate(zip(signal_.channels, signal_.units, strict=True)):
+    named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
+
+    def place(pose: Any) -> str:
+        shown = (f"{c} {from_si(pose[i], u):.4g} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i])
+        return ", ".join(shown) or "home"
+
+    table = table_of(("from", "left"), *((place(base), "right") for base in found.bases), ("anywhere", "right"))
+    for i, (channel, unit) in named:
+        rounding = 1e-9 * signal_.scale[i]
+        ends = (np.where(np.abs(r[i]) > rounding, r[i], 0.0) for r in (*found.ranges, found.extent))
         table.add_row(
-            f"{channel} [{unit}]", *(" ... ".join(f"{v:.4g}" for v in from_si(r[i], unit)) for r in found.ranges)
+            escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
         )
     out.print(table)
-    for what, ball in (("translations", found.translations), ("translations and rotations", found.everything)):
-        centre = ", ".join(
-            f"{c} {from_si(v, u):.3g} {u}" for c, v, u in zip(signal_.channels, ball.centre, signal_.units, strict=True)
-            if abs(v) > 1e-3 * signal_.scale[signal_.channels.index(c)]
-        )  # fmt: skip
-        out.print(f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {centre}", soft_wrap=True)
-    sizes = ", ".join(f"{show(v, u, 3)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
+    for what, ball in (("translations", found.translations), ("all channels", found.everything)):
+        out.print(
+            f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",
+            soft_wrap=True,
+        )
+    sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
     out.print(f"typical sizes: {sizes}")
     out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
 
@@ -250,13 +257,20 @@ def reproduce(
         return
     colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
     table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
+    for words in (table.columns[1], table.columns[-1]):
+        words.no_wrap = False  # long words break; the numbers never make way for them
     for row in rows:
         if differing and row.status is Status.REPRODUCED:
             continue
         ours = "" if row.ours is None else f"{row.ours:.6g}"
         status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
         table.add_row(
-            row.source, escape(row.where), escape(f"{row.printed} {row.unit}"), ours, status, escape(row.reason)
+            row.source,
+            escape(row.where),
+            escape(row.printed if row.unit == "1" else f"{row.printed} {row.unit}"),
+            ours,
+            status,
+            escape(row.reason),
         )
     out.print(table)
     counts = everything.counts(rows)
@@ -307,6 +321,7 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     """
     try:
         CHECK.set(check)
+        warnings.showwarning = show_warning
         status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
         return status if isinstance(status, int) else 0
     except Unreachable as error:

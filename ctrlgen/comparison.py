@@ -259,7 +259,8 @@ def _equilibria(ref: Reference, answers: np.ndarray) -> np.ndarray:
     n = len(m.axes)
     drives = answers[:, 1 : 1 + n]
     x, z, u = (ca.MX.sym(name, s.numel()) for name, s in (("x", m.x), ("z", m.z), ("u", m.u)))
-    dynamics = m.dynamics(x, z, u, m.p_nominal)
+    both = ca.Function("at_rest", [m.x, m.z, m.u, m.p], [m.settling, m.balance])
+    dynamics = both(x, z, u, m.p_nominal)
     scale = np.concatenate([m.x_scale, m.z_scale])
     scaled = ca.vertcat(dynamics[0] / m.x_scale, dynamics[1] / m.force_scale)
     w = ca.MX.sym("w", len(scale))

@@ -89,7 +89,9 @@ class Controller:
     @property
     def shrinks(self) -> int:
         """How often a displacement is shrunk toward home: once, if all of a limit shrinks with it."""
-        return MEMORY_SHRINKS if self.nominal.x.numel() > self.nominal.n_states else 1
+        m = self.nominal
+        bent = ca.depends_on(ca.jacobian(m.signals["displacement"].expr, m.z), m.z)
+        return MEMORY_SHRINKS if bent or m.x.numel() > m.n_states else 1
 
     @cached_property
     def safe_displacement(self) -> float:

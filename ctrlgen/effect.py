@@ -49,6 +49,7 @@ class Param:
     doc: str
     off: float | None = None
     grid: tuple[float, ...] = ()
+    expected: tuple[float, float] | None = None
 
     @property
     def relative(self) -> bool:

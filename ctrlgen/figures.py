@@ -11,7 +11,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
 
 from ctrlgen.measures import force_parts
 from ctrlgen.shortfall import REACHED
@@ -173,25 +175,35 @@ def draw_stage_force(solution: Solution) -> Figure:
 
 
 def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) -> Figure:
-    """Slices of the workspace in two translations, one outline a base pose, and the largest ball, seen from two sides."""
+    """Slices of the workspace in two channels, one outline a base pose, the side view through the ball, and the ball itself."""
     signal = workspace.model.signals["pose"]
-    x, y, z = (i for i, unit in enumerate(signal.units) if unit == "um")
-    figure, panels = plt.subplots(1, 2, figsize=(8.6, 4.2))
+    x, y, *third = workspace.drawn
+    figure, panels = plt.subplots(1, 1 + len(third), figsize=(8.6, 4.2) if third else (4.8, 4.2), squeeze=False)
     for base, colour in zip(bases, COLOURS[::2], strict=False):
-        edge = from_si(workspace.outline(base, x, y), "um")
-        label = f"{signal.channels[z]} = {from_si(base[z], 'um'):.3g} um"
-        panels[0].fill(*edge.T, facecolor=colour, edgecolor=colour, alpha=0.25, lw=1.5, label=label)
-    side = from_si(workspace.outline(ball.centre, x, z), "um")
-    panels[1].fill(
-        *side.T, facecolor=COLOURS[0], edgecolor=COLOURS[0], alpha=0.25, lw=1.5, label="through the ball's centre"
-    )
-    centre = from_si(ball.centre, "um")
-    radius = ball.radius * from_si(signal.scale[x], "um")
-    panels[1].add_patch(plt.Circle((centre[x], centre[z]), radius, fill=False, color=COLOURS[2], lw=1.5))
-    panels[1].plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius:.3g} um")
-    for panel, across, up in ((panels[0], x, y), (panels[1], x, z)):
-        panel.set_aspect("equal", adjustable="datalim")
-        panel.set_xlabel(f"{signal.channels[across]} [um]")
-        panel.set_ylabel(f"{signal.channels[up]} [um]")
-        panel.legend(fontsize=8, loc="upper right")
+        named = third or [x]
+        value = from_si(base[named[0]], signal.units[named[0]])
+        label = f"{signal.channels[named[0]]} = {value:.4g} {signal.units[named[0]]}"
+        _fill(panels[0][0], workspace, base, x, y, colour, label)
+    for up in third:
+        _fill(panels[0][1], workspace, ball.centre, x, up, COLOURS[0], "through the ball's centre")
+    across, up = (x, third[0]) if third and third[0] in ball.channels else (x, y)
+    panel = panels[0][1] if up in third else panels[0][0]
+    centre = [from_si(ball.centre[i], signal.units[i]) for i in (across, up)]
+    radius = [from_si(ball.radius * signal.scale[i], signal.units[i]) for i in (across, up)]
+    panel.add_patch(Ellipse(centre, 2 * radius[0], 2 * radius[1], fill=False, color=COLOURS[2], lw=1.5))
+    panel.plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius[0]:.3g} {signal.units[across]}")
+    for panel, vertical in zip(panels[0], (y, *third), strict=True):
+        if signal.units[x] == signal.units[vertical]:
+            panel.set_aspect("equal", adjustable="datalim")
+        panel.set_xlabel(f"{signal.channels[x]} [{signal.units[x]}]")
+        panel.set_ylabel(f"{signal.channels[vertical]} [{signal.units[vertical]}]")
+        panel.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
+
+
+def _fill(panel: Axes, workspace: Workspace, base: np.ndarray, x: int, y: int, colour: str, label: str) -> None:
+    """The slice through `base` in channels `x` and `y`."""
+    units = workspace.model.signals["pose"].units
+    edge = workspace.outline(base, x, y)
+    shown = from_si(edge[:, 0], units[x]), from_si(edge[:, 1], units[y])
+    panel.fill(*shown, facecolor=colour, edgecolor=colour, alpha=0.25, lw=1.5, label=label)

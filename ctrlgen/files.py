@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -61,7 +61,7 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
     if details["type"] == "missing":
         message = "is missing; add it"
     elif details["type"] == "extra_forbidden":
-        siblings = _keys(model, location[:-1])
+        siblings = _keys(model, details["loc"][:-1])
         near = difflib.get_close_matches(str(location[-1]), siblings, n=1)
         message = "is not a key I know; " + (
             f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(siblings)}"
@@ -86,24 +86,36 @@ _REMEDY = {
 }
 
 
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """The tables that a field of this type may hold."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for member in getattr(annotation, "__args__", ()):
+        yield from _models(member)
+
+
+def _kinds(model: type[BaseModel]) -> set[str]:
+    """Values of `kind` by which a table is known as this model."""
+    kind = model.model_fields.get("kind")
+    return set(getattr(getattr(kind, "annotation", None), "__args__", ()))
+
+
 def _tags(model: type[BaseModel]) -> set[str]:
     """Values of `kind` by which unions inside `model` are told apart."""
-    found = set()
-    for field in model.model_fields.values():
-        for member in getattr(field.annotation, "__args__", ()):
-            kind = getattr(member, "model_fields", {}).get("kind")
-            found |= set(getattr(getattr(kind, "annotation", None), "__args__", ()))
-    return found
+    members = (member for field in model.model_fields.values() for member in _models(field.annotation))
+    return {kind for member in members for kind in _kinds(member)}
 
 
-def _keys(model: type[BaseModel], location: list[Any]) -> list[str]:
-    current: Any = model
+def _keys(model: type[BaseModel], location: Sequence[Any]) -> list[str]:
+    """What may stand in the table at `location`, a path of keys, indices and kinds."""
+    models = [model]
     for part in location:
-        fields = getattr(current, "model_fields", {})
-        if part not in fields:
-            continue
-        current = fields[part].annotation
-    return list(getattr(current, "model_fields", {}))
+        fields = [m.model_fields[part] for m in models if part in m.model_fields]
+        if fields:
+            models = [member for field in fields for member in _models(field.annotation)]
+        else:
+            models = [m for m in models if part in _kinds(m)] or models
+    return list(dict.fromkeys(key for m in models for key in m.model_fields))
 
 
 def write_text(path: Path, text: str) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ctrlgen.model import Model
 
+CORNERS = frozenset((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_IF_ELSE_ZERO))
 NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves rounding only
 
 
@@ -68,7 +69,9 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
             reached[i] = ca.substitute(value, now, here)
     else:
         reached = ca.substitute(model.step(sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
+        reached = ca.substitute(reached, u, u_1)
         motion = x_1 - reached
+        produced = ca.substitute(model.heat_of_drive, ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
     heating = heat - produced
     wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion, heating), ca.vertcat(z_1, x_1, u_1, heat))[
         :n
@@ -76,9 +79,9 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     # The later kernels take the earlier results as given, because the controller has limited them meanwhile.
     later = _solve(known, ca.vertcat(balance, motion, heating), ca.vertcat(x_1, u_1, heat))
     wanted_state, memory = later[:n_s], later[n_s : x.numel()]
-    drive_of_state = ca.vertcat(ca.substitute(motion[:n_s], x_1[n_s:], memory), heating)
+    drive_of_state = ca.substitute(ca.vertcat(motion[:n_s], heating), x_1[n_s:], memory)
     wanted_u = _solve(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
-    advance = ca.substitute(reached, heat, produced)
+    advance = ca.substitute(reached, heat, ca.substitute(produced, x_1, reached) if sample_time is None else produced)
     return Inverse(
         _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
         _kernel("state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
@@ -149,9 +152,15 @@ def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
     if not ca.depends_on(slope, v):
         return base - ca.solve(slope, ca.substitute(r, v, base))
     curvature = ca.jacobian(slope, v)
-    if v.numel() == 1 and not ca.depends_on(curvature, v):
+    if v.numel() == 1 and not ca.depends_on(curvature, v) and not _has_corners(slope):
         return base + _rising_root(known, r, v, base, slope, curvature)
     return _newton(r, v, ca.SX(known.inside(v)))
+
+
+def _has_corners(slope: ca.SX) -> bool:
+    """Whether a slope jumps, as that of a play or a dead zone: its curvature says nothing then."""
+    f = ca.Function("slope", ca.symvar(slope), [slope])
+    return any(f.instruction_id(k) in CORNERS for k in range(f.n_instructions()))
 
 
 def _newton(r: ca.SX, v: ca.SX, start: ca.SX) -> ca.SX:

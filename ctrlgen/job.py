@@ -19,6 +19,7 @@ from ctrlgen.files import whole_folder, write_text
 from ctrlgen.firmware import CFolder, generate
 from ctrlgen.measures import Expected, expectations
 from ctrlgen.model import build_model
+from ctrlgen.paths import Frame
 from ctrlgen.scenario import Scenario, load_scenario
 from ctrlgen.solution import Solution, solve
 from ctrlgen.units import from_si
@@ -106,33 +107,34 @@ def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) ->
 
 @dataclass(frozen=True)
 class WorkspaceSummary:
-    """What `map_workspace` found; `ranges` per base pose (channels, 2), SI."""
+    """What `map_workspace` found; `ranges` per base pose and `extent` anywhere (channels, 2), SI."""
 
     workspace: Workspace
     bases: list[np.ndarray]
     ranges: list[np.ndarray]
+    extent: np.ndarray
     translations: Ball
     everything: Ball
 
 
-def map_workspace(device: Device, heights: list[float], out: Path) -> WorkspaceSummary:
-    """Ranges of each degree of freedom alone at some heights [m], slices, and the largest balls; workspace.json and a figure."""
+def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSummary:
+    """Ranges of each degree of freedom alone at some poses and anywhere, slices, the largest balls; workspace.json and a figure.
+
+    `poses` such as "delta_x=5um,delta_z=20um", channels left out zero; without any those of `Workspace.bases`. The one in the middle of the
+    list is where the balls and the ends are looked for.
+    """
     model = build_model(device)
     workspace, signal = Workspace(model), model.signals["pose"]
-    lengths = tuple(i for i, unit in enumerate(signal.units) if unit == "um")
-    if len(lengths) != 3:
+    if len(signal.channels) < 2 or not workspace.translations:
         raise InputError(
-            device.name, [Fault("workspace", "is mapped for platforms with three translations; this one has fewer")]
+            device.name, [Fault("workspace", "is mapped for platforms with a translation and another channel")]
         )
-    bases = []
-    for height in heights:
-        base = np.zeros(len(signal.channels))
-        base[lengths[-1]] = height
-        bases.append(base)
+    frame = Frame(signal.channels, signal.units)
+    bases = [frame.pose(pose, "--at") for pose in poses] or workspace.bases()
     ranges = [workspace.ranges(base) for base in bases]
     middle = bases[len(bases) // 2]
-    balls = workspace.ball(middle, lengths), workspace.ball(middle, tuple(range(len(signal.channels))))
-    found = WorkspaceSummary(workspace, bases, ranges, *balls)
+    balls = workspace.ball(middle, workspace.translations), workspace.ball(middle, tuple(range(len(signal.channels))))
+    found = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
     with whole_folder(out) as draft:
         with figures.plt.rc_context(figures.STYLE):
             write_text(draft / "workspace.svg", figures.svg(figures.draw_workspace(workspace, bases, balls[0])))
@@ -151,6 +153,7 @@ def _workspace_numbers(found: WorkspaceSummary) -> dict[str, Any]:
     return {
         "device": found.workspace.model.name,
         "alone": [{"base": row(base), "range": row(r)} for base, r in zip(found.bases, found.ranges, strict=True)],
+        "anywhere": row(found.extent),
         "largest_ball": [
             {
                 "channels": [signal.channels[i] for i in ball.channels],

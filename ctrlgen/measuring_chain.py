@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from math import exp, pi, sqrt
 
 import numpy as np
-from scipy.signal import butter, lfilter, lfilter_zi
 
 from ctrlgen.units import parse
 
@@ -298,6 +297,12 @@ def calibrate_all(recordings: Sequence[Recording], wavelength: float) -> Calibra
 
 def low_pass(signal: np.ndarray, cutoff: float, rate: float, settled: bool = True) -> np.ndarray:
     """Second-order Butterworth low-pass. S2 names the cutoff only; first order would leave more than it prints."""
+    from scipy.signal import (
+        butter,
+        lfilter,
+        lfilter_zi,
+    )  # most of a second to import, which no device file should wait for
+
     b, a = butter(2, cutoff, fs=rate)
     start = lfilter_zi(b, a) * (signal[0] if settled else 0.0)
     return np.asarray(lfilter(b, a, signal, zi=start)[0])
@@ -305,6 +310,8 @@ def low_pass(signal: np.ndarray, cutoff: float, rate: float, settled: bool = Tru
 
 def _first_order(white: np.ndarray, cutoff: float, rate: float, before: float = 0.0) -> np.ndarray:
     """White noise of unit variance coloured to first-order bandwidth `cutoff`, unit variance again."""
+    from scipy.signal import lfilter
+
     pole = exp(-2 * pi * cutoff / rate)
     return np.asarray(lfilter([sqrt(1 - pole**2)], [1, -pole], white, zi=[pole * before])[0])
 

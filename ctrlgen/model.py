@@ -72,6 +72,14 @@ class Model:
         """dx/dt (n_x,) as a function of x, z, u and p."""
         return ca.substitute(self.rates_of_heat, self.heat, self.heat_of_drive)
 
+    @cached_property
+    def settling(self) -> ca.SX:
+        """What is zero (n_x,) at an equilibrium: the rates; of memories by samples and clocks, which never rest, themselves."""
+        rows = self.rates[:]
+        for i in (*self.stepped, *self.clocks):
+            rows[i] = self.x[i]
+        return rows
+
     @property
     def ambient_symbol(self) -> ca.SX:
         """`ambient` as an argument of a function: the symbol, or one that nothing depends on."""
@@ -142,7 +150,10 @@ class Model:
             gain = ca.vertcat(*(_phi_1(rate[i], h) for i in range(self.x.numel())))
             return self.x + gain * rates
         norm = float(
-            ca.norm_inf(ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal))
+            ca.norm_inf(
+                ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal)
+                * (self.x_scale[None, :] / self.x_scale[:, None])
+            )
         )
         if h * norm > 1:
             raise InputError(

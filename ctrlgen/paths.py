@@ -49,6 +49,17 @@ class Frame:
             raise InputError("path", faults)
         return vector
 
+    def pose(self, text: str, option: str) -> np.ndarray:
+        """'delta_x=5um,delta_z=20um', as given to a command's `option`, as an SI vector. Raises InputError."""
+        pairs = [part.partition("=") for part in text.split(",") if part.strip()]
+        if any(not value for _, _, value in pairs):
+            example = "write channel=value, separated by commas, such as delta_x=5um,delta_z=20um"
+            raise InputError(option, [Fault(text, example)])
+        try:
+            return self.point({name.strip(): value.strip() for name, _, value in pairs}, "")
+        except InputError as error:
+            raise InputError(option, [Fault(f.where.removeprefix("."), f.what) for f in error.faults]) from None
+
     def directions(self, names: Sequence[str], where: str) -> np.ndarray:
         """Unit vectors of the named channels, (n, channels). Raises InputError for unknown or mixed units."""
         for name in names:

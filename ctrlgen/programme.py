@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ctrlgen.errors import SolverError
+from ctrlgen.errors import Fault, InputError, SolverError
 from ctrlgen.model import Limit, Model
 from ctrlgen.scenario import Scenario
 from ctrlgen.simulation import Trace, trace
@@ -46,6 +46,9 @@ class Programme:
     def __init__(self, model: Model, scenario: Scenario, command: np.ndarray) -> None:
         self.model, self.scenario = model, scenario
         self.signal = model.signals[scenario.file.follow]
+        if model.clocks and scenario.closed:
+            what = "a closed path is not repeated by a device that changes with time; make the path open, or drop the effect"
+            raise InputError(scenario.name, [Fault("path", what)])
         self.wanted = len(command)  # an open path is held for one more sample, so that its last drive is determined
         held = scenario.sample_time is not None and not scenario.closed
         self.command = np.vstack([command, command[-1:]]) if held else command
@@ -68,7 +71,7 @@ class Programme:
             values = ca.vertcat(*physical, drive * m.u_scale, ca.DM(m.p_nominal))
             return ca.substitute(expression, ca.vertcat(m.x, m.z, m.u, m.p), values)
 
-        motion = at(m.rates, u) / m.x_scale if h is None else x_1 - (at(m.step(h), u) - m.rest) / m.x_scale
+        motion = at(m.settling, u) / m.x_scale if h is None else x_1 - (at(m.step(h), u) - m.rest) / m.x_scale
         equal = [at(self.signal.expr, v) / self.signal.scale - wanted - s, at(m.balance, v) / m.force_scale, motion]
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
         for limit in limits:
@@ -78,6 +81,15 @@ class Programme:
             high.append(np.full(limit.expr.numel(), np.inf if limit.upper is None else limit.upper / unit))
         function = ca.Function("sample", [x, z, v, u, s, x_1, wanted], [ca.vertcat(*rows)], {"cse": True})
         return function, np.concatenate(low), np.concatenate(high)
+
+    @property
+    def _settled(self) -> ca.Function:
+        """(x, z, u, p) -> what is zero where a path starts: settled, memories by samples after one from zero, clocks at zero."""
+        m = self.model
+        rows, stepped = m.settling[:], list(m.stepped)
+        for i, value in m.stepped.items():
+            rows[i] = m.x[i] - ca.substitute(value, m.x[stepped], ca.SX.zeros(len(stepped)))
+        return ca.Function("settled", [m.x, m.z, m.u, m.p], [rows])
 
     def run(self, limits: Sequence[Limit]) -> Result:
         """IPOPT's solution with the rows of `limits` added. Raises SolverError, KeyboardInterrupt."""
@@ -94,9 +106,9 @@ class Programme:
             u_start, x_end = ca.MX.sym("u0", self.sizes[2]), ca.MX.sym("x1", self.sizes[0])
             U_before, X_next = ca.horzcat(u_start, U[:, :-1]), ca.horzcat(X[:, 1:], x_end)
             extra = [u_start, x_end]
-            settled = m.dynamics(
+            settled = self._settled(
                 X[:, 0] * m.x_scale + m.rest, Z[:, 0] * m.z_scale, u_start * m.u_scale, ca.DM(m.p_nominal)
-            )[0]
+            )
             extra_rows = [settled / m.x_scale, x_end[: m.n_states] - X[: m.n_states, -1]]
             (xl, xh), (ul, uh) = self._bounds("x"), self._bounds("u")
             extra_low, extra_high = [ul, xl], [uh, xh]

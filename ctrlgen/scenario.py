@@ -111,7 +111,11 @@ def load_scenario(path: Path | str) -> Scenario:
     """The scenario in a folder (its scenario.toml) or in a TOML file, with its device. Raises InputError."""
     path = Path(path)
     file_path = path / FILE if path.is_dir() else path
-    file = validate(ScenarioFile, read_toml(file_path), file_path)
+    table = read_toml(file_path)
+    if "kind" in table and "device" not in table:
+        what = 'describes a device; name a scenario, or write one that has device = "..." with this file\'s path'
+        raise InputError(file_path, [Fault("file", what)])
+    file = validate(ScenarioFile, table, file_path)
     device_path = file_path.parent / file.device
     device = load_device(device_path)
     texts = {"scenario": read_text(file_path), "device": read_text(device_path)}

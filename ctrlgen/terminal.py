@@ -153,3 +153,8 @@ def complain(error: CtrlgenError) -> None:
     """One clear message on standard error."""
     err.print("[bold red]error[/bold red]: ", end="")
     err.print(str(error), markup=False, soft_wrap=True)
+
+
+def show_warning(message: Warning | str, *_: Any) -> None:
+    """One line without the place in our code, which tells a user nothing."""
+    err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)

@@ -15,9 +15,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import exudyn as exu
-import exudyn.itemInterface as eii
 import numpy as np
+
+try:
+    import exudyn as exu
+    import exudyn.itemInterface as eii
+except ModuleNotFoundError as missing:
+    raise ModuleNotFoundError("plants/ needs Exudyn: pip install ctrlgen[plant]") from missing
 
 Array = np.ndarray
 

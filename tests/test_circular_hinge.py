@@ -205,9 +205,21 @@ def test_auto_is_positive_definite(ratio):
 @pytest.mark.parametrize("ratio", [0.764, 0.374])
 def test_s3_case_2_without_shear_is_refused_by_name(ratio):
     case_2 = {ALPHA: "schotborgh", DELTA_Y: "lobontiu", DELTA_X: "paros_weisbord"}
-    with pytest.raises(ValueError, match=r"Lobontiu.*Schotborgh.*indefinite"):
+    with pytest.raises(ValueError, match=r"not positive definite.*Lobontiu.*Schotborgh"):
         planar(ratio, case_2, shear_factor=0.0)
     assert planar(ratio, case_2, shear_factor=1.5)[1, 1] > 0
+
+
+def test_a_stretch_that_is_negative_is_refused():
+    """C.7 falls below zero at t/R = 1.49, C.9 and C.6 stay positive."""
+    mixed = {ALPHA: "smith", DELTA_Y: "paros_weisbord_simplified", DELTA_X: "paros_weisbord_simplified"}
+    with pytest.raises(ValueError, match=r"delta_x_per_F_x by S2 C\.7.*is -.*no compliance"):
+        table.planar(geometry(1.6), mixed, "accept")
+
+
+def test_what_is_accepted_is_silent_and_still_noted():
+    found = table.compliance(ALPHA, geometry(0.764), "paros_weisbord", "accept")  # a warning would be an error here
+    assert not found.holds and "outside its range" in found.note
 
 
 def test_symbols_go_through_and_the_number_selects():

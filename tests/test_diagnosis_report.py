@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -294,6 +295,7 @@ def test_notes_alike_are_said_once():
 def command(*words: object) -> int:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["ctrlgen", *map(str, words)])
+        patch.setattr(warnings, "showwarning", warnings.showwarning)  # put back what the command changes
         return execute()
 
 

@@ -456,9 +456,17 @@ def test_repeated_poses_are_pooled_home_included() -> None:
     assert opposites(commanded, measured).pairs == ()
 
 
+def test_the_device_s_travel_covers_the_recorded_commands(device, data) -> None:
+    for J in (matrices(device)["J_k"], data.J_c):
+        assert 0.8 < np.abs(np.linalg.solve(J, data.commanded.T)).max() / device.travel.si < 1
+
+
 def test_a_planted_drift_is_found_and_the_recording_shows_none(data, rng) -> None:
     slopes = np.array([1, -2, 0, 3, 0, 5]) * 1e-8
-    found = drift(np.outer(np.arange(54), slopes) + rng.normal(0, 1e-7, (54, 6)))
+    order = np.arange(54)
+    found = drift(np.outer(order, slopes) + rng.normal(0, 1e-7, (54, 6)))
+    assert (np.abs(found.level - order.mean() * slopes) < 4 * found.level_sd).all()
+    assert found.level_sd == pytest.approx(np.full(6, 1e-7 / np.sqrt(54)), rel=0.4)
     assert (np.abs(found.slope - slopes) < 4 * found.slope_sd).all() and (found.slope_sd < 2e-9).all()
     assert found.slope_sd == pytest.approx(np.full(6, 1e-7 / np.sqrt(54 * (54**2 - 1) / 12)), rel=0.4)
     ours = drift(calibrate(data.inputs, data.measured, offset=True).residuals)
@@ -512,7 +520,7 @@ def test_every_printed_text_stands_in_the_source(rows) -> None:
 
 def test_figures_6_to_10_show_the_errors(data) -> None:
     drawings = s0_figures.figures(data)
-    assert list(drawings) == ["s0_fig6", "s0_fig7", "s0_fig8", "s0_fig9", "s0_fig10"]
+    assert [name.partition(",")[0] for name in drawings] == [f"Fig. {k}" for k in range(6, 11)]
     assert all(text.startswith("<svg") for text in drawings.values())
     assert drawings == s0_figures.figures(data)  # no date, no random name
     calibrated = pose_errors(data.measured, data.commanded)

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import re
 
 import numpy as np
 import pytest
 
-from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.physics import hexapod as linear_hexapod
 from ctrlgen.physics import xy_stage as linear_stage
 
-ROOT = Path(__file__).parents[1]
 pytest.importorskip("exudyn", reason="no Exudyn: the independent models were not built; pip install ctrlgen[plant]")
 
-from plants.mems_hexapod import MemsHexapod, bar_force, temperature_for, temperatures  # noqa: E402
-from plants.numbers import read  # noqa: E402
-from plants.paper import error, linear_force, nonlinear_force  # noqa: E402
-from plants.struts import Hexapod, Refinement  # noqa: E402
-from plants.xy_stage import Options, Stage, actuator_stiffness  # noqa: E402
+import plants.__main__ as program
+from plants.cases import COUPLED, circle, coupled_poses
+from plants.mems_hexapod import MemsHexapod, bar_force, temperature_for, temperatures
+from plants.numbers import read
+from plants.paper import error, linear_force, nonlinear_force
+from plants.struts import Hexapod, Refinement
+from plants.xy_stage import Options, Stage, actuator_stiffness
 
 NUMBERS = read()
 K_T14 = float(actuator_stiffness(NUMBERS.actuator)[0, 0])
@@ -222,21 +222,31 @@ def test_recording_repeats_and_its_noise_is_the_given_one(whole):
         whole.record(-powers, 1e3)
 
 
-def test_circle_and_coupled_poses(whole):
-    """S1 Table 3 and Fig. 14 with ctrlgen's forces. The paper: 2.34 ... 4.69 % and a mean of 3.38 %."""
-    coupled = _solved("coupled_dof")
-    main = (5, 3, 4, 0, 1, 2)
-    poses = np.array([whole.pose(whole.solve(f)) for f in coupled.trace.signals["force"]])
-    command = coupled.command / SI_TO_UM[::-1]
-    errors = [float(error(command[k, i], poses[k, i])) for k, i in enumerate(main)]
-    assert errors == pytest.approx([4.45, 3.28, 3.27, 4.24, 4.14, 2.80], abs=0.05)
+def test_coupled_poses(whole):
+    """S1 Table 3 with ctrlgen's forces. The paper: 2.34 ... 4.69 %."""
+    case = coupled_poses(whole)
+    assert case.command[:, 5] == pytest.approx(30.0, abs=1e-9) and case.command[1, 3] == pytest.approx(-10.0, abs=1e-9)
+    errors = case.coupled_errors()
+    assert list(errors) == [name for name, _ in COUPLED]
+    assert list(errors.values()) == pytest.approx([4.45, 3.28, 3.27, 4.24, 4.14, 2.80], abs=0.05)
 
-    circle = _solved("circle20")
-    path = whole.path(circle.trace.signals["force"][::10])
-    poses = np.array([whole.pose(s) for s in path])[:, 3:]
-    command = (circle.command / SI_TO_UM[::-1])[::10, 3:]
-    mean = [error(c, p)[np.abs(c) > 0.5].mean() for c, p in zip(command.T, poses.T, strict=True)]
-    assert np.mean(mean) == pytest.approx(3.97, abs=0.05)
+
+def test_circle(whole):
+    """S1 Fig. 14 with ctrlgen's forces. The paper: a mean of 3.38 %."""
+    case = circle(whole)
+    assert len(case.command) == 100
+    assert np.hypot(case.command[:, 3], case.command[:, 4]) == pytest.approx(10.0, abs=1e-9)
+    assert np.mean(list(case.mean_errors().values())) == pytest.approx(3.97, abs=0.05)
+    assert list(case.parasitic().values()) == pytest.approx([5.67e-6, 5.66e-6, 4.36e-6], rel=0.03)
+
+
+def test_the_program_prints_table_3_and_the_circle(monkeypatch, capsys):
+    monkeypatch.setattr(program, "stage_forces", lambda: None)  # seconds, and nothing of the two tables
+    monkeypatch.setattr("sys.argv", ["plants"])
+    program.main()
+    printed = capsys.readouterr().out
+    assert re.search(r"theta_z +-4\.0 mrad +-3\.89\d +2\.8\d % +4\.56 %", printed)
+    assert re.search(r"mean of the three +3\.9\d % +printed 3\.38 %", printed)
 
 
 def _simpson(force: np.ndarray, travel: np.ndarray) -> float:
@@ -244,11 +254,6 @@ def _simpson(force: np.ndarray, travel: np.ndarray) -> float:
     weights = np.ones(len(force))
     weights[1:-1:2], weights[2:-1:2] = 4, 2
     return float(force[-1] * travel[-1] - (force[1] - force[0]) / 3 * weights @ travel)
-
-
-def _solved(name: str):
-    scenario = load_scenario(ROOT / "scenarios" / name)
-    return solve(scenario, build_model(scenario.device))
 
 
 def _half_stage() -> np.ndarray:

@@ -6,18 +6,22 @@ import math
 
 import pytest
 
-from ctrlgen.reproduce import s0, s1, s2, s3
+from ctrlgen.reproduce import all as everything
 from ctrlgen.reproduce.row import Row, Status, half_unit
 
 
-@pytest.fixture(scope="module", params=[s0, s1, s2, s3], ids=["S0", "S1", "S2", "S3"])
+@pytest.fixture(scope="module", params=list(everything.SOURCES))
 def rows(request):
-    return request.param.rows()
+    return everything.reproduce([request.param])
 
 
 def test_every_row_that_is_not_reproduced_says_why(rows):
     assert rows
     assert not [row.where for row in rows if row.status is not Status.REPRODUCED and not row.reason]
+
+
+def test_every_row_belongs_to_the_source_that_was_asked_for(rows, request):
+    assert {row.source for row in rows} == {request.node.callspec.params["rows"]}
 
 
 def test_no_number_is_left_out_by_being_no_number(rows):

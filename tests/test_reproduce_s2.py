@@ -1,18 +1,40 @@
 from __future__ import annotations
 
+import re
 from collections import Counter
 
 import pytest
 
+from ctrlgen.measuring_chain import SENSORS
 from ctrlgen.physics import circular_hinge_table as table
+from ctrlgen.reproduce import all as everything
+from ctrlgen.reproduce import s2, s3_hinges
 from ctrlgen.reproduce.row import Row, Status
-from ctrlgen.reproduce.s2 import PRINTED_ERRORS, rows
+from ctrlgen.reproduce.s3_hinges import PRINTED_ERRORS
+
+
+def test_the_page_of_s2_shows_its_measuring_chain_and_the_hinge_errors(tmp_path, found):
+    """The hinge errors are S3's figures; its Table 3 is among the rows of S2."""
+    page = tmp_path / "page.html"
+    everything.write_page(list(found.values()), page)
+    text = page.read_text()
+    for figure in (
+        "Figs. A.8 and A.9",
+        "Figs. A.3 and A.10",
+        "Fig. 3, alpha_z/M_z",
+        "Fig. 4, delta_y/F_y",
+        "Fig. 5, delta_x/F_x",
+    ):
+        assert text.count(f"<figcaption>{figure}") == 1
+    for name, sensor in SENSORS.items():
+        drawn = float(re.search(rf"{name}: ([\d.]+) um/V", text)[1])
+        assert drawn == pytest.approx(sensor.sensitivity * 1e6, rel=5e-4)  # of one recording of 12 s
 
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, Row]:
     pytest.importorskip("skfem")
-    listed = rows()
+    listed = [*s2.rows(), *s3_hinges.rows()]
     by_place = {f"{row.source} {row.where}": row for row in listed}
     assert len(by_place) == len(listed)  # each number once
     return by_place
@@ -24,10 +46,10 @@ def test_what_is_not_reproduced_has_a_reason(found):
 
 
 def test_every_computable_number_of_s2_is_reproduced_but_two(found):
-    s2 = [row for row in found.values() if row.source == "S2" and row.ours is not None]
-    differing = {row.where for row in s2 if row.status is Status.DIFFERS}
+    listed = [row for row in found.values() if row.source == "S2" and row.ours is not None]
+    differing = {row.where for row in listed if row.status is Status.DIFFERS}
     assert differing == {"A.5.1.1, eq. (A.2), 3338", "below C.15, coefficient, Tseytlin"}
-    assert len(s2) >= 30
+    assert len(listed) >= 30
 
 
 def test_the_hinge_errors_of_s3_table_3_agree_where_the_reading_does_not_matter(found):

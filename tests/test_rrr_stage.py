@@ -14,9 +14,10 @@ from conftest import SCENARIOS
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices import rrr_stage as device_module
-from ctrlgen.physics import piezo_stack, rrr_hinge, rrr_stage
+from ctrlgen.physics import circular_hinge_table, piezo_stack, rrr_stage
 from ctrlgen.reproduce import s3, s3_lengths, s3_tables
 from ctrlgen.reproduce.row import Row, Status, half_unit
+from ctrlgen.workspace import Workspace
 
 CASES = (1, 2)
 ROTATION_SCALE = np.array([1.0, 1.0, 30e-3])  # rotations as motion of a point 30 mm away
@@ -33,6 +34,11 @@ def whole(k: rrr_stage.Kinetostatics, C_in: Any) -> np.ndarray:
     return M * np.outer(scale, scale)
 
 
+def output_per_voltage(device: device_module.RrrStage) -> np.ndarray:
+    """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]."""
+    return array(device_module.stage(device).complete_J) @ device_module.input_per_voltage(device)
+
+
 def geometry(rng: np.random.Generator) -> SimpleNamespace:
     l = dict(zip(("l1", "l2", "l3", "l4", "l5", "l6"), rng.uniform(2e-3, 50e-3, 6), strict=True))
     R = dict(zip(("R1", "R2", "R3"), rng.uniform(1e-3, 3e-3, 3), strict=True))
@@ -42,7 +48,7 @@ def geometry(rng: np.random.Generator) -> SimpleNamespace:
 def random_hinge(rng: np.random.Generator, R: float) -> np.ndarray:
     """Of the form of a hinge, positive definite, sized like those of S3."""
     x, alpha = rng.uniform(1e-9, 6e-9), rng.uniform(0.02, 0.2)
-    return array(rrr_hinge.hinge_compliance(x, R**2 * alpha * rng.uniform(1.01, 1.3), alpha, R))
+    return array(circular_hinge_table.end_compliance(x, R**2 * alpha * rng.uniform(1.01, 1.3), alpha, R))
 
 
 def printed_rows(where: str) -> list[Row]:
@@ -74,15 +80,26 @@ def test_a_hinge_that_would_give_energy_away_is_refused_by_its_name(tmp_path: An
     assert "not positive definite" in message and "shear" in message
 
 
-def test_every_hinge_that_is_not_positive_definite_is_found() -> None:
-    good = rrr_hinge.hinge_compliance(1e-9, 2e-7, 0.05, 1e-3)
-    at_the_edge = rrr_hinge.hinge_compliance(1e-9, 1e-6 * 0.05 * (1 - 1e-6), 0.05, 1e-3)
-    negative = rrr_hinge.hinge_compliance(-1e-9, 2e-7, 0.05, 1e-3)
-    missing = rrr_hinge.hinge_compliance(float("nan"), 2e-7, 0.05, 1e-3)
-    assert device_module.indefinite([good] * 3) == []
-    for bad in (at_the_edge, negative, missing):
-        (fault,) = device_module.indefinite([good, bad, good])
-        assert fault.startswith("hinge2 ")
+def test_the_hinges_may_choose_their_own_equations(tmp_path: Any) -> None:
+    """A device file whose hinges say "auto": another stiffness, but hardly another Jacobian (S3 section 5.1.1)."""
+    lines = (SCENARIOS / "devices" / "rrr_case2.toml").read_text().splitlines()
+    auto = ['equation = "auto"' if line.startswith("equation = ") else line for line in lines]
+    assert auto != lines
+    path = tmp_path / "device.toml"
+    path.write_text("\n".join(auto))
+    ours, printed = (device_module.stage(d) for d in (load_device(path), s3_lengths.printed_device(2)))
+    assert np.abs(array(ours.J) / array(printed.J) - 1).max() < 0.01
+    assert 0.001 < np.abs(array(ours.C_oFo)[2, 2] / array(printed.C_oFo)[2, 2] - 1) < 0.05
+    path.write_text("\n".join(line for line in auto if not line.startswith("outside = ")))
+    with pytest.warns(circular_hinge_table.HingeRangeWarning, match="recommends no printed equation here"):
+        load_device(path)
+
+
+def test_a_stage_says_which_equations_stand_outside_their_range(case: int) -> None:
+    remarks = s3_lengths.printed_device(case).remarks()
+    expected = {1: 9, 2: 6}[case]  # of nine; S3 Table 3 covers the others
+    assert len(remarks) == expected and all("S3 Table 3" in remark for remark in remarks)
+    assert any(remark.startswith("hinge1: delta_y_per_F_y at t/R = 0.7636") for remark in remarks)
 
 
 # Appendix B
@@ -132,8 +149,9 @@ def test_the_stage_is_the_direct_stiffness_assembly_for_any_hinges_and_lengths(s
 
 def test_the_corrected_stage_is_the_direct_stiffness_assembly(case: int, corrected: rrr_stage.Kinetostatics) -> None:
     p = s3_lengths.corrected(case)
-    g = SimpleNamespace(**vars(p.lengths), R3=p.hinge3.radius, frame_angle=p.frame_angle)
-    hinges = [array(C) for C in device_module.hinge_compliances(s3_lengths.printed_device(case), p)]
+    g = SimpleNamespace(**vars(p.lengths), R3=p.hinge3.R, frame_angle=p.frame_angle)
+    device = s3_lengths.printed_device(case)
+    hinges = [array(device_module.hinge_compliance(device, name, p)) for name in device.hinges]
     scale = np.append(ROTATION_SCALE, [1.0, 1.0, 1.0])
     reference = direct.assemble(hinges, g) * np.outer(scale, scale)
     ours = whole(corrected, corrected.input_compliance)
@@ -338,20 +356,26 @@ def test_a_stack_pushes_with_what_its_travel_leaves_of_the_blocking_force(case: 
     _, balance = model.dynamics(volts, d, volts, [])
     assert np.abs(balance.full()).max() < 1e-9 * 850  # rounding
     pose = np.array(model.evaluate(volts, d, volts, [])[list(model.signals).index("pose")]).ravel()
-    assert np.allclose(device_module.output_per_voltage(device) @ volts, pose, rtol=1e-9)
+    assert np.allclose(output_per_voltage(device) @ volts, pose, rtol=1e-9)
     assert np.isclose(float(piezo_stack.stiffness(device.values().piezo)), k_p, rtol=1e-12)
 
 
 def test_the_workspace_is_as_far_as_the_voltages_reach(case: int) -> None:
-    device, p = s3_lengths.printed_device(case), s3_lengths.corrected(case)
-    M, limit = device_module.output_per_voltage(device, p), 150.0
-    corners = M @ (np.array(list(product((0.0, limit), repeat=3))).T - limit / 2)
-    ranges = device_module.workspace(device, p)
-    assert np.allclose(ranges["together"], corners.max(axis=1), rtol=1e-12)
-    for k, alone in enumerate(ranges["alone"]):
-        volts = limit / 2 + np.linalg.solve(M, alone * np.eye(3)[k])
-        assert np.isclose(np.abs(volts - limit / 2).max(), limit / 2, rtol=1e-12)  # one stack just at its end
-        assert alone <= ranges["together"][k] * (1 + 1e-12)
+    """The mapped workspace against the corners of the voltages' cube, seen through the static map."""
+    device = s3_lengths.printed_device(case)
+    M, limit = output_per_voltage(device), 150.0
+    workspace = Workspace(build_model(device))
+    _, middle, _ = workspace.bases()
+    assert np.allclose(middle, M @ np.full(3, limit / 2), rtol=0, atol=1e-6 * np.abs(M).max(axis=1) * limit)
+    corners = M @ np.array(list(product((0.0, limit), repeat=3))).T
+    extent = workspace.extent(middle)
+    size = np.ptp(corners, axis=1)
+    ends = np.column_stack([corners.min(axis=1), corners.max(axis=1)])
+    assert (np.abs(extent - ends).max(axis=1) < 2e-4 * size).all()
+    for k, (low, high) in enumerate(workspace.ranges(middle)):
+        for end in (low, high):
+            volts = limit / 2 + np.linalg.solve(M, (end - middle[k]) * np.eye(3)[k])
+            assert np.isclose(np.abs(volts - limit / 2).max(), limit / 2, rtol=1e-6)  # one stack just at its end
 
 
 def test_a_circle_is_solved_with_voltages_that_the_static_map_gives(tmp_path: Any) -> None:
@@ -363,7 +387,7 @@ def test_a_circle_is_solved_with_voltages_that_the_static_map_gives(tmp_path: An
     )
     scenario = load_scenario(path)
     trace = solve(scenario, build_model(scenario.device)).trace
-    M = device_module.output_per_voltage(s3_lengths.printed_device(2))
+    M = output_per_voltage(s3_lengths.printed_device(2))
     volts, pose = trace.signals["state"], trace.signals["pose"]
     assert np.abs(pose - volts @ M.T)[:, :2].max() < 1e-11 and np.abs(pose - volts @ M.T)[:, 2].max() < 1e-9
     assert volts.min() > 0 and volts.max() < 150

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -62,6 +63,49 @@ def test_the_largest_ball_is_inside_and_touches_on_all_sides(workspace, model, c
         moved = ball.centre.copy()
         moved[list(channels)] += 0.05 * ball.radius * shift * scale[list(channels)]
         assert workspace.excess(moved + 1.002 * ball.radius * directions * scale).max() > 0
+
+
+def test_no_pose_lies_beyond_the_ends(workspace, model, rng):
+    """Boundary points in many directions stay inside the extent; the ends of each channel alone do not go as far."""
+    extent = workspace.extent(at(20))
+    directions = rng.normal(size=(3000, 6)) * np.array(model.signals["pose"].scale)
+    edge = at(20) + workspace.reach(at(20), directions)[:, None] * directions
+    size = np.diff(extent)[:, 0]
+    assert (edge.min(axis=0) >= extent[:, 0] - 1e-4 * size).all() and (
+        edge.max(axis=0) <= extent[:, 1] + 1e-4 * size
+    ).all()
+    alone = workspace.ranges(at(20))
+    assert (alone[:, 0] >= extent[:, 0] - 1e-4 * size).all() and (alone[:, 1] <= extent[:, 1] + 1e-4 * size).all()
+    assert np.diff(alone)[0, 0] < 0.9 * size[0]
+
+
+@pytest.mark.parametrize(("channel", "side"), [(1, 1), (3, 0), (5, 1)])
+def test_the_ends_are_those_of_a_nonlinear_programme(workspace, model, channel, side):
+    """IPOPT over (state, displacement, drive) with the model's own equations: no inverse, no tangent planes."""
+    x_free, z_free, u_free = (ca.SX.sym(name, 6) for name in "xzu")  # in typical sizes
+    x, z, u = x_free * ca.DM(model.x_scale), z_free * ca.DM(model.z_scale), u_free * ca.DM(model.u_scale)
+    free = ca.vertcat(x_free, z_free, u_free)
+    rates, balance = model.dynamics(x, z, u, model.p_nominal)
+    values = model.evaluate_limits(x, z, u, model.p_nominal)
+    scale = [(limit.upper or 0.0) - (limit.lower or 0.0) or 1.0 for limit in model.limits]
+    low = [
+        -np.inf if m.lower is None else m.lower / s
+        for m, s in zip(model.limits, scale, strict=True)
+        for _ in m.channels
+    ]
+    high = [
+        np.inf if m.upper is None else m.upper / s for m, s in zip(model.limits, scale, strict=True) for _ in m.channels
+    ]
+    pose = model.evaluate(x, z, u, model.p_nominal)[list(model.signals).index("pose")]
+    goal = pose[channel] / model.signals["pose"].scale[channel]
+    g = ca.vertcat(rates, balance / model.force_scale, *(v / s for v, s in zip(values, scale, strict=True)))
+    quiet = {"ipopt.print_level": 0, "print_time": False}
+    solver = ca.nlpsol("end", "ipopt", {"x": free, "f": goal * (1, -1)[side], "g": g}, quiet)
+    start = np.concatenate([np.full(6, 150 + 273.15) / model.x_scale, [1.2, 2.2] * 3, np.full(6, 0.2) / model.u_scale])
+    found = solver(x0=start, lbg=[0.0] * 12 + low, ubg=[0.0] * 12 + high)
+    assert solver.stats()["success"]
+    end = float(found["f"]) * (1, -1)[side] * model.signals["pose"].scale[channel]
+    assert workspace.extent(at(20))[channel, side] == pytest.approx(end, rel=2e-4)
 
 
 def test_a_base_that_cannot_be_held_is_refused(workspace):

@@ -17,7 +17,9 @@ for _module in iter_modules(__path__):
 
 def load_device(path: Path | str) -> Device:
     """The device described by a TOML file. Raises InputError listing every fault."""
-    table = read_toml(path)
+    table = read_toml(Path(path) / "scenario.toml" if (Path(path) / "scenario.toml").is_file() else path)
+    if "device" in table and "kind" not in table:
+        raise InputError(path, [Fault("file", f"is a scenario; name its device, {table['device']}")])
     kind = table.get("kind")
     if kind not in Device.library:
         known = ", ".join(f'"{name}"' for name in sorted(Device.library))

@@ -8,23 +8,12 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.effect import Effect
 from ctrlgen.units import Quantity
-
-
-class Section(BaseModel):
-    """A table of a device file. Unknown keys are faults; nothing changes after loading.
-
-    `domain` is where a report places its numbers; `tolerance` is how far they may be off, relative, where the file
-    states no standard deviation: None where a number off its nominal would be a finding.
-    """
-
-    domain: ClassVar[str] = "mechanism"
-    tolerance: ClassVar[float | None] = None
-
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
 
 @dataclass(frozen=True)
@@ -118,6 +107,7 @@ class Device(Section):
     title: str
     source: str
     effect: tuple[Effect, ...] = ()
+    sensor: tuple[AnySensor, ...] = ()
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -127,6 +117,10 @@ class Device(Section):
     def links(self, p: SimpleNamespace) -> Links:
         """The device's physics with the values `p` (numbers, or symbols where they are free)."""
         raise NotImplementedError
+
+    def remarks(self) -> list[str]:
+        """What a reader should know of the description, such as an equation used beyond its range."""
+        return []
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Every number of the device with its dotted path, such as 'struts.wire_length'."""

@@ -6,7 +6,7 @@ hinge = { kind = "circular", R = "1.1 mm", t = "0.84 mm", equation = "auto" }
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Literal
+from typing import Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -31,25 +31,36 @@ Group = Literal[
 
 
 class HingeEquations(Section):
-    """Whose equation gives each compliance, as in S3 Table 2."""
+    """Whose equation gives each compliance, as in S3 Table 2; one name in place of the table means all three."""
 
     alpha_z_per_M_z: Group = "auto"
     delta_y_per_F_y: Group = "auto"
     delta_x_per_F_x: Group = "auto"
 
+    @model_validator(mode="before")
+    @classmethod
+    def _one_for_all(cls, given: Any) -> Any:
+        if not isinstance(given, str):
+            return given
+        known = get_args(Group)
+        if given not in known:
+            raise ValueError(f"{given!r} must be one of {', '.join(known)}, or a table with one of them per compliance")
+        return dict.fromkeys(table.PLANAR, given)
+
 
 class Hinge(Section):
     """A right circular hinge. Width and material may be its own or come from the device.
 
-    `equation` names one group of authors, one per compliance, or "auto". `outside` = "warn" admits equations beyond
-    their t/R range. `shear_factor` 0 leaves shear out of delta_y/F_y; without it each group's own is taken.
+    `equation` names one group of authors, one per compliance, or "auto". Beyond an equation's t/R range, `outside`
+    refuses it, warns, or accepts it in silence (`ctrlgen check` still says so). `shear_factor` 0 leaves shear out of
+    delta_y/F_y; without it each group's own is taken.
     """
 
     kind: Literal["circular"]
     R: Length
     t: Length
-    equation: Group | HingeEquations = "auto"
-    outside: Literal["refuse", "warn"] = "refuse"
+    equation: HingeEquations = HingeEquations()
+    outside: table.Outside = "refuse"
     shear_factor: quantity("1", low=0.0, high=2.0) | None = None
     b: Length | None = Field(default=None, description="width")
     young: quantity("GPa", positive=True) | None = None
@@ -57,8 +68,14 @@ class Hinge(Section):
 
     @model_validator(mode="after")
     def _equations_hold(self) -> Hinge:
+        faults = []
         for compliance, group in self.equations.items():
-            table.choose(compliance, self.ratio, group, self.outside)
+            try:
+                table.choose(compliance, self.ratio, group, self.outside)
+            except ValueError as fault:
+                faults.append(str(fault))
+        if faults:
+            raise ValueError("; ".join(faults))
         return self
 
     @property
@@ -69,9 +86,12 @@ class Hinge(Section):
     @property
     def equations(self) -> dict[str, str]:
         """The group asked for, per compliance."""
-        if isinstance(self.equation, str):
-            return dict.fromkeys(table.PLANAR, self.equation)
         return {key: getattr(self.equation, key) for key in table.PLANAR}
+
+    def notes(self) -> list[str]:
+        """What to know of each compliance whose equation S3 Table 3 does not recommend at this t/R."""
+        asked = self.equations.items()
+        return [note for key, group in asked if (note := table.pedigree(key, self.ratio, group, self.outside)[1])]
 
     def geometry(
         self, p: SimpleNamespace, b: Scalar | None = None, E: Scalar | None = None, nu: Scalar | None = None

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
+import numpy as np
 from pydantic import Field, model_validator
 
 from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
@@ -128,6 +129,19 @@ class MemsHexapod(Device):
         if a.temperature_limit.si <= a.ambient.si:
             raise ValueError("actuator.temperature_limit must be above actuator.ambient: a heater can only heat")
         return self
+
+    def in_paper_axes(self, values: np.ndarray) -> np.ndarray:
+        """Displacements or forces (..., 6), positive along the push, with the signs of S1 eq. (19)."""
+        return np.asarray(values) * np.array(self.push)
+
+    def remarks(self) -> list[str]:
+        """Where the paper counts the other way."""
+        turned = [axis for axis, sign in zip(self.axes, self.push, strict=True) if sign < 0]
+        return (
+            [f"S1 eq. (19) counts {', '.join(turned)} against the push; here all count positive along it"]
+            if turned
+            else []
+        )
 
     def links(self, p: SimpleNamespace) -> Links:
         """Equations of `ctrlgen.physics` with this device's numbers."""

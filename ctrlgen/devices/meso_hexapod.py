@@ -47,7 +47,7 @@ class Cube(Section):
 
 
 class Workspace(Section):
-    """Largest rotation and translation of any axis."""
+    """Largest rotation and translation of any axis that the paper states; no limit of the model, `travel` is."""
 
     rotation: quantity("deg", positive=True)
     translation: quantity("um", positive=True)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 from pydantic import model_validator
 
 from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
-from ctrlgen.physics import piezo_stack, rrr_hinge, rrr_stage
+from ctrlgen.devices.hinge import Hinge
+from ctrlgen.physics import piezo_stack, rrr_stage
 from ctrlgen.physics.rrr_stage import Kinetostatics
 from ctrlgen.physics.screw import Matrix
 from ctrlgen.units import quantity
@@ -36,20 +36,6 @@ class Material(Section):
     young: quantity("GPa", positive=True)
     poisson: quantity("1", low=0.0, high=0.5)
     width: Length
-
-
-class Hinge(Section):
-    """One circular notch and the equation chosen for each of its compliances.
-
-    `shear_factor` 0 leaves shear out of Delta-y/F_y.
-    """
-
-    thickness: Length
-    radius: Length
-    rotation: Literal["paros_weisbord_full", "schotborgh"]
-    transverse: Literal["paros_weisbord_simplified", "lobontiu"]
-    axial: Literal["paros_weisbord_simplified", "paros_weisbord_full"]
-    shear_factor: quantity("1", low=0.0)
 
 
 class Piezo(Section):
@@ -79,10 +65,24 @@ class RrrStage(Device):
 
     @model_validator(mode="after")
     def _hinges_store_energy(self) -> RrrStage:
-        refused = indefinite(hinge_compliances(self, self.values()))
-        if refused:
-            raise ValueError("; ".join(refused))
+        faults = []
+        for name in self.hinges:
+            try:
+                hinge_compliance(self, name, self.values())
+            except ValueError as fault:
+                faults.append(f"{name}: {fault}")
+        if faults:
+            raise ValueError("; ".join(faults))
         return self
+
+    @property
+    def hinges(self) -> dict[str, Hinge]:
+        """The hinges of one arm by their name, from the base to the platform."""
+        return {"hinge1": self.hinge1, "hinge2": self.hinge2, "hinge3": self.hinge3}
+
+    def remarks(self) -> list[str]:
+        """Which hinge equations stand outside their t/R range."""
+        return [f"{name}: {note}" for name, hinge in self.hinges.items() for note in hinge.notes()]
 
     def links(self, p: SimpleNamespace) -> Links:
         """Equations of `ctrlgen.physics` with this device's numbers.
@@ -130,43 +130,20 @@ class RrrStage(Device):
         )
 
 
-def hinge_compliances(device: RrrStage, p: SimpleNamespace) -> list[Matrix]:
-    """[C] of hinges 1, 2, 3 by the equations that `device` names and the values `p`, each (3, 3)."""
-    m, matrices = p.material, []
-    for choice, h in ((device.hinge1, p.hinge1), (device.hinge2, p.hinge2), (device.hinge3, p.hinge3)):
-        size = (h.radius, h.thickness, m.width, m.young)
-        y = rrr_hinge.TRANSVERSE[choice.transverse](*size) + h.shear_factor * rrr_hinge.shear(*size, m.poisson)
-        matrices.append(
-            rrr_hinge.hinge_compliance(
-                rrr_hinge.AXIAL[choice.axial](*size), y, rrr_hinge.ROTATION[choice.rotation](*size), h.radius
-            )
-        )
-    return matrices
+def hinge_compliance(device: RrrStage, name: str, p: SimpleNamespace) -> Matrix:
+    """[C] of one hinge by the equations that `device` names and the values `p`, (3, 3). Width and material are the sheet's.
 
-
-def indefinite(hinges: Sequence[Matrix]) -> list[str]:
-    """One sentence for each hinge of which some load would take energy out, by its name."""
-    faults = []
-    for number, matrix in enumerate(hinges, start=1):
-        C = ca.DM(matrix).full()
-        scale = np.sqrt(np.abs(np.diag(C)))
-        scaled = C / np.outer(scale, scale)  # to order 1, so that the eigenvalue does not depend on the unit of length
-        if not (np.isfinite(C).all() and np.diag(C).min() > 0 and np.linalg.eigvalsh(scaled).min() > 0):
-            faults.append(
-                f"hinge{number} has a compliance that is not positive definite: Delta-y/F_y = {C[1, 1]:.4g} m/N, "
-                f"at least {C[1, 2] ** 2 / C[2, 2]:.4g} m/N follows from its rotation; "
-                "add shear (shear_factor), or take rotation and transverse from one source"
-            )
-    return faults
+    Raises ValueError where some load would take energy out of it.
+    """
+    m = p.material
+    return device.hinges[name].planar(getattr(p, name), m.width, m.young, m.poisson)
 
 
 def stage(device: RrrStage, p: SimpleNamespace | None = None) -> Kinetostatics:
     """The matrices of S3 appendix B with the values `p`, by default the device's own."""
     p = device.values() if p is None else p
-    g = SimpleNamespace(
-        **vars(p.lengths), R1=p.hinge1.radius, R2=p.hinge2.radius, R3=p.hinge3.radius, frame_angle=p.frame_angle
-    )
-    return rrr_stage.kinetostatics(hinge_compliances(device, p), g)
+    g = SimpleNamespace(**vars(p.lengths), R1=p.hinge1.R, R2=p.hinge2.R, R3=p.hinge3.R, frame_angle=p.frame_angle)
+    return rrr_stage.kinetostatics([hinge_compliance(device, name, p) for name in device.hinges], g)
 
 
 def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
@@ -174,21 +151,6 @@ def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.
     p = device.values() if p is None else p
     K = stage(device, p).input_stiffness + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
     return ca.DM(ca.inv(K) * piezo_stack.blocked_force(1.0, p.piezo)).full()
-
-
-def output_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
-    """Output displacement per stack voltage at rest, (3, 3) [m/V, m/V, rad/V]."""
-    return ca.DM(stage(device, p).complete_J).full() @ input_per_voltage(device, p)
-
-
-def workspace(device: RrrStage, p: SimpleNamespace | None = None) -> dict[str, list[float]]:
-    """Half ranges of (dx, dy, dalpha) [m, m, rad] over stack voltages from 0 to their limit.
-
-    'alone': the other two stay at the centre; 'together': over the whole workspace.
-    """
-    M, u = ca.DM(output_per_voltage(device, p)), device.piezo.voltage_limit.si
-    ranges: dict[str, Any] = {"alone": rrr_stage.reach_alone(M, u), "together": rrr_stage.reach_together(M, u)}
-    return {name: [float(value) for value in values] for name, values in ranges.items()}
 
 
 def matrices(device: RrrStage) -> dict[str, np.ndarray]:

@@ -125,6 +125,10 @@ def findings(search: Search) -> tuple[Finding, ...]:
                     ),
                     unknown.unit,
                 )
+        for p in () if cause.effect == PARAMETER else cause.law.params:
+            if p.expected:
+                middle = sum(p.expected) / 2
+                parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
         rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
         gain = _gain(search, k)
         source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source

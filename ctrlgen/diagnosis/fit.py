@@ -51,14 +51,10 @@ class Fit:
 
     def values(self, cause: int) -> dict[str, float]:
         """The parameters of one cause [SI]."""
-        found = {}
+        found = dict(self.structure.starts[cause])
         for unknown, value in zip(self.structure.unknowns, self.theta, strict=True):
             if unknown.cause == cause:
-                found[
-                    "value"
-                    if unknown.path[-1] != "." and "effect[" not in unknown.path
-                    else unknown.path.rpartition(".")[2]
-                ] = float(value)
+                found[unknown.name] = float(value)
         return found
 
 

@@ -1,4 +1,7 @@
-"""Step 5: what could have been left out. Every effect of the library at every place where it can act, and every number of the device that could be off."""
+"""Step 5: what could have been left out.
+
+Every effect of the library at every place where it can act, and every number of the device that could be off.
+"""
 
 from __future__ import annotations
 
@@ -60,14 +63,16 @@ def _of_law(
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
         places = [where for where in places if where.channel in seen]
-    for where in places:
-        if law.pairs:
-            for other in channels(links, law.place):
-                if other.channel != where.channel:
+    if law.pairs:
+        for k, where in enumerate(places):
+            for j, other in enumerate(channels(links, law.place)):
+                if law.fits(where.beside(other)) and not (law.mutual and j < k):
                     yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, other.channel)
-        else:
-            yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel)
-    if len(places) > 1 and not law.pairs and law.place not in (Place.POSE, Place.SENSOR):
+        return
+    fitting = [where for where in places if law.fits(where)]
+    for where in fitting:
+        yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel)
+    if len(fitting) > 1 and law.place not in (Place.POSE, Place.SENSOR):
         yield Hypothesis(law.kind, f"{domain}:all", "all")
 
 

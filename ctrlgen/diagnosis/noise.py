@@ -7,6 +7,7 @@ the part of the readings above the drive's band. Its colour is an autoregressive
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import detrend, lfilter
@@ -138,7 +139,7 @@ def _dwells(record: Record, i: int) -> list[np.ndarray]:
     moved = np.any(np.diff(record.drive, axis=0) != 0, axis=1)
     edges = np.flatnonzero(np.concatenate([[True], moved, [True]]))
     found = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         start = a + int(SETTLING_SHARE * (b - a))
         part = _valid(record.observed[start:b, i], record.valid[start:b, i])
         if len(part) >= SHORTEST_REST:

@@ -18,8 +18,9 @@ from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
-MOST_CAUSES = 6
-TRIALS = 6  # suspects fitted a round
+MOST_CAUSES = 12
+TRIALS = 6  # suspects fitted a round, and as many sets of each size
+SMALL = 5000  # samples up to which fits are cheap: four times as many are tried
 TRIAL_STEPS = 15
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
@@ -62,7 +63,7 @@ class Searcher:
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
         self.fitter, self.screen, self.step = fitter, screen, step
         self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
-        self.known: dict[tuple, Trial] = {}
+        self.trials = TRIALS * (4 if self.n_fit <= SMALL else 1)
 
     def trial(
         self,
@@ -87,6 +88,7 @@ class Searcher:
             if len(current.fit.structure.causes) >= MOST_CAUSES:
                 break
             trials = self._try(current, self._conspicuous(screened))
+            trials = tuple(sorted((*trials, *self._together(current, screened, trials)), key=lambda t: t.total))
             rounds.append(Round(screened, trials, current))
             better = [t for t in trials if self._justified(current, t)]
             if not better:
@@ -126,11 +128,45 @@ class Searcher:
             trials.append(self.trial(_warm(current.fit, s.hypothesis, s.start), s.hypothesis))
         return tuple(sorted(trials, key=lambda t: t.total))
 
+    def _together(self, current: Trial, screened: Screened, singles: tuple[Trial, ...]) -> list[Trial]:
+        """Sets of suspects that promise more than any single one gave; each size must promise more than the smaller."""
+        best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
+        excess, trials = current.fit.objective - self.n_fit, []
+        for size in (2, 3, 4):
+            tried, used = 0, {}
+            enough = best + max(self._need(screened), 0.05 * (excess - best))
+            for promised, suspects in screened.together:
+                if len(suspects) != size or promised < enough or tried >= self.trials:
+                    continue
+                if max(used.get(s.hypothesis, 0) for s in suspects) >= max(2, self.trials // 2):
+                    continue
+                structure = _cooled(current.fit)
+                for s in suspects:
+                    used[s.hypothesis] = used.get(s.hypothesis, 0) + 1
+                    structure = structure.with_cause(s.hypothesis, s.start)
+                self.step("trying " + ", ".join(f"{s.hypothesis.effect} at {s.hypothesis.location}" for s in suspects))
+                trials.append(self.trial(structure, suspects[-1].hypothesis))
+                tried += 1
+            best = max([best, *(current.fit.objective - t.fit.objective for t in trials if self._meant(t))])
+        return trials
+
+    @staticmethod
+    def _meant(trial: Trial) -> bool:
+        """Whether every cause has an amplitude inside its bounds."""
+        structure = trial.fit.structure
+        for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
+            if not unknown.amplitude:
+                continue
+            span = 1e-6 * (unknown.high - unknown.low)
+            if value >= unknown.high - span or (value <= unknown.low + span and unknown.low != unknown.nominal):
+                return False
+        return True
+
     def _justified(self, before: Trial, after: Trial) -> bool:
         gained = before.fit.objective - after.fit.objective
         added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
         needed = max(MATERIAL**2 * self.n_fit, 12.0 + added * np.log(max(self.n_fit, 2)))
-        return gained > needed and before.held - after.held > 2.0
+        return gained > needed and before.held - after.held > 2.0 and self._meant(after)
 
     def _swap(self, current: Trial) -> Trial:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""

@@ -36,6 +36,11 @@ class Unknown:
     cause: int | None = None
     amplitude: bool = False
 
+    @property
+    def name(self) -> str:
+        """Of the parameter in its effect; "value" for a number of the device."""
+        return self.path.rpartition(".")[2] if self.path.startswith("effect[") else "value"
+
 
 @dataclass(frozen=True, eq=False)
 class Structure:
@@ -57,7 +62,8 @@ class Structure:
     def place(self, cause: Hypothesis) -> Where:
         """The channel at which a cause acts; the first one where it acts at all of them."""
         where = channels(self.device.links(self.device.values()), cause.law.place)
-        return where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
+        here = where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
+        return here if cause.of is None else here.beside(next(w for w in where if w.channel == cause.of))
 
     @cached_property
     def described(self) -> Device:
@@ -69,7 +75,10 @@ class Structure:
                 continue
             where = self.place(cause)
             law = cause.law
-            numbers_ = {p.name: written(_inside(start[p.name], p, where), where.unit_of(p)) for p in law.params}
+            numbers_ = {
+                p.name: written(_inside(_settled(start[p.name], p, where), p, where), where.unit_of(p))
+                for p in law.params
+            }
             added.append(law(cause.at, numbers_, cause.of))
         return changed(self.device, values).model_copy(update={"effect": (*self.device.effect, *added)})
 
@@ -105,6 +114,8 @@ class Structure:
                 continue
             where, law = self.place(cause), cause.law
             for p in law.params:
+                if p.expected:  # it is so or it is not: nothing to fit
+                    continue
                 low, high = (where.si(b, p) for b in p.bounds)
                 off = 0.0 if p.off is None else where.si(p.off, p)
                 size = (
@@ -136,8 +147,7 @@ class Structure:
             if unknown.cause is None:
                 values.append(unknown.nominal)
             else:
-                name = unknown.path.rpartition(".")[2] if self.causes[unknown.cause].effect != PARAMETER else "value"
-                values.append(min(max(self.starts[unknown.cause][name], unknown.low), unknown.high))
+                values.append(min(max(self.starts[unknown.cause][unknown.name], unknown.low), unknown.high))
         return np.array(values)
 
     def responses(self, recording: Recording, cache: dict) -> dict[tuple[float, bool], Response]:
@@ -151,6 +161,11 @@ class Structure:
                 cache[key] = Response(self.described, free, recording.channels, h, linear)
             found[h, linear] = cache[key]
         return found
+
+
+def _settled(value: float, p: Param, where: Where) -> float:
+    """The middle of the range that an amplitude is expected in, where it is; else the value."""
+    return value if p.expected is None else where.si(sum(p.expected) / 2, p)
 
 
 def _inside(value: float, p: Param, where: Where) -> float:

@@ -9,6 +9,7 @@ class AsymmetricHysteresis(Effect):
     """F = -k z w', w(d) = d + a (sqrt(d^2 + L^2) - L), w' = 1 + a d/sqrt(d^2 + L^2), dz = dw (1 - sgn(dw) z/r).
 
     Dahl's law in the warped displacement w, L the typical travel. As F dd = -k z dw it dissipates as Dahl's does.
+    Holds for reversals farther apart than a sample.
     """
 
     place = Place.FORCE

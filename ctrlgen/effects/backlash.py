@@ -6,9 +6,10 @@ from ctrlgen.effect import Effect, Param, Place, State
 
 
 class Backlash(Effect):
-    """w = max(min(w, d + b/2), d - b/2), Delta d = w - d: what is carried stands still until the gap b is crossed.
+    """w = max(min(w, d + b/2), d - b/2), Delta d = 0.999 (w - d): what is carried stands still until b is crossed.
 
-    Holds where friction keeps the carried side at rest inside the gap.
+    A thousandth of the motion comes through inside the gap, or no inverse could cross it. Holds where friction
+    keeps the carried side at rest there.
     """
 
     place = Place.DISPLACEMENT
@@ -17,7 +18,7 @@ class Backlash(Effect):
     states = (State("w", "travel", 1.0, stepped=True),)
 
     def term(self, s, p):
-        return s.w - s.value
+        return 0.999 * (s.w - s.value)
 
     def update(self, s, p):
         return {"w": ca.fmax(ca.fmin(s.w, s.value + p.gap / 2), s.value - p.gap / 2)}

@@ -4,7 +4,7 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class LinkCompliance(Effect):
-    """Delta theta = c delta: the joint's moment, in proportion to the motion `of`, over its stiffness. Elastic, first order."""
+    """Delta theta = c delta: the joint's moment, in proportion to the motion `of`, over its stiffness. Holds to first order."""
 
     place = Place.POSE
     pairs = True

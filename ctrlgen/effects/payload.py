@@ -6,9 +6,9 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class Payload(Effect):
-    """Delta theta = g sin(theta + lambda), g = m g_0 h C: weight times height of its centre times the compliance.
+    """Delta theta = g (sin(theta + lambda) - sin(lambda)), g = m g_0 h C: weight times height of its centre times the compliance.
 
-    lambda = 0 stands upright over the axis, 90 deg hangs out sideways. Holds for g below 0.3.
+    lambda = 0 stands upright over the axis, 90 deg hangs out sideways; home is loaded. Holds for g below 0.3.
     """
 
     place = Place.POSE
@@ -20,4 +20,4 @@ class Payload(Effect):
     )
 
     def term(self, s, p):
-        return p.share * ca.sin(s.value + p.lean)
+        return p.share * (ca.sin(s.value + p.lean) - ca.sin(p.lean))

@@ -8,7 +8,7 @@ from ctrlgen.effect import Effect, Param, Place
 class Quantisation(Effect):
     """Delta y = s (q floor(y/q + 1/2) - y), s = 1 for true rounding to steps q.
 
-    Linear in s; in q and y it jumps, so its slope says nothing of the jumps: search q, do not descend.
+    Holds for rounding to the nearest step. Linear in s; in q and y it jumps: search q, do not descend.
     """
 
     place = Place.SENSOR

@@ -10,7 +10,7 @@ class Reversed(Effect):
     needs = frozenset({"actuator", "bipolar"})
     domain = "mechanism"
     source = "definition"
-    params = (Param("share", "1", (0.0, 1.2), "1 where the sign is wrong", off=0.0),)
+    params = (Param("share", "1", (0.0, 1.2), "1 where the sign is wrong", off=0.0, expected=(0.9, 1.1)),)
 
     def term(self, s, p):
         return -2 * p.share * s.value

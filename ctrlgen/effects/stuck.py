@@ -4,7 +4,7 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class Stuck(Effect):
-    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Between 0 and 1 a loose contact, on average."""
+    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Holds also for a loose contact, s the time it is off."""
 
     place = Place.SENSOR
     source = "R. Isermann, Fault-Diagnosis Systems (2006): sensor faults"

@@ -13,7 +13,7 @@ class Swapped(Effect):
     partner_unit = "channel"
     domain = "mechanism"
     source = "definition"
-    params = (Param("share", "1", (0.0, 1.2), "1 where the two are exchanged", off=0.0),)
+    params = (Param("share", "1", (0.0, 1.2), "1 where the two are exchanged", off=0.0, expected=(0.9, 1.1)),)
 
     def term(self, s, p):
         return p.share * (s.all[s.partner] - s.value)

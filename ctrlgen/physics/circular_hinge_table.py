@@ -23,7 +23,7 @@ RECTANGLE = 6 / 5  # shear factor of a rectangular section
 LARGEST, SMALLEST = 0.8, 0.05  # t/R of the comparison in S3
 
 Range = tuple[float, float]
-Outside = Literal["refuse", "warn"]
+Outside = Literal["refuse", "warn", "accept"]
 
 
 class HingeRangeError(ValueError):
@@ -230,22 +230,37 @@ def choose(compliance: str, ratio: float, equation: str = "auto", outside: Outsi
     return found
 
 
+def pedigree(name: str, ratio: float, equation: str = "auto", outside: Outside = "refuse") -> tuple[Equation, str]:
+    """The equation chosen for compliance `name` at this t/R, and what to know of it: '' where S3 Table 3 recommends it.
+
+    Raises as `choose` does.
+    """
+    found = choose(name, ratio, equation, outside)
+    if found.holds(ratio) and (equation != "auto" or found.errors is not None):
+        return found, ""
+    why = "the nearest; S3 Table 3 recommends no printed equation here" if equation == "auto" else "outside its range"
+    return found, f"{name} at t/R = {ratio:.4g} by {found.number} ({found.authors}), {why}: {found.range_text}"
+
+
 def compliance(name: str, geometry: Geometry, equation: str = "auto", outside: Outside = "refuse") -> Compliance:
     """One compliance of the hinge, `name` of PLANAR or LOCKED, with its range and source.
 
-    A named equation outside its range raises, or warns when `outside` is "warn"; "auto" always warns there.
+    A named equation outside its range raises, warns when `outside` is "warn", and is silent when that is "accept";
+    "auto" where the table recommends nothing warns unless that is accepted.
     """
-    found = choose(name, geometry.ratio, equation, outside)
-    listed = found.holds(geometry.ratio) and (equation != "auto" or found.errors is not None)
-    note = ""
-    if not listed:
-        note = (
-            f"{name} at t/R = {geometry.ratio:.4g} by {found.number} ({found.authors}), "
-            + ("the nearest; S3 Table 3 recommends no printed equation here" if equation == "auto" else "outside its range")
-            + f": {found.range_text}"
-        )  # fmt: skip
+    found, note = pedigree(name, geometry.ratio, equation, outside)
+    if note and outside != "accept":
         warnings.warn(note, HingeRangeWarning, stacklevel=2)
-    return Compliance(found.law(geometry), found, listed, note)
+    return Compliance(found.law(geometry), found, not note, note)
+
+
+def end_compliance(x: Scalar, y: Scalar, alpha: Scalar, R: Scalar) -> Matrix:
+    """Compliance of a hinge about its free end (R, 0), (delta_x, delta_y, alpha_z) per (F_x, F_y, M_z), shape (3, 3).
+
+    A notch of length 2R turns about its middle: a force across the end turns it by R alpha, a moment moves
+    the end by as much. Positive definite only where y > R^2 alpha. Source: S3 eq. (B.9), (B.13), (B.21).
+    """
+    return ca.vertcat(ca.horzcat(x, 0, 0), ca.horzcat(0, y, R * alpha), ca.horzcat(0, R * alpha, alpha))
 
 
 def planar(geometry: Geometry, equation: str | Mapping[str, str] = "auto", outside: Outside = "refuse") -> Matrix:
@@ -256,14 +271,20 @@ def planar(geometry: Geometry, equation: str | Mapping[str, str] = "auto", outsi
     """
     asked = {key: equation if isinstance(equation, str) else equation.get(key, "auto") for key in PLANAR}
     found = {key: compliance(key, geometry, asked[key], outside) for key in PLANAR}
+    faults = [
+        f"{key} by {one.source} is {float(one.value):.4g} {UNITS[key]} at t/R = {geometry.ratio:.4g}, which is no compliance"
+        for key, one in found.items()
+        if not isinstance(one.value, ca.SX) and not 0 < float(one.value) < float("inf")
+    ]
     alpha, y, x = (found[key].value for key in PLANAR)
-    couple = geometry.R * alpha
-    locked: Any = y - geometry.R * couple
+    turned: Any = geometry.R**2 * alpha
     # C.6 is R^2 C.5 but for shear; rounding must not decide whether a compliance is positive.
-    if not isinstance(locked, ca.SX) and float(locked) <= 1e-12 * float(y):
-        raise ValueError(
-            f"delta_y/F_y by {found[DELTA_Y].source} is below R^2 alpha_z/M_z by {found[ALPHA].source} at "
-            f"t/R = {geometry.ratio:.4g}: the hinge would be indefinite (push it and it yields energy); "
-            f'use equation = "auto" or include shear'
+    if not faults and not isinstance(y - turned, ca.SX) and float(y - turned) <= 1e-12 * float(y):
+        faults.append(
+            f"the compliance is not positive definite: delta_y/F_y by {found[DELTA_Y].source} is {float(y):.4g} m/N, at "
+            f"least {float(turned):.4g} m/N follows from alpha_z/M_z by {found[ALPHA].source} at "
+            f't/R = {geometry.ratio:.4g}; include shear (shear_factor), use equation = "auto", or take both from one source'
         )
-    return ca.vertcat(ca.horzcat(x, 0, 0), ca.horzcat(0, y, couple), ca.horzcat(0, couple, alpha))
+    if faults:
+        raise ValueError("; ".join(faults))
+    return end_compliance(x, y, alpha, geometry.R)

@@ -1,7 +1,7 @@
 """The planar 3-RRR stage: compliances at output and inputs from any three hinge compliances.
 
 Source: S3 appendix B. Displacements (dx, dy, dalpha) [m, m, rad], loads (F_x, F_y, M_z) [N, N, N m]. A hinge is a
-(3, 3) compliance about its free end, x along the hinge (`rrr_hinge.hinge_compliance`). Each hinge of Link 1
+(3, 3) compliance about its free end, x along the hinge (`circular_hinge_table.end_compliance`). Each hinge of Link 1
 is carried to the platform by the equilibrium of the links between, which gives (B.9)-(B.48) entry by entry.
 
 Misprints: B.8 row 3 is Delta-alpha; B.12 is with respect to M_o'z; B.42 has hinge 3; B.36-B.38 and B.46-B.48 are at o'; B.62
@@ -132,18 +132,3 @@ def kinetostatics(hinges: Sequence[Matrix], g: Any) -> Kinetostatics:
         C_inFin=ca.mtimes(C_oFin.T, F_eqv),  # (B.83)
         clamped=ca.mtimes([load.T, hinges[0], load]) - ca.mtimes(c_o.T, equivalent),
     )
-
-
-def reach_alone(M: Matrix, u: Scalar) -> list[Scalar]:
-    """Half the range of each output alone, the others at their centre, for y = M x with x in [0, u]^3, [SI of y].
-
-    x - u/2 = M^-1 e_k y stays within u/2 where |y| <= (u/2)/max|M^-1 e_k|.
-    """
-    N = ca.fabs(ca.inv(M))
-    return [u / 2 / ca.mmax(N[:, k]) for k in range(3)]
-
-
-def reach_together(M: Matrix, u: Scalar) -> list[Scalar]:
-    """Half the range of each output over all of [0, u]^3: the edges of the box around the workspace, [SI of y]."""
-    S = ca.fabs(M)
-    return [u / 2 * ca.sum2(S[k, :]) for k in range(3)]

@@ -17,12 +17,6 @@ Matrix = ca.SX | ca.DM
 Scalar = float | ca.SX
 
 
-def rotation_x(angle: Scalar) -> Matrix:
-    """[X(angle)], rotation about x, shape (3, 3). Source: S1 section 2.2."""
-    c, s = ca.cos(angle), ca.sin(angle)
-    return ca.vertcat(ca.horzcat(1, 0, 0), ca.horzcat(0, c, -s), ca.horzcat(0, s, c))
-
-
 def rotation_z(angle: Scalar) -> Matrix:
     """[Z(angle)], rotation about z, shape (3, 3). Source: S1 section 2.2."""
     c, s = ca.cos(angle), ca.sin(angle)

@@ -13,13 +13,18 @@ from ctrlgen.figures import STYLE, draw_path, draw_signal, draw_stage_force, svg
 from ctrlgen.files import write_text
 from ctrlgen.model import build_model
 from ctrlgen.report import render
-from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s3
+from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
 from ctrlgen.reproduce.row import Row
 from ctrlgen.reproduce.s0_data import SCENARIOS
 from ctrlgen.scenario import load_scenario
 from ctrlgen.solution import solve
 
-SOURCES = {"S0": s0.rows, "S1": s1.rows, "S2": s2.rows, "S3": s3.rows}
+
+def _s3_rows() -> list[Row]:
+    return [*s3.rows(), *s3_hinges.rows()]
+
+
+SOURCES = {"S0": s0.rows, "S1": s1.rows, "S2": s2.rows, "S3": _s3_rows}
 TITLES = {
     "S0": "meso-scale hexapod: kinematics and calibration", "S1": "MEMS hexapod: stiffness model and control",
     "S2": "hinge equations and the measuring chain", "S3": "3-RRR stage: kinetostatic model",
@@ -49,7 +54,7 @@ def _s3_figures() -> dict[str, str]:
     }
 
 
-FIGURES = {"S0": s0_figures.figures, "S1": _s1_figures, "S3": _s3_figures}
+FIGURES = {"S0": s0_figures.figures, "S1": _s1_figures, "S2": s2_figures.figures, "S3": _s3_figures}
 
 
 def reproduce(sources: list[str]) -> list[Row]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from enum import Enum
 
@@ -54,6 +54,10 @@ class Row:
             return Status.NOT_COMPUTABLE
         close = math.isfinite(self.ours) and abs(self.ours - self.value) <= self.allowed * (1 + 1e-9)
         return Status.REPRODUCED if close else Status.DIFFERS
+
+    def settled(self) -> Row:
+        """This row without its reason where the print is reproduced after all."""
+        return replace(self, reason="") if self.status is Status.REPRODUCED else self
 
 
 def half_unit(printed: str) -> float:

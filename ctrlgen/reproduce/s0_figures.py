@@ -24,11 +24,15 @@ def figures(recordings: Recordings | None = None) -> dict[str, str]:
     alone = parasitic(data.commanded, data.measured)
     with plt.rc_context(STYLE):
         return {
-            "s0_fig6": svg(draw_norms(model, calibrated)),
-            "s0_fig7": svg(draw_distribution(model, calibrated, "rotation")),
-            "s0_fig8": svg(draw_distribution(model, calibrated, "translation")),
-            "s0_fig9": svg(draw_single([part for part in alone if part.channel in CHANNELS[:3]])),
-            "s0_fig10": svg(draw_single([part for part in alone if part.channel in CHANNELS[3:]])),
+            "Fig. 6, norm of the errors of every pose": svg(draw_norms(model, calibrated)),
+            "Fig. 7, distribution of the rotation errors": svg(draw_distribution(model, calibrated, "rotation")),
+            "Fig. 8, distribution of the translation errors": svg(draw_distribution(model, calibrated, "translation")),
+            "Fig. 9, poses commanded in one rotation": svg(
+                draw_single([part for part in alone if part.channel in CHANNELS[:3]])
+            ),
+            "Fig. 10, poses commanded in one translation": svg(
+                draw_single([part for part in alone if part.channel in CHANNELS[3:]])
+            ),
         }
 
 

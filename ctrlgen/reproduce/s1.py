@@ -7,9 +7,10 @@ from typing import cast
 
 import numpy as np
 
+from ctrlgen.controller import Controller
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mems_hexapod import MemsHexapod, matrices
-from ctrlgen.model import build_model
+from ctrlgen.model import Model, build_model
 from ctrlgen.physics import hexapod, xy_stage
 from ctrlgen.reproduce.row import Row, half_unit
 from ctrlgen.workspace import Workspace
@@ -30,13 +31,14 @@ TABLE_3 = (
     ("delta_z", "3.0e1", "3.07e1", "2.39"), ("delta_x", "-1.0e1", "-1.04e1", "4.12"), ("delta_y", "-1.0e1", "-1.04e1", "4.25"),
     ("theta_x", "-4.0e-3", "-4.10e-3", "2.34"), ("theta_y", "-4.0e-3", "-4.20e-3", "4.69"), ("theta_z", "-4.00e-3", "-4.19e-3", "4.56"),
 )  # fmt: skip
-NO_PLANT = "compares with the paper's own finite elements; the independent plant answers this, not the program"
+SIGNS_19 = ("-1", "-1", "-1", "1", "1", "1")  # F <= 0 or F >= 0, in the order of the actuators
+NO_PLANT = "compares with the paper's own finite elements; an independent plant answers this: python -m plants"
 
 
 def rows() -> list[Row]:
     """Every number of S1 that is printed, with what the program makes of it."""
     device = cast(MemsHexapod, load_device(DEVICE))
-    return [*_matrices(device), *_geometry(device), *_force(device), *_table_3(device), *_circle()]
+    return [*_matrices(device), *_geometry(device), *_force(device), *_signs(device), *_table_3(device), *_circle()]
 
 
 def _in_micrometres(matrix: np.ndarray, row: int, column: int) -> float:
@@ -88,21 +90,40 @@ def _force(device: MemsHexapod) -> list[Row]:
     return result + [Row("S1", f"section 6.2, {what}", printed, "%", None, NO_PLANT) for what, printed in errors]
 
 
+def _poses(model: Model) -> list[np.ndarray]:
+    """The six poses of Table 3, (6,) [rad, m]."""
+    channels, poses = model.signals["pose"].channels, []
+    for channel, analytic, *_ in TABLE_3:
+        pose = np.zeros(6)
+        pose[5] = 30e-6
+        pose[channels.index(channel)] = float(analytic) * (1e-6 if channel.startswith("delta") else 1.0)
+        poses.append(pose)
+    return poses
+
+
+def _signs(device: MemsHexapod) -> list[Row]:
+    """The signs of the six forces of eq. (19): those of the forces that hold the poses of Table 3, in the paper's axes."""
+    model = build_model(device)
+    displacement = Controller(model, "pose", None).static.displacement
+    d = [displacement(model.rest, 0, pose).full().ravel() for pose in _poses(model)]
+    p = device.values()
+    forces = device.in_paper_axes(np.array([[float(xy_stage.force(x, p.stage, p.actuator)) for x in row] for row in d]))
+    signs = (np.sign(forces.min(axis=0)) + np.sign(forces.max(axis=0))) / 2  # 0 where a force changes its sign
+    printed = zip(device.axes, SIGNS_19, signs, strict=True)
+    return [Row("S1", f"eq. (19), sign of the force on {axis}", text, "1", float(sign)) for axis, text, sign in printed]
+
+
 def _table_3(device: MemsHexapod) -> list[Row]:
     """The printed errors from the printed values, as far as their digits tell; and whether the poses can be held."""
     workspace = Workspace(build_model(device))
-    channels = workspace.model.signals["pose"].channels
     result = []
-    for channel, analytic, element, percent in TABLE_3:
+    for (channel, analytic, element, percent), pose in zip(TABLE_3, _poses(workspace.model), strict=True):
         ours = 100 * abs((float(analytic) - float(element)) / float(element))
         spread = 100 * abs(float(analytic)) * half_unit(element) / float(element) ** 2
         reason = "from values printed with three digits"
         result.append(
             Row("S1", f"Table 3, error of {channel}", percent, "%", ours, reason, half_unit(percent) + spread)
         )
-        pose = np.zeros(6)
-        pose[5] = 30e-6
-        pose[channels.index(channel)] = float(analytic) * (1e-6 if channel.startswith("delta") else 1.0)
         held = float(workspace.holds(pose))
         result.append(Row("S1", f"Table 3, {channel} at delta_z = 30 um can be held", "1", "yes = 1", held))
     return result

@@ -73,8 +73,7 @@ def _table_1() -> Iterator[Row]:
         yield Row("S3", f"Table 1, {name}", text, "mm", float(from_si(length, "mm")), reason)
     device = printed_device(1)
     for k, text in RATIOS.items():
-        hinge = getattr(device, f"hinge{k}")
-        yield Row("S3", f"Table 1, t/R of hinge {k}", text, "1", hinge.thickness.si / hinge.radius.si)
+        yield Row("S3", f"Table 1, t/R of hinge {k}", text, "1", device.hinges[f"hinge{k}"].ratio)
 
 
 def _text_on_coupling() -> Iterator[Row]:

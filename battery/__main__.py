@@ -1,0 +1,55 @@
+"""`python -m battery make|score`: draw concealed cases, run the diagnosis over them, print the table."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from battery import cases, score
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+    )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit 0 when the table was made, whatever it says; --strict: 1 where a goal is missed."""
+    parser = argparse.ArgumentParser(prog="python -m battery", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    make = commands.add_parser("make", help="draw cases into a folder, answers sealed")
+    make.add_argument("--out", type=Path, required=True)
+    make.add_argument("--seed", type=int, default=1)
+    make.add_argument("--size", choices=sorted(cases.COUNTS), default="small")
+    run = commands.add_parser("score", help="run the diagnosis over a folder and print the table")
+    run.add_argument("folder", type=Path)
+    run.add_argument("--run", default="ctrlgen diagnose", help="the command under test")
+    run.add_argument("--timeout", type=float, default=600.0, help="seconds a case may take")
+    run.add_argument("--opponents", type=int, default=0, metavar="N", help="opponents on N cases of each class")
+    run.add_argument("--again", action="store_true", help="run cases that already have a diagnosis again")
+    run.add_argument("--strict", action="store_true", help="exit 1 where a goal is missed")
+    for each in (make, run):
+        each.add_argument("--jobs", type=int, default=2)
+    a = parser.parse_args(arguments)
+    console = Console()
+    with _progress(console) as bar:
+        task = bar.add_task("drawing" if a.command == "make" else "diagnosing", total=None)
+
+        def shown(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        if a.command == "make":
+            cases.make(a.out, a.seed, a.size, a.jobs, shown)
+            return 0
+        result = score.run(a.folder, shlex.split(a.run), a.jobs, a.timeout, a.again, a.opponents, shown)
+    console.print(result.markdown, markup=False, highlight=False)
+    return int(a.strict and not result.met)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

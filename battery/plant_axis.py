@@ -1,0 +1,169 @@
+"""An independent single-axis flexure stage: m q'' + c q' + k q = k_f u + whatever the laws add.
+
+Integration: the linear part is discretised exactly (matrix exponential) at an eighth of the sample time; the laws' forces
+are taken at the predicted middle of that step (exponential midpoint rule, second order). Laws live in `battery.laws_*`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+Array = np.ndarray
+SUBSTEPS = 8
+
+
+@dataclass(frozen=True)
+class Loop:
+    """u = clip(kp kv (r - q) - kv q' + ki int(r - q) dt), `position_gain` kp [1/s], `velocity_gain` kv [V s/m], ki [V/(m s)]."""
+
+    position_gain: float
+    velocity_gain: float
+    integral_gain: float = 0.0
+
+
+@dataclass(frozen=True)
+class Axis:
+    """`mass` [kg], `damping` [N s/m], `stiffness` [N/m], `force_constant` [N/V], `stroke` [m], `drive_limit` [V]."""
+
+    mass: float
+    damping: float
+    stiffness: float
+    force_constant: float
+    stroke: float
+    drive_limit: float
+    loop: Loop | None = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a law may know when it is drawn or built: the axis and typical sizes of its motion, SI.
+
+    `travel`, `speed`: rms of motion, `peak`: largest motion, `drive_peak`: largest amplifier drive, `span`: end of the clock, `noise`: sd.
+    """
+
+    axis: Axis
+    travel: float = 2e-5
+    speed: float = 5e-3
+    peak: float = 6e-5
+    drive_peak: float = 2.0
+    span: float = 20.0
+    noise: float = 5e-9
+    sample_time: float = 1e-3
+
+    @property
+    def step(self) -> float:
+        """Integration step [s]."""
+        return self.sample_time / SUBSTEPS
+
+
+@dataclass(frozen=True)
+class Planted:
+    """One law in a plant: its name, its amplitude (0 is absent) and its shape values, SI."""
+
+    name: str
+    amplitude: float
+    shape: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """Where a law acts, in the order in which the signal passes them; each is None where it does not.
+
+    `drive(t, u)` -> u [V]; `force(t, q, v)` -> N, added; `carried(t, q, u)` -> what the sensor's target does [m], arrays on the fine grid;
+    `sensed(t, y, ambient)` -> y, the same; `digital(t, y)` -> y at the samples, after noise.
+    """
+
+    drive: Callable[[float, float], float] | None = None
+    force: Callable[[float, float, float], float] | None = None
+    carried: Callable[[Array, Array, Array], Array] | None = None
+    sensed: Callable[[Array, Array, Array], Array] | None = None
+    digital: Callable[[Array, Array], Array] | None = None
+
+
+def exact_step(axis: Axis, h: float) -> tuple[float, ...]:
+    """(a11, a12, a21, a22, b1, b2) of (q, v)+ = A (q, v) + b F, force F held over `h`: expm of the companion matrix."""
+    M = np.zeros((3, 3))
+    M[0, 1] = 1.0
+    M[1] = [-axis.stiffness / axis.mass, -axis.damping / axis.mass, 1 / axis.mass]
+    E = expm(M * h)
+    return E[0, 0], E[0, 1], E[1, 0], E[1, 1], E[0, 2], E[1, 2]
+
+
+def fine_drive(drive: Array, linear: bool) -> Array:
+    """The command in the middle of every integration step, (n * SUBSTEPS,): held, or linear from sample to sample."""
+    if not linear:
+        return np.repeat(drive, SUBSTEPS)
+    middle = (np.arange(SUBSTEPS) + 0.5) / SUBSTEPS
+    following = np.append(drive[1:], drive[-1])
+    return (drive[:, None] + (following - drive)[:, None] * middle).ravel()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """On the fine grid: `time` [s, common clock], `position` [m], `speed` [m/s], `drive` [V] after the drive laws."""
+
+    time: Array
+    position: Array
+    speed: Array
+    drive: Array
+
+
+def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0.0, scene: Scene | None = None,
+         linear: bool = False) -> Motion:  # fmt: skip
+    """Motion from rest under `drive` [V], or under a reference [m] where the axis has a loop."""
+    h = (scene or Scene(axis)).step
+    a11, a12, a21, a22, b1, b2 = exact_step(axis, h)
+    m, c, k, k_f, limit, loop = (
+        axis.mass, axis.damping, axis.stiffness, axis.force_constant, axis.drive_limit, axis.loop,
+    )  # fmt: skip
+    on_drive = [x.drive for x in hooks if x.drive]
+    on_force = [x.force for x in hooks if x.force]
+    q = v = summed = 0.0
+    t, half, F = start, h / 2, 0.0
+    qs, vs, us = [], [], []
+    for u in fine_drive(np.asarray(drive, dtype=float), linear).tolist():
+        if loop is not None:
+            error = u - q
+            summed += error * h
+            u = loop.velocity_gain * (loop.position_gain * error - v) + loop.integral_gain * summed
+        u = min(max(u, -limit), limit)
+        for law in on_drive:
+            u = law(t + half, u)
+        qs.append(q), vs.append(v), us.append(u)
+        F = k_f * u
+        if on_force:
+            v_mid = v + half * (F - c * v - k * q) / m
+            q_mid = q + half * v
+            for law in on_force:
+                F += law(t + half, q_mid, v_mid)
+        q, v = a11 * q + a12 * v + b1 * F, a21 * q + a22 * v + b2 * F
+        t += h
+    return Motion(start + h * np.arange(len(qs)), np.array(qs), np.array(vs), np.array(us))
+
+
+def read(motion: Motion, hooks: Sequence[Hooks] = (), ambient: Array | None = None) -> Array:
+    """The sensor's signal at the samples, noise-free, (n,) [m]; `ambient` (n,) [K]."""
+    n = len(motion.time) // SUBSTEPS
+    T = np.full(n, 295.15) if ambient is None else ambient
+    T_fine = np.repeat(T, SUBSTEPS)
+    y = motion.position
+    for x in hooks:
+        if x.carried:
+            y = x.carried(motion.time, y, motion.drive)
+    for x in hooks:
+        if x.sensed:
+            y = x.sensed(motion.time, y, T_fine)
+    return y[::SUBSTEPS]
+
+
+def digitise(time: Array, y: Array, hooks: Sequence[Hooks]) -> Array:
+    """What the converter makes of the noisy signal `y` (n,) at `time` (n,)."""
+    for x in hooks:
+        if x.digital:
+            y = x.digital(time, y)
+    return y

@@ -1,0 +1,20 @@
+"""The base of every table of a device file."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import BaseModel, ConfigDict
+
+
+class Section(BaseModel):
+    """A table of a device file. Unknown keys are faults; nothing changes after loading.
+
+    `domain` is where a report places its numbers; `tolerance` is how far they may be off, relative, where the file
+    states no standard deviation: None where a number off its nominal would be a finding.
+    """
+
+    domain: ClassVar[str] = "mechanism"
+    tolerance: ClassVar[float | None] = None
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)

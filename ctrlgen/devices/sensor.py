@@ -1,0 +1,213 @@
+"""What reads a channel of the pose, as [[sensor]] tables of any device file, such as
+
+[[sensor]]
+kind = "displacement"
+at = "delta_x"
+model = "3316" # one of S2's sensors; any of its numbers may be given anew beside it
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from ctrlgen import measuring_chain as chain
+from ctrlgen.devices.section import Section
+from ctrlgen.errors import Fault
+from ctrlgen.units import from_si, quantity, same_dimension
+
+NUMBERS = (
+    "sensitivity", "gain", "bandwidth", "noise", "filtered_noise", "filter_cutoff", "offset_rate", "calibrated_at",
+    "low", "high",
+)  # fmt: skip
+Volt = quantity("V")
+Positive = quantity("V", positive=True)
+
+
+def _given(section: Section) -> dict[str, Any]:
+    """The quantities that are written, in SI."""
+    fields = ((key, getattr(section, key)) for key in type(section).model_fields)
+    return {key: value.si for key, value in fields if hasattr(value, "si")}
+
+
+class Converter(Section):
+    """The ADC behind a sensor; by default that of S2 A.3.1, dSPACE DS1104."""
+
+    low: Volt | None = None
+    high: Volt | None = None
+    bits: quantity("1", low=1, high=32, whole=True) | None = None
+    rate: quantity("Hz", positive=True) | None = None
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> Converter:
+        adc = self.adc()
+        if adc.low >= adc.high:
+            raise ValueError(f"low = {adc.low:g} V must be below high = {adc.high:g} V")
+        return self
+
+    def adc(self) -> chain.Adc:
+        """The converter of the measuring chain."""
+        given = _given(self)
+        return chain.Adc(**given | ({"bits": round(given["bits"])} if "bits" in given else {}))
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a sensor gives, in the channel's SI unit: ADC step, peak-to-peak noise, the same filtered, range of readings.
+
+    `filtered` is None where no filter is known, `low` and `high` where the range has no end.
+    """
+
+    name: str
+    step: float
+    noise: float
+    filtered: float | None
+    low: float | None
+    high: float | None
+
+
+class _Mounted(Section):
+    """`at` the channel of the pose. A rotation is read at the end of an `arm`: displacement = arm * angle."""
+
+    at: str
+    arm: quantity("mm", positive=True) | None = None
+    adc: Converter = Converter()
+
+    @property
+    def lever(self) -> float:
+        """Displacement at the sensor per unit of the channel [m/rad], 1 for a translation."""
+        return 1.0 if self.arm is None else self.arm.si
+
+
+class DisplacementSensor(_Mounted):
+    """Sensor with amplifier and digital filter. S2 Appendix A; `home` is where the platform at pose 0 stands in the range.
+
+    `home` counts from the end of the range at which the voltage begins; without it the middle.
+    """
+
+    kind: Literal["displacement"]
+    model: Literal["3316", "3317", "3338", "fibre"] | None = None
+    home: quantity("um", low=0.0) | None = None
+    sensitivity: quantity("um/V") | None = None
+    gain: quantity("1", positive=True) | None = None
+    bandwidth: quantity("Hz", positive=True) | None = None
+    noise: Positive | None = None
+    filtered_noise: Positive | None = None
+    filter_cutoff: quantity("Hz", positive=True) | None = None
+    offset_rate: quantity("V/delta_degC") | None = None
+    calibrated_at: quantity("degC") | None = None
+    low: Volt | None = None
+    high: Volt | None = None
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> DisplacementSensor:
+        given = self._numbers()
+        missing = [key for key in NUMBERS if key not in given]
+        if self.model is None and missing:
+            raise ValueError(f"{', '.join(missing)} missing; give them, or model = one of {', '.join(chain.SENSORS)}")
+        sensor, faults = self.sensor(), []
+        if sensor.sensitivity == 0:
+            faults.append("sensitivity must not be zero")
+        if sensor.low >= sensor.high:
+            faults.append(f"low = {sensor.low:g} V must be below high = {sensor.high:g} V")
+        elif sensor.low < sensor.adc.low or sensor.high > sensor.adc.high:
+            faults.append(
+                f"the linear range {sensor.low:g} ... {sensor.high:g} V leaves the ADC's {sensor.adc.low:g} ... {sensor.adc.high:g} V"
+            )
+        elif self.start() > sensor.usable_range():
+            faults.append(
+                f"home = {self.start() * 1e6:.4g} um lies beyond the range of {sensor.usable_range() * 1e6:.4g} um"
+            )
+        if given.keys() & {"noise", "filtered_noise", "filter_cutoff", "bandwidth"} or self.adc != Converter():
+            try:
+                sensor.noise_parts()
+            except ValueError as fault:
+                faults.append(str(fault))
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+    def _numbers(self) -> dict[str, float]:
+        return {key: value for key, value in _given(self).items() if key in NUMBERS}
+
+    def sensor(self) -> chain.Sensor:
+        """The sensor of the measuring chain with these numbers."""
+        given = self._numbers() | {"adc": self.adc.adc()}
+        if self.model is not None:
+            return replace(chain.SENSORS[self.model], **given)
+        return chain.Sensor(name="sensor", **given)
+
+    def start(self) -> float:
+        """Place of pose 0 in the range [m]."""
+        return self.sensor().usable_range() / 2 if self.home is None else self.home.si
+
+    def figures(self) -> Figures:
+        """What this sensor gives at its calibration temperature."""
+        sensor, lever, start = self.sensor(), self.lever, self.start()
+        return Figures(
+            sensor.name,
+            sensor.resolution_adc() / lever,
+            sensor.resolution_noise(filtered=False) / lever,
+            sensor.resolution_noise(filtered=True) / lever,
+            -start / lever,
+            (sensor.usable_range() - start) / lever,
+        )
+
+
+class InterferometerSensor(_Mounted):
+    """Michelson interferometer with a photodiode, S2 A.3.4; what is not given is S2's. Its reading is the fringe voltage."""
+
+    kind: Literal["interferometer"]
+    wavelength: quantity("nm", positive=True) | None = None
+    mean: Volt | None = None
+    amplitude: Positive | None = None
+    noise: quantity("V", low=0.0) | None = None
+
+    def interferometer(self) -> chain.Interferometer:
+        """The interferometer of the measuring chain with these numbers."""
+        keys = ("wavelength", "mean", "amplitude", "noise")
+        return chain.Interferometer(**{key: value for key, value in _given(self).items() if key in keys})
+
+    def figures(self) -> Figures:
+        """What the steepest part of a fringe gives: dV = 4 pi/lambda * amplitude * dd."""
+        laser = self.interferometer()
+        slope = 4 * pi * laser.amplitude / laser.wavelength * self.lever
+        noise = chain.PEAK_TO_PEAK * laser.noise / slope
+        return Figures("interferometer", self.adc.adc().step / slope, noise, None, None, None)
+
+
+AnySensor = Annotated[DisplacementSensor | InterferometerSensor, Field(discriminator="kind")]
+
+
+def mounting_faults(sensors: Sequence[_Mounted], channels: Sequence[str], units: Sequence[str]) -> list[Fault]:
+    """What is wrong with where the sensors stand: a channel that is none, an arm too few or too many."""
+    faults, unit = [], dict(zip(channels, units, strict=True))
+    for k, sensor in enumerate(sensors):
+        where = f"sensor[{k}]"
+        if sensor.at not in unit:
+            faults.append(Fault(f"{where}.at", f"{sensor.at!r} is not one of {', '.join(channels)}"))
+            continue
+        turns = same_dimension(unit[sensor.at], "rad")
+        if turns and sensor.arm is None:
+            faults.append(
+                Fault(f"{where}.arm", f'is missing: {sensor.at} is a rotation; write for example arm = "20 mm"')
+            )
+        if not turns and sensor.arm is not None:
+            faults.append(Fault(f"{where}.arm", f"has no meaning: {sensor.at} is a translation; leave it out"))
+    return faults
+
+
+def describe(sensor: DisplacementSensor | InterferometerSensor, unit: str) -> str:
+    """One line of `sensor.figures()` in the channel's `unit`."""
+    found = sensor.figures()
+
+    def text(value: float) -> str:
+        return f"{from_si(value, unit):.4g}"
+
+    filtered = "" if found.filtered is None else f" ({text(found.filtered)} filtered)"
+    span = "no end of range" if found.low is None or found.high is None else f"{text(found.low)} ... {text(found.high)}"
+    return f"{sensor.at} [{unit}] by {found.name}: step {text(found.step)}, noise {text(found.noise)}{filtered} peak to peak, {span}"
