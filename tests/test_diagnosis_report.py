@@ -106,16 +106,21 @@ def found(creeping):
 
 
 def same_prediction(diagnosis, text: str, folder: Path) -> None:
-    """The device in `text` predicts what the chosen fit predicts, to 1e-9 of the largest reading."""
+    """The device in `text` holds the chosen fit's numbers, which predict what the fit predicts to 1e-9 of the largest
+    reading; its own model may differ by how finely it integrates around its own nominal numbers."""
     (folder / "next.toml").write_text(text)
-    device, fit = ctrlgen.load_device(folder / "next.toml"), diagnosis.search.chosen.fit
-    recording = diagnosis.recording
+    device, fit, recording = ctrlgen.load_device(folder / "next.toml"), diagnosis.search.chosen.fit, diagnosis.recording
+    stated = {path: number.si for path, number in device.quantities()}
+    theta = np.array([stated.pop(unknown.path) for unknown in fit.structure.unknowns])
+    assert stated.items() <= {path: number.si for path, number in diagnosis.device.quantities()}.items()
     responses = fit.structure.responses(recording, diagnosis.fitter.cache)
     for record in recording.records:
-        wanted = responses[record.sample_time, record.linear].outputs(record, fit.theta)
-        response = Response(device, (), recording.channels, record.sample_time, record.linear)
-        given = response.outputs(record, np.zeros(0))
-        assert np.all(np.abs(given - wanted) <= 1e-9 * np.abs(wanted).max(axis=0))
+        response = responses[record.sample_time, record.linear]
+        own = Response(device, (), recording.channels, record.sample_time, record.linear)
+        wanted = response.outputs(record, fit.theta)
+        size = np.abs(wanted).max(axis=0)
+        assert np.all(np.abs(response.outputs(record, theta) - wanted) <= 1e-9 * size)
+        assert np.all(np.abs(own.outputs(record, np.zeros(0)) - wanted) <= 1e-6 * size)
 
 
 # --- diagnosis.json
