@@ -13,17 +13,21 @@ if TYPE_CHECKING:
     from ctrlgen.comparison import Comparison, compare
     from ctrlgen.controller import Controller, Status
     from ctrlgen.devices import load_device
+    from ctrlgen.diagnosis.diagnosis import Diagnosis
+    from ctrlgen.diagnosis.job import diagnose
     from ctrlgen.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.firmware import generate
     from ctrlgen.job import Outcome, run
     from ctrlgen.model import Model, build_model
     from ctrlgen.readings import Record, record_readings
+    from ctrlgen.recording import load_recordings
     from ctrlgen.scenario import load_scenario
     from ctrlgen.simulation import Trace, simulate
     from ctrlgen.solution import Solution, solve
 
 _HOME = {
     "comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
+    "diagnosis.diagnosis": ("Diagnosis",), "diagnosis.job": ("diagnose",), "recording": ("load_recordings",),
     "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware": ("generate",),
     "job": ("Outcome", "run"), "model": ("Model", "build_model"), "readings": ("Record", "record_readings"), "scenario": ("load_scenario",),
     "simulation": ("Trace", "simulate"), "solution": ("Solution", "solve"),
@@ -42,6 +46,7 @@ __all__ = [
     "Comparison",
     "Controller",
     "CtrlgenError",
+    "Diagnosis",
     "InputError",
     "Model",
     "Outcome",
@@ -55,8 +60,10 @@ __all__ = [
     "__version__",
     "build_model",
     "compare",
+    "diagnose",
     "generate",
     "load_device",
+    "load_recordings",
     "load_scenario",
     "record_readings",
     "run",

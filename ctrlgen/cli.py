@@ -3,30 +3,38 @@
 from __future__ import annotations
 
 import json
-import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
-from ctrlgen import job, report
+from ctrlgen import job
 from ctrlgen.devices import load_device
 from ctrlgen.devices.sensor import describe
 from ctrlgen.errors import CtrlgenError, Fault, InputError, Unreachable
 from ctrlgen.files import read_toml
-from ctrlgen.measures import in_unit
 from ctrlgen.model import build_model
 from ctrlgen.paths import Frame
+from ctrlgen.recording import load_recordings
+from ctrlgen.recording_file import FILE as RECORDING
 from ctrlgen.scenario import load_scenario
+from ctrlgen.terminal import (
+    CHECK,
+    complain,
+    err,
+    out,
+    print_comparison,
+    print_diagnosis,
+    print_recording,
+    print_solution,
+    progress,
+    show_warning,
+    table_of,
+)
 from ctrlgen.units import from_si, show
 
 app = typer.Typer(
@@ -34,9 +42,6 @@ app = typer.Typer(
     help="Describe a flexure nanopositioner once; solve its trajectories, generate its C, and prove that the C is right.\n\n"
     "Start with:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
 )  # fmt: skip
-out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
-err = Console(stderr=True, highlight=False)
-CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # see `execute`
 
 ScenarioPath = Annotated[
     Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)
@@ -59,10 +64,10 @@ def run(scenario: ScenarioPath, out_folder: OutFolder) -> None:
 
     Example:  ctrlgen run scenarios/circle20 --out out/circle20
     """
-    with _progress(job.STAGES) as advance:
+    with progress(job.STAGES) as advance:
         outcome = job.run(scenario, out_folder, advance)
-    _print_solution(outcome)
-    _print_comparison(outcome)
+    print_solution(outcome)
+    print_comparison(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
@@ -73,9 +78,9 @@ def solve(scenario: ScenarioPath, out_folder: OutFolder) -> None:
 
     Example:  ctrlgen solve scenarios/raster --out out/raster
     """
-    with _progress(2) as advance:
+    with progress(2) as advance:
         outcome = job.solve_into(scenario, out_folder, advance)
-    _print_solution(outcome)
+    print_solution(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
@@ -86,7 +91,7 @@ def generate(scenario: ScenarioPath, out_folder: OutFolder) -> None:
 
     Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
     """
-    with _progress(2) as advance:
+    with progress(2) as advance:
         c = job.generate_into(scenario, out_folder, advance)
     for name in [*c.online.values(), *c.player.values()]:
         out.print(f"{out_folder / name}.c", soft_wrap=True, markup=False)
@@ -99,22 +104,33 @@ def compare(scenario: ScenarioPath) -> None:
 
     Example:  ctrlgen compare scenarios/circle20
     """
-    with _progress(job.STAGES - 1) as advance:
+    with progress(job.STAGES - 1) as advance:
         outcome = job.compare_only(scenario, advance)
-    _print_comparison(outcome)
+    print_comparison(outcome)
     _exit(outcome)
 
 
 @app.command()
 def check(
     file: Annotated[
-        Path, typer.Argument(help="A device file, a scenario file or a scenario folder.", show_default=False)
+        Path,
+        typer.Argument(
+            help="A device file, a scenario, or with --device a recording; or its folder.", show_default=False
+        ),
     ],
+    device_path: Annotated[
+        Path | None, typer.Option("--device", help="The device that a recording was made on.", show_default=False)
+    ] = None,
 ) -> None:
-    """Read a device or scenario and list every fault, or say what it describes. Nothing is computed.
+    """Read a device, scenario or recording and list every fault, or say what it describes. Nothing is computed.
 
     Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
     """
+    if device_path is not None:
+        print_recording(load_recordings([file], build_model(load_device(device_path))))
+        return
+    if (file / RECORDING).is_file() or (file.name == RECORDING and file.is_file()):
+        raise InputError(file, [Fault("--device", "is missing; name the device file that this recording was made on")])
     if file.is_dir() or "kind" not in read_toml(file):
         scenario = load_scenario(file)
         count = len(scenario.command(build_model(scenario.device)))
@@ -185,7 +201,7 @@ def workspace(
         shown = (f"{c} {from_si(pose[i], u):.4g} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i])
         return ", ".join(shown) or "home"
 
-    table = _table(("from", "left"), *((place(base), "right") for base in found.bases), ("anywhere", "right"))
+    table = table_of(("from", "left"), *((place(base), "right") for base in found.bases), ("anywhere", "right"))
     for i, (channel, unit) in named:
         rounding = 1e-9 * signal_.scale[i]
         ends = (np.where(np.abs(r[i]) > rounding, r[i], 0.0) for r in (*found.ranges, found.extent))
@@ -229,7 +245,7 @@ def reproduce(
         )
     if page is not None and page.suffix != ".html":
         raise InputError("--out", [Fault(str(page), "must end in .html")])
-    with _progress(len(chosen)) as advance:
+    with progress(len(chosen)) as advance:
         rows = []
         for name in chosen:
             advance(f"{name}, {everything.TITLES[name]}")
@@ -240,7 +256,7 @@ def reproduce(
         print(json.dumps(everything.as_json(rows), indent=1))
         return
     colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
-    table = _table(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
+    table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
     for words in (table.columns[1], table.columns[-1]):
         words.no_wrap = False  # long words break; the numbers never make way for them
     for row in rows:
@@ -263,99 +279,39 @@ def reproduce(
         out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)
 
 
-def _print_solution(outcome: job.Outcome) -> None:
-    """Title, tracking error, margins and expectations."""
-    solution = outcome.solution
-    scenario = solution.scenario
-    rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
-    out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
-    out.print(
-        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, IPOPT {solution.iterations} iterations",
-        soft_wrap=True,
-    )
-    table = _table(
-        ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
-    )
-    for margin in solution.margins:
-        unit, tightest = margin.limit.unit, margin is solution.tightest
-        share = "" if margin.share is None else f"{100 * margin.share:.1f} %"
-        where = f"{margin.channel}, " + (
-            f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
-        )
-        row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
-        table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
-    out.print(table)
-    if outcome.expected:
-        good = sum(e.passed for e in outcome.expected)
-        out.print(f"expected: {good} of {len(outcome.expected)} values in range")
-    for e in outcome.expected:
-        if not e.passed:
-            measured, low, high = (f"{in_unit(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
-            out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
+@app.command()
+def diagnose(
+    device: DevicePath,
+    recording: Annotated[
+        list[Path],
+        typer.Argument(help="A recording.toml, or the folder that holds one; several are joined.", show_default=False),
+    ],
+    out_folder: OutFolder,
+    seed: Annotated[int, typer.Option(help="Of everything drawn at random; the same seed gives the same answer.")] = 0,
+) -> None:
+    """Find what a device file leaves out: where, which physics by name, with numbers, proved on held-out records.
 
+    Leaves in --out: report.html (open this first), diagnosis.json, and device.next.toml, the device file with what
+    was found. The exit status is 0 whatever the verdict, and 2 for input that cannot be used.
 
-def _print_comparison(outcome: job.Outcome) -> None:
-    """One line per arithmetic and comparison."""
-    if outcome.comparison is None or outcome.c is None:
-        return
-    comparison, c = outcome.comparison, outcome.c
-    tools = ", ".join(comparison.compilers)
-    cost = f"{c.operations} operations a sample, {c.worst_operations} at most"
-    out.print(f"[bold]generated C[/bold], built strictly with {tools}; {cost}", soft_wrap=True)
-    for missing in comparison.missing:
-        out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
-    table = _table(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
-    for row in report.worst_rows(comparison):
-        if row["passed"] and row["what"].endswith("CasADi"):
-            continue
-        unit = "" if row["unit"] == "1" else f" {row['unit']}"
-        verdict = (
-            "[green]ok[/green]" if row["passed"] else f"[red]OUT from sample {row['first']} ({row['build']})[/red]"
-        )
-        table.add_row(
-            row["real"],
-            f"{row['what']}, {row['signal']}",
-            f"{row['worst']:.2g}{unit}",
-            f"{row['limit']:.2g}{unit}",
-            verdict,
-        )
-    out.print(table)
-    good = sum(row.passed for row in comparison.rows)
-    out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+    Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
+    """
+    from ctrlgen.diagnosis.job import diagnose_into
 
-
-def _table(*columns: tuple[str, Literal["left", "right"]]) -> Table:
-    """A plain table with a last column for remarks."""
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for name, justify in (*columns, ("", "left")):
-        table.add_column(name, justify=justify, no_wrap=True)
-    return table
+    try:
+        with progress() as advance:
+            found = diagnose_into(device, recording, out_folder, seed, advance)
+    except InputError as error:
+        complain(error)
+        raise typer.Exit(2) from None
+    print_diagnosis(found)
+    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
 
 
 def _exit(outcome: job.Outcome) -> None:
     if not outcome.passed:
         out.print("[red]out of tolerance[/red]")
         raise typer.Exit(1)
-
-
-@contextmanager
-def _progress(stages: int) -> Iterator[Any]:
-    """A progress bar on standard error; each call moves it on and names what comes next."""
-    check = CHECK.get()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=err, transient=True) as bar:
-        task = bar.add_task("reading", total=stages)
-
-        def advance(what: str) -> None:
-            check()
-            bar.update(task, advance=1, description=what)
-
-        yield advance
-
-
-def _show_warning(message: Warning | str, *_: Any) -> None:
-    """One line without the place in our code, which tells a user nothing."""
-    err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
 
 
 def execute(check: Callable[[], None] = lambda: None) -> int:
@@ -365,7 +321,7 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     """
     try:
         CHECK.set(check)
-        warnings.showwarning = _show_warning
+        warnings.showwarning = show_warning
         status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
         return status if isinstance(status, int) else 0
     except Unreachable as error:
@@ -373,8 +329,7 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
         err.print(str(error), markup=False, soft_wrap=True)
         return 1
     except CtrlgenError as error:
-        err.print("[bold red]error[/bold red]: ", end="")
-        err.print(str(error), markup=False, soft_wrap=True)
+        complain(error)
         return 1
     except typer.Abort:
         return 130

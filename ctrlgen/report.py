@@ -130,13 +130,18 @@ def write_report(
     figures = draw_all(solution)
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(codegen_folder() / "templates"), autoescape=True, undefined=jinja2.StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    page = environment.get_template("report.html.j2").render(
-        s=result, figures=figures, rows=worst_rows(comparison) if comparison else [], source=solution.model.device.source,
+    page = render(
+        "report.html.j2", s=result, figures=figures, rows=worst_rows(comparison) if comparison else [], source=solution.model.device.source,
         device_title=solution.model.device.title,
         sourced=[(path, q.text, q.source or "") for path, q in solution.model.device.quantities()],
     )  # fmt: skip
     write_text(out / "report.html", page)
+
+
+def render(template: str, **values: Any) -> str:
+    """A page of `codegen/templates/`; a value that a template asks for and does not get is an error."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(codegen_folder() / "templates"), autoescape=True, undefined=jinja2.StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template(template).render(**values)

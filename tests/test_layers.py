@@ -31,8 +31,9 @@ LAYERS = [
     "diagnosis.slopes", "diagnosis.together", "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis",
     "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
     "diagnosis.empirical diagnosis.detectable diagnosis.profile diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
-    "diagnosis.evidence", "diagnosis",
-    "job", "cli", "", "__main__",
+    "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",
+    "diagnosis.writeback diagnosis.picture_maps diagnosis.picture_sure", "diagnosis.pictures", "diagnosis.page", "diagnosis.job",
+    "job", "terminal", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}
 MODULES = sorted(PACKAGE.rglob("*.py"))

@@ -7,13 +7,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib.pyplot as plt
 
 from ctrlgen.figures import STYLE, draw_path, draw_signal, draw_stage_force, svg
 from ctrlgen.files import write_text
-from ctrlgen.firmware import codegen_folder
 from ctrlgen.model import build_model
+from ctrlgen.report import render
 from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
 from ctrlgen.reproduce.row import Row
 from ctrlgen.reproduce.s0_data import SCENARIOS
@@ -83,11 +82,7 @@ def write_page(rows: list[Row], path: Path) -> None:
     """One self-contained HTML page: counts, the figures redrawn from our own results, and every row."""
     sources = list(dict.fromkeys(row.source for row in rows))
     figures = {source: FIGURES[source]() for source in sources if source in FIGURES}
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(codegen_folder() / "templates"), autoescape=True, undefined=jinja2.StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    page = environment.get_template("reproduce.html.j2").render(
-        rows=as_json(rows), sources=sources, titles=TITLES, counts=counts(rows), figures=figures
+    page = render(
+        "reproduce.html.j2", rows=as_json(rows), sources=sources, titles=TITLES, counts=counts(rows), figures=figures
     )
     write_text(path, page)

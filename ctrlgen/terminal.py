@@ -1,0 +1,160 @@
+"""What the command line shows: tables, progress, and one clear message for what went wrong."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any, Literal
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ctrlgen import job, report
+from ctrlgen.errors import CtrlgenError
+from ctrlgen.measures import in_unit
+from ctrlgen.recording import Recording
+from ctrlgen.units import show
+
+if TYPE_CHECKING:
+    from ctrlgen.diagnosis.diagnosis import Diagnosis
+
+out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
+err = Console(stderr=True, highlight=False)
+CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
+
+
+def print_solution(outcome: job.Outcome) -> None:
+    """Title, tracking error, margins and expectations."""
+    solution = outcome.solution
+    scenario = solution.scenario
+    rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
+    out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
+    out.print(
+        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, IPOPT {solution.iterations} iterations",
+        soft_wrap=True,
+    )
+    table = table_of(
+        ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
+    )
+    for margin in solution.margins:
+        unit, tightest = margin.limit.unit, margin is solution.tightest
+        share = "" if margin.share is None else f"{100 * margin.share:.1f} %"
+        where = f"{margin.channel}, " + (
+            f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
+        )
+        row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
+        table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
+    out.print(table)
+    if outcome.expected:
+        good = sum(e.passed for e in outcome.expected)
+        out.print(f"expected: {good} of {len(outcome.expected)} values in range")
+    for e in outcome.expected:
+        if not e.passed:
+            measured, low, high = (f"{in_unit(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
+            out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
+
+
+def print_comparison(outcome: job.Outcome) -> None:
+    """One line per arithmetic and comparison."""
+    if outcome.comparison is None or outcome.c is None:
+        return
+    comparison, c = outcome.comparison, outcome.c
+    tools = ", ".join(comparison.compilers)
+    cost = f"{c.operations} operations a sample, {c.worst_operations} at most"
+    out.print(f"[bold]generated C[/bold], built strictly with {tools}; {cost}", soft_wrap=True)
+    for missing in comparison.missing:
+        out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
+    table = table_of(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
+    for row in report.worst_rows(comparison):
+        if row["passed"] and row["what"].endswith("CasADi"):
+            continue
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        verdict = (
+            "[green]ok[/green]" if row["passed"] else f"[red]OUT from sample {row['first']} ({row['build']})[/red]"
+        )
+        table.add_row(
+            row["real"],
+            f"{row['what']}, {row['signal']}",
+            f"{row['worst']:.2g}{unit}",
+            f"{row['limit']:.2g}{unit}",
+            verdict,
+        )
+    out.print(table)
+    good = sum(row.passed for row in comparison.rows)
+    out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+
+
+def table_of(*columns: tuple[str, Literal["left", "right"]]) -> Table:
+    """A plain table with a last column for remarks."""
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for name, justify in (*columns, ("", "left")):
+        table.add_column(name, justify=justify, no_wrap=True)
+    return table
+
+
+def print_recording(recording: Recording) -> None:
+    """What the gate lets through, record by record, and its notes."""
+    out.print(f"{recording.title}: {', '.join(recording.channels)}", markup=False, soft_wrap=True)
+    table = table_of(("record", "left"), ("role", "left"), ("samples", "right"), ("marked", "right"))
+    for record in recording.records:
+        marked = int((~record.valid).sum())
+        table.add_row(escape(record.name), record.role, str(len(record.time)), f"{marked} of {record.valid.size}")
+    out.print(table)
+    for note in recording.notes:
+        out.print(f"note: {note}", markup=False, soft_wrap=True)
+
+
+def print_diagnosis(found: Diagnosis) -> None:
+    """The verdict, what was found, and the held-out errors."""
+    from ctrlgen.diagnosis.words import gathered, interval, next_steps, number, sentence
+
+    out.print(f"[bold]{escape(sentence(found))}[/bold]", soft_wrap=True)
+    if found.findings:
+        table = table_of(("found", "left"), ("at", "left"), ("number", "left"), ("95 % interval", "left"))
+        for finding in found.findings:
+            rows = [(name, interval(e)) for name, e in finding.parameters.items()]
+            alike = ", ".join(f"{effect} {location}" for effect, location in finding.alternatives)
+            for k, (name, text) in enumerate(rows):
+                first = (finding.effect, finding.location) if k == 0 else ("", "")
+                table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
+        out.print(table)
+    table = table_of(("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"))
+    for channel, e in found.held_out.items():
+        floor = "not known" if e.noise_floor is None else f"{number(e.noise_floor)} {e.unit}"
+        table.add_row(channel, f"{number(e.rms_before)} {e.unit}", f"{number(e.rms_after)} {e.unit}", floor)
+    out.print(table)
+    for note in gathered(found.notes):
+        out.print(f"note: {note}", markup=False, soft_wrap=True)
+    for step in next_steps(found):
+        out.print(f"next: {step}", markup=False, soft_wrap=True)
+
+
+@contextmanager
+def progress(stages: int | None = None) -> Iterator[Any]:
+    """A progress bar on standard error, none where nobody knows how many stages come; each call names the next one."""
+    check = CHECK.get()
+    bar_column = () if stages is None else (BarColumn(),)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), *bar_column, TimeElapsedColumn())
+    with Progress(*columns, console=err, transient=True) as bar:
+        task = bar.add_task("reading", total=stages)
+
+        def advance(what: str) -> None:
+            check()
+            bar.update(task, advance=1, description=what)
+
+        yield advance
+
+
+def complain(error: CtrlgenError) -> None:
+    """One clear message on standard error."""
+    err.print("[bold red]error[/bold red]: ", end="")
+    err.print(str(error), markup=False, soft_wrap=True)
+
+
+def show_warning(message: Warning | str, *_: Any) -> None:
+    """One line without the place in our code, which tells a user nothing."""
+    err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)

@@ -1,0 +1,375 @@
+"""What a diagnosis leaves behind: diagnosis.json, device.next.toml, the page, and the command that writes them."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import SCENARIOS
+
+import ctrlgen
+from ctrlgen.cli import execute
+from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, Estimate
+from ctrlgen.diagnosis.job import diagnose_into
+from ctrlgen.diagnosis.page import Provenance, page
+from ctrlgen.diagnosis.pictures import POINTS, thinned
+from ctrlgen.diagnosis.record import as_dict, plain
+from ctrlgen.diagnosis.response import Response
+from ctrlgen.diagnosis.words import gathered, interval, next_steps, sentence
+from ctrlgen.diagnosis.writeback import next_text
+from ctrlgen.effect import Effect
+from ctrlgen.units import from_si
+
+AXIS, MESO = SCENARIOS / "devices" / "flexure_axis.toml", SCENARIOS / "devices" / "meso_hexapod.toml"
+CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\n'
+STEP = 1e-3
+RECORD = '[[record]]\nfile = "{0}.csv"\nrole = "{0}"\ntime = {{ column = "t", unit = "s" }}\n'
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_library():
+    """Four laws instead of all: the report is the same, and quick."""
+    with pytest.MonkeyPatch.context() as patch:
+        few = ("creep", "drive_gain", "home_offset", "stiffening")
+        patch.setattr(Effect, "library", {kind: Effect.library[kind] for kind in few})
+        yield
+
+
+def axis_recording(folder: Path, true: str, title: str = "creeping axis") -> Path:
+    """Two records of the axis described by the text `true`, with 5 nm of noise; the nominal model is AXIS."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "true.toml").write_text(true)
+    model, rng = ctrlgen.build_model(ctrlgen.load_device(folder / "true.toml")), np.random.default_rng(3)
+    t = STEP * np.arange(1200)
+    drives = {
+        "fit": sum(np.sin(2 * np.pi * f * t + f) for f in (0.8, 1.7, 3.1, 7, 19, 47, 95)) / 4,
+        "hold_out": np.repeat(rng.uniform(-1, 1, 6), 100),
+    }
+    for role, u in drives.items():
+        trace = ctrlgen.simulate(model, u[:, None], STEP)
+        y = from_si(trace.signals["reading"][:-1, 0], "nm") + 5 * rng.standard_normal(len(u))
+        rows = np.column_stack([STEP * np.arange(len(u)), u, y])
+        np.savetxt(folder / f"{role}.csv", rows, delimiter=",", header="t,u,y", comments="")
+    (folder / "recording.toml").write_text(
+        f'title = "{title}"\ndevice = "flexure_axis"\nkind = "series"\n[columns]\n'
+        '"drive.axis" = { column = "u", unit = "V" }\n"reading.axis" = { column = "y", unit = "nm", noise = "5 nm" }\n'
+        + "".join(RECORD.format(role) for role in drives)
+    )
+    return folder
+
+
+def poses_recording(folder: Path, device) -> Path:
+    """Settled poses of a meso-scale hexapod with a noise of 10 nm and 10 nrad."""
+    rng, n = np.random.default_rng(5), 40
+    model = ctrlgen.build_model(device)
+    channels = tuple(f"reading.{c}" for c in model.signals["pose"].channels)
+    units = model.signals["pose"].units
+    drives = rng.uniform(-400e-6, 400e-6, (n, 6))
+    from ctrlgen.recording import Record
+
+    none = np.zeros((n, 6))
+    record = Record("", "fit", np.arange(n), np.inf, drives, none, False, None, none == 0)
+    pose = Response(device, (), channels, np.inf, False).outputs(record, np.zeros(0)) + 1e-8 * rng.standard_normal(
+        (n, 6)
+    )
+    axes = model.signals["drive"].channels
+    columns = [from_si(drives, "um"), *(from_si(pose[:, [i]], unit) for i, unit in enumerate(units))]
+    header = ",".join((*axes, *channels))
+    np.savetxt(folder / "poses.csv", np.hstack(columns), delimiter=",", header=header, comments="")
+    lines = [f'"drive.{a}" = {{ column = "{a}", unit = "um" }}' for a in axes]
+    for channel, unit in zip(channels, units, strict=True):
+        noise = from_si(1e-8, unit)
+        lines.append(f'"{channel}" = {{ column = "{channel}", unit = "{unit}", noise = "{noise:.9g} {unit}" }}')
+    records = [f'[[record]]\nfile = "poses.csv"\nrole = "{r}"\nrows = {rows}\n' for r, rows in PARTS.items()]
+    head = 'title = "turned strut"\ndevice = "meso_hexapod"\nkind = "poses"\n[columns]\n'
+    (folder / "recording.toml").write_text(head + "\n".join(lines) + "\n" + "".join(records))
+    return folder
+
+
+PARTS = {"fit": [0, 25], "hold_out": [25, 40]}
+
+
+@pytest.fixture(scope="module")
+def creeping(tmp_path_factory) -> Path:
+    return axis_recording(tmp_path_factory.mktemp("creeping"), AXIS.read_text() + CREEP)
+
+
+@pytest.fixture(scope="module")
+def found(creeping):
+    return ctrlgen.diagnose(AXIS, creeping)
+
+
+def same_prediction(diagnosis, text: str, folder: Path) -> None:
+    """The device in `text` holds the chosen fit's numbers, which predict what the fit predicts to 1e-9 of the largest
+    reading; its own model may differ by how finely it integrates around its own nominal numbers."""
+    (folder / "next.toml").write_text(text)
+    device, fit, recording = ctrlgen.load_device(folder / "next.toml"), diagnosis.search.chosen.fit, diagnosis.recording
+    stated = {path: number.si for path, number in device.quantities()}
+    theta = np.array([stated.pop(unknown.path) for unknown in fit.structure.unknowns])
+    assert stated.items() <= {path: number.si for path, number in diagnosis.device.quantities()}.items()
+    responses = fit.structure.responses(recording, diagnosis.fitter.cache)
+    for record in recording.records:
+        response = responses[record.sample_time, record.linear]
+        own = Response(device, (), recording.channels, record.sample_time, record.linear)
+        wanted = response.outputs(record, fit.theta)
+        size = np.abs(wanted).max(axis=0)
+        assert np.all(np.abs(response.outputs(record, theta) - wanted) <= 1e-9 * size)
+        assert np.all(np.abs(own.outputs(record, np.zeros(0)) - wanted) <= 1e-6 * size)
+
+
+# --- diagnosis.json
+
+
+def test_the_json_is_the_contract(found):
+    result = json.loads(json.dumps(as_dict(found), allow_nan=False))
+    assert list(result) == ["verdict", "findings", "where", "held_out", "detectable", "next_experiment", "history"]
+    assert result["verdict"] == EXPLAINED
+    (finding,) = result["findings"]
+    assert set(finding) == {"effect", "location", "parameters", "alternatives", "held_out_gain", "source"}
+    assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")
+    assert finding["parameters"]["tau"]["unit"] == "s"
+    low, high = finding["parameters"]["gain"]["ci95"]
+    assert low < finding["parameters"]["gain"]["value"] < high and low < 0.03 < high
+    error = result["held_out"]["reading.axis"]
+    assert set(error) == {"rms_before", "rms_after", "noise_floor", "unit"} and error["unit"] == "nm"
+    assert error["rms_before"] > 10 * error["rms_after"] and error["noise_floor"] == pytest.approx(5)
+
+
+def test_the_json_lists_alternatives_by_name(found):
+    rival = replace(found.findings[0], alternatives=(("thermal_lag", "actuator:axis"),))
+    result = as_dict(replace(found, findings=(rival,)))
+    assert result["findings"][0]["alternatives"] == [{"effect": "thermal_lag", "location": "actuator:axis"}]
+
+
+def test_numbers_that_are_none_are_null():
+    given = {"a": float("nan"), "b": (np.float64(np.inf), np.int64(3)), "c": np.array([1.5, np.nan]), 1: np.bool_(True)}
+    given["e"] = Estimate(1.0, (-np.inf, 2.0), "s")
+    assert plain(given) == {
+        "a": None, "b": [None, 3], "c": [1.5, None], "1": True, "e": {"value": 1.0, "ci95": [None, 2.0], "unit": "s"},
+    }  # fmt: skip
+
+
+# --- device.next.toml
+
+
+def test_the_next_device_keeps_the_authors_text_and_predicts_what_the_fit_predicts(found, tmp_path):
+    text = next_text(found, AXIS.read_text())
+    kept = [line for line in AXIS.read_text().splitlines() if "sd =" not in line]
+    assert [line for line in text.splitlines() if line in kept and line] == [line for line in kept if line]
+    assert 'was 0.5 kg"' in text and "refitted to creeping axis" in text
+    assert "# Diagnosed from 'creeping axis'" in text and "Held-out error of axis" in text
+    assert text.index("# Diagnosed") < text.index("[[effect]]")
+    same_prediction(found, text, tmp_path)
+
+
+def test_the_next_device_states_the_deviations_of_the_fit(found, tmp_path):
+    (tmp_path / "next.toml").write_text(next_text(found, AXIS.read_text()))
+    device, fit = ctrlgen.load_device(tmp_path / "next.toml"), found.search.chosen.fit
+    stated = dict(device.quantities())
+    for unknown, variance in zip(fit.structure.unknowns, np.diag(fit.covariance), strict=True):
+        assert stated[unknown.path].sd == pytest.approx(np.sqrt(variance), rel=0.01), unknown.path
+
+
+def test_an_effect_that_is_there_already_stays_and_the_new_one_follows(creeping, tmp_path):
+    known = AXIS.read_text() + "\n# glue\n" + CREEP.replace("0.03", "0.01").replace("0.2 s", "0.05 s")
+    (tmp_path / "known.toml").write_text(known)
+    again = ctrlgen.diagnose(tmp_path / "known.toml", creeping)
+    text = next_text(again, known)
+    assert "# glue" in text and text.count('kind = "creep"') == 2 and 'tau = "0.05 s"' in text
+    same_prediction(again, text, tmp_path)
+
+
+def test_effects_written_in_one_line_are_continued_in_that_line(creeping, tmp_path):
+    first = 'effect = [{ kind = "home_offset", at = "axis", offset = "0 um" }] # level\n'
+    known = first + AXIS.read_text()
+    (tmp_path / "known.toml").write_text(known)
+    again = ctrlgen.diagnose(tmp_path / "known.toml", creeping)
+    text = next_text(again, known)
+    assert text.startswith("effect = [{ kind") and "# level" in text and "[[effect]]" not in text
+    same_prediction(again, text, tmp_path)
+    assert [e.kind for e in ctrlgen.load_device(tmp_path / "next.toml").effect] == ["home_offset", "creep"]
+
+
+@pytest.mark.parametrize("layout", ["table", "text"])
+def test_a_number_in_a_list_changes_in_place_and_says_what_it_was(tmp_path, layout):
+    row = '  { value = "51 deg", source = "S0 Table 1, phi_4" },'
+    written = MESO.read_text() if layout == "table" else MESO.read_text().replace(row, '  "51 deg", # mine')
+    assert layout == "table" or "# mine" in written
+    (tmp_path / "device.toml").write_text(written)
+    (tmp_path / "true.toml").write_text(MESO.read_text().replace('"51 deg"', '"51.2 deg"', 1))
+    folder = poses_recording(tmp_path, ctrlgen.load_device(tmp_path / "true.toml"))
+    turned = ctrlgen.diagnose(tmp_path / "device.toml", folder)
+    assert [f.cause.path for f in turned.findings] == ["hexapod.platform_angles[3]"]
+    text = next_text(turned, written)
+    assert "[[effect]]" not in text and text.count("diagnosed from turned strut; was 51 deg") == 1
+    assert ("S0 Table 1, phi_4" in text) if layout == "table" else ("# mine" in text)
+    changed = set(written.splitlines()) - set(text.splitlines())
+    assert len(changed) == 1 and "51 deg" in changed.pop()
+    same_prediction(turned, text, tmp_path)
+    assert dict(ctrlgen.load_device(tmp_path / "next.toml").quantities())["hexapod.platform_angles[3]"].si == (
+        pytest.approx(np.deg2rad(51.2), abs=1e-5)
+    )
+
+
+# --- the page
+
+
+def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
+    text = page(found, Provenance({"flexure_axis.toml": "0" * 64}, 7))
+    links = re.findall(r"""(?:src|href)\s*=\s*["']([^"'#][^"']*)""", text) + re.findall(r"url\(([^#)]+)\)", text)
+    assert (
+        all(link.startswith("data:") for link in links)
+        and "<script" not in text
+        and "@import" not in text
+        and "<link" not in text
+    )
+    assert "A flexure or its glue keeps moving" in text and "Explained" in text.split("<h2>")[0]
+    assert text.count("<figure>") == 5 and "seed 7" in text and "0" * 64 in text
+    assert text.index("device.next.toml") < text.index("<figure>")
+
+
+def test_a_title_cannot_write_html(found):
+    hostile = replace(found, recording=replace(found.recording, title="<script>alert(1)</script>"))
+    assert "<script>" not in page(hostile, Provenance({}, 0))
+
+
+def test_the_page_shows_whatever_evidence_there_is(found):
+    part = {"label": "reading.axis", "excess": 4.0, "ci95": (3.0, 5.0)}
+    where = {"output": [part], "direction": {"axis": [{**part, "label": "forward"}]}, "said": ["more below 1 Hz"]}
+    profile = {
+        "effect": "creep", "location": "stage:axis", "parameter": "tau", "value": 0.2, "ci95": (0.1, 0.3), "unit": "s",
+        "points": ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)),
+    }  # fmt: skip
+    experiment = {"drive": "multisine", "duration": {"value": 20.0, "unit": "s"}}
+    told = replace(
+        found, where=where, next_experiment=experiment, history=({"was": "before"},), extra={"profiles": (profile,)},
+        detectable={"drift": {"value": float("nan"), "unit": "nm/s"}},
+    )  # fmt: skip
+    text = page(told, Provenance({}, 0))
+    assert text.count("<figure>") == 7
+    for words in ("more below 1 Hz", "20 s", "before", "drift"):
+        assert words in text
+
+
+def test_a_verdict_says_what_to_do(found):
+    rival = replace(found.findings[0], alternatives=(("thermal_lag", "actuator:axis"),))
+    told = {v: replace(found, verdict=v, findings=(rival,)) for v in (EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED)}
+    told[CONSISTENT] = replace(found, verdict=CONSISTENT, findings=())
+    first = {verdict: (sentence(d).split(":")[0], next_steps(d)[0]) for verdict, d in told.items()}
+    assert len(set(first.values())) == 5
+    assert first[CONSISTENT][1].startswith("Nothing to correct") and first[EXPLAINED][1].startswith(
+        "Use device.next.toml"
+    )
+    assert first[UNEXPLAINED][1].startswith("Not a cause I know")
+    assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[AMBIGUOUS])
+    assert "thermal_lag" not in sentence(told[EXPLAINED])
+    assert "no cause I know" in sentence(replace(found, verdict=UNEXPLAINED, findings=()))
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "unit", "says"),
+    [(0.041, 0.039, 0.043, "1", "4.1 % (3.9 ... 4.3 %)"), (312.0, 300.0, 324.0, "nm", "312 nm (300 ... 324 nm)"),
+     (2.5, 2.4, 2.6, "1", "2.5 (2.4 ... 2.6)"), (0.5, 0.3, 0.5, "s", "0.5 s (0.3 ... 0.5 s, at the end of its range)"),
+     (0.5, -np.inf, np.inf, "s", "0.5 s (this record does not hold it)")],
+)  # fmt: skip
+def test_intervals_read_well(value, low, high, unit, says):
+    assert interval(Estimate(value, (low, high), unit)) == says
+
+
+def test_a_long_curve_keeps_its_peaks():
+    y = np.random.default_rng(0).standard_normal(50_000)
+    y[31_234], y[100] = 40.0, np.nan
+    x, thin = thinned(np.arange(50_000.0), y)
+    assert len(x) <= 2 * POINTS and np.max(thin) == 40.0 and x[np.argmax(thin)] == 31_234 and np.all(np.diff(x) > 0)
+
+
+def test_notes_alike_are_said_once():
+    notes = ("reading.x: as stated", "reading.y: as stated", "a.csv: 3 spikes")
+    assert gathered(notes) == ["reading.x, reading.y: as stated", "a.csv: 3 spikes"]
+
+
+# --- the command and the job
+
+
+def command(*words: object) -> int:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["ctrlgen", *map(str, words)])
+        patch.setattr(warnings, "showwarning", warnings.showwarning)  # put back what the command changes
+        return execute()
+
+
+def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert command("diagnose", AXIS, creeping, "--out", out, "--seed", 3) == 0
+    assert {p.name for p in out.iterdir()} == {"report.html", "diagnosis.json", "device.next.toml", ".ctrlgen"}
+    printed = capsys.readouterr().out
+    assert "Explained: a flexure" in printed and "stage:axis" in printed and str(out / "report.html") in printed
+    page_text = (out / "report.html").read_text()
+    assert "seed 3" in page_text and "/fit.csv" in page_text and "/recording.toml" in page_text
+    assert command("diagnose", out / "device.next.toml", creeping, "--out", tmp_path / "next") == 0
+    assert json.loads((tmp_path / "next" / "diagnosis.json").read_text())["verdict"] == CONSISTENT
+
+
+def without_values(folder: Path) -> Path:
+    """The same recording with nothing in its reading."""
+    for name in ("fit.csv", "hold_out.csv"):
+        lines = (folder / name).read_text().splitlines()
+        (folder / name).write_text("\n".join([lines[0], *(line.rpartition(",")[0] + ",nan" for line in lines[1:])]))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("spoil", "device", "says"),
+    [(lambda f: f, MESO, "'flexure_axis' is not 'meso_hexapod'"), (lambda f: f / "none", AXIS, "does not exist"),
+     (lambda f: f, SCENARIOS / "none.toml", "does not exist"), (without_values, AXIS, "reading.axis")],
+    ids=["device of another recording", "no recording", "no device file", "empty channel"],
+)  # fmt: skip
+def test_bad_input_is_refused_with_status_2_and_nothing_is_written(tmp_path, capsys, spoil, device, says):
+    folder = spoil(axis_recording(tmp_path / "given", AXIS.read_text()))
+    assert command("diagnose", device, folder, "--out", tmp_path / "out") == 2
+    told = capsys.readouterr()
+    assert says in told.err and "fault" in told.err and told.out == ""
+    assert [p.name for p in tmp_path.iterdir()] == ["given"]
+
+
+def test_a_foreign_folder_is_refused(creeping, tmp_path, capsys):
+    (tmp_path / "thesis.tex").write_text("precious")
+    assert command("diagnose", AXIS, creeping, "--out", tmp_path) == 2
+    assert "did not make" in capsys.readouterr().err and [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("at", ["noise", "screening", "report"])
+def test_an_interruption_keeps_the_earlier_result(creeping, tmp_path, at):
+    def stop(step: str) -> None:
+        if step.startswith(at):
+            raise KeyboardInterrupt
+
+    out = tmp_path / "out"
+    diagnose_into(AXIS, [creeping], out)
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_into(AXIS, [creeping], out, progress=stop)
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == before and list(tmp_path.iterdir()) == [out]
+
+
+def test_objects_and_paths_give_the_same_answer_and_the_same_page(creeping, found):
+    device = ctrlgen.load_device(AXIS)
+    again = ctrlgen.diagnose(device, ctrlgen.load_recordings([creeping], ctrlgen.build_model(device)))
+    assert isinstance(again, ctrlgen.Diagnosis) and as_dict(again) == as_dict(found)
+    assert page(again, Provenance({}, 0)) == page(found, Provenance({}, 0))
+    several = ctrlgen.diagnose(str(AXIS), [str(creeping / "recording.toml")])
+    assert as_dict(several) == as_dict(found)
+
+
+def test_check_says_what_the_gate_lets_through(creeping, capsys):
+    assert command("check", creeping, "--device", AXIS) == 0
+    printed = capsys.readouterr().out
+    assert "creeping axis" in printed and "hold_out" in printed and "0 of 1200" in printed
+    assert command("check", creeping) == 1
+    assert "--device" in capsys.readouterr().err
