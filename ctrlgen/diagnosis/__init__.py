@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import judge
@@ -34,7 +35,11 @@ def diagnose(device: Device, recording: Recording, seed: int = 0, progress: Prog
     Deterministic for a given `seed`. `progress` is called with a sentence before each step. Raises InputError where the
     recording holds nothing to fit or to hold out.
     """
-    step = progress or (lambda _: None)
+    with threadpool_limits(1):  # the matrices are small; threads that wait for each other cost more than they do
+        return _diagnose(device, recording, seed, progress or (lambda _: None))
+
+
+def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -> Diagnosis:
     recording = _relative_ambient(recording)
     missing = [role for role in ("fit", "hold_out") if not any(r.role == role for r in recording.records)]
     if missing:

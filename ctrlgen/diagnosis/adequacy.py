@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.fit import Fit, Fitter
 RATIO = 1.10  # held-out error over what is expected: the gate of the design
 SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
 NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
+SMALL_SAMPLE = 0.001  # p of so large an error by chance, above which the gate's ratio says nothing
 LAGS = 20
 
 
@@ -52,8 +53,10 @@ def judge(fitter: Fitter, fit: Fit) -> Adequacy:
                     p["drive"].append(cross_correlation(e, record.drive[usable[:, i]]))
     ratio = tuple(np.sqrt(squares / np.maximum(expected, 1.0)))
     smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
+    smallest["size"] = min(1.0, n_y * min(map(float, stats.chi2.sf(squares, np.maximum(expected, 1.0)))))
+    above = any(r > RATIO for r in ratio) and smallest["size"] < SMALL_SAMPLE  # few poses scatter by more than the gate
     rejected = any(value < SURE for value in smallest.values()) and max(ratio, default=0.0) > NOTICED
-    return Adequacy(ratio, smallest, bool(max(ratio, default=0.0) <= RATIO and not rejected))
+    return Adequacy(ratio, smallest, not (above or rejected))
 
 
 def _spread(fitter: Fitter, fit: Fit, record: object) -> np.ndarray:

@@ -125,6 +125,8 @@ class _Sums:
     @property
     def separation(self) -> float:
         """Standard deviations that are left when J has taken what it can."""
+        if not (np.isfinite(self.N).all() and np.isfinite(self.g).all()):  # the motion left the numbers
+            return float("nan")
         d = np.sqrt(np.maximum(np.diag(self.N), 1e-300))
         taken = (self.g / d) @ np.linalg.pinv(self.N / np.outer(d, d), rcond=1e-12) @ (self.g / d)
         return float(np.sqrt(max(self.s - taken, 0.0)))

@@ -71,7 +71,7 @@ class Response:
         rows, symbols, parametric = ca.extract_parametric([following, y], m.p, {"extract_trivial": True})
         if ca.Function("work", [m.p], parametric).n_instructions() > WORTH:
             (following, y), c, value = rows, ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
-        constants = ca.Function("constants", [m.p], [value, ca.densify(ca.jacobian(value, m.p))])
+        constants = ca.Function("constants", [m.p], [value, ca.jacobian(value, m.p)])
         slopes = [ca.jacobian(a, b) for a in (following, y) for b in (S, c)]
         sample = ca.Function(
             "sample", [S, m.u, after.u_next, e, c], [following, y, *slopes], {"cse": True}
@@ -114,34 +114,34 @@ class Response:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings (n, n_y) and their derivatives (n, n_y, n_p + len(initial)) by `free`, then by what the record starts with."""
         constants, _ = self._kernel
-        c, by_p = (value.full() for value in constants(p))
+        c, by_p = constants(p)
         k, n_i, n_y, n = len(self.free), len(self.initial), len(self.channels), len(record.time)
         D_0 = np.zeros((self.n_s, k + n_i))
         D_0[list(self.initial), k + np.arange(n_i)] = 1.0
         begin = np.concatenate([self._start(record, p, start), D_0.ravel(order="F")])
-        values = self._sensitive(n, by_p)(begin, *self._inputs(record), np.tile(c, (1, n)))[1].full()
+        slow = (np.tile(np.reshape(v, (-1, 1)), (1, n)) for v in (c.full(), np.array(by_p.nonzeros())))
+        values = self._sensitive(n)(begin, *self._inputs(record), *slow)[1].full()
         slopes = values[n_y:].reshape(k + n_i, n_y, n)
         return values[:n_y].T, np.moveaxis(slopes, 2, 0).transpose(0, 2, 1)
 
-    def _sensitive(self, n: int, by_p: np.ndarray) -> ca.Function:
-        """The sample map with its derivatives carried along; where constants are plain parameters it is made once."""
-        plain = np.array_equal(by_p, np.eye(*by_p.shape))
-        if plain and ("sensitive", n) in self._runs:
-            return self._runs["sensitive", n]
-        k, n_i = len(self.free), len(self.initial)
-        seed = ca.horzcat(ca.sparsify(ca.DM(by_p)), ca.DM(by_p.shape[0], n_i))
-        symbol = ca.SX if plain else ca.MX  # expanded where it is made once, whole calls where it is made for each p
-        S, *others = (symbol.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols))  # an empty one has no name
-        D = symbol.sym("D", self.n_s, k + n_i)
-        following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
-        D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
-        one = ca.Function(
-            "one", [ca.vertcat(S, ca.vec(D)), *others], [ca.vertcat(following, ca.vec(D_next)), ca.vertcat(y, ca.vec(Y))]
-        )  # fmt: skip
-        run = one.mapaccum(n)
-        if plain:
-            self._runs["sensitive", n] = run
-        return run
+    def _sensitive(self, n: int) -> ca.Function:
+        """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
+        if ("sensitive", n) not in self._runs:
+            k, n_i = len(self.free), len(self.initial)
+            by_p = ca.SX.sym("by_p", self._kernel[0].sparsity_out(1))
+            seed = ca.horzcat(by_p, ca.SX(by_p.shape[0], n_i))
+            S, *others = (
+                ca.SX.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols)
+            )  # an empty one has no name
+            D = ca.SX.sym("D", self.n_s, k + n_i)
+            following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
+            D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
+            one = ca.Function(
+                "one", [ca.vertcat(S, ca.vec(D)), *others, ca.vertcat(ca.SX(0, 1), *by_p.nonzeros())],
+                [ca.vertcat(following, ca.vec(D_next)), ca.vertcat(y, ca.vec(Y))], {"cse": True},
+            )  # fmt: skip
+            self._runs["sensitive", n] = one.mapaccum(n)
+        return self._runs["sensitive", n]
 
     @cached_property
     def _runs(self) -> dict:

@@ -8,7 +8,7 @@ anywhere among all hypotheses, if it is material (a tenth of the noise), and if 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,8 @@ TRIALS = 6  # suspects fitted a round, and as many sets of each size; three time
 
 TRIAL_STEPS = 8
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
+ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
+REPLACEMENTS = 4  # rivals fitted for a cause
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
 
 
@@ -63,6 +65,8 @@ class Searcher:
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
         self.fitter, self.screen, self.step = fitter, screen, step
         self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
+        self.known: dict[frozenset, tuple[Trial, int]] = {}
+        self.screens: dict[frozenset, Screened] = {}
         self.trials = TRIALS * (3 if fitter.recording.kind == "poses" else 1)
 
     def trial(
@@ -73,18 +77,28 @@ class Searcher:
         theta: np.ndarray | None = None,
     ) -> Trial:
         """Fits one structure and judges it on the held-out records."""
+        key = frozenset(structure.causes)
+        known, done = self.known.get(key, (None, 0))
+        if known is not None and done >= steps:
+            return replace(known, cause=cause)
         fit = self.fitter.fit(structure, theta, steps)
+        if known is not None and known.fit.objective <= fit.objective:
+            self.known[key] = (known, steps)
+            return replace(known, cause=cause)
         held, _ = self.fitter.held_out(fit)
         price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
-        return Trial(fit, held, fit.objective + price + held, cause)
+        found = Trial(fit, held, fit.objective + price + held, cause)
+        self.known[key] = (found, steps)
+        return found
 
     def run(self, structure: Structure) -> Search:
         """Forward rounds until nothing more is justified, with swaps in between; then the rivals of each cause."""
         current = self._measured(self.trial(structure, steps=40))
         rounds: list[Round] = []
+        visited = {frozenset(structure.causes)}
         while True:
             self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
-            screened = self.screen.run(current.fit)
+            screened = self._screened(current)
             if len(current.fit.structure.causes) >= MOST_CAUSES:
                 break
             trials = self._try(current, self._conspicuous(screened))
@@ -93,8 +107,11 @@ class Searcher:
             better = [t for t in trials if self._justified(current, t)]
             if not better:
                 break
-            current = better[0]
-            current = self._measured(self._polished(self._prune(self._swap(self._polished(current)))))
+            current = self._prune(self._swap(self._polished(better[0])))
+            if frozenset(current.fit.structure.causes) in visited:
+                break
+            visited.add(frozenset(current.fit.structure.causes))
+            current = self._measured(self._polished(current))
         nominal = self.trial(structure, steps=40)
         rivals = tuple(self._rivals(current, k) for k in range(len(current.fit.structure.causes)))
         return Search(nominal, current, rivals, tuple(rounds), screened, self.fitter.held_out(current.fit)[1])
@@ -108,6 +125,8 @@ class Searcher:
         if self.fitter.noise.known.all():
             return trial
         self.fitter.learn_noise(trial.fit)
+        self.known.clear()
+        self.screens.clear()
         return self.trial(_cooled(trial.fit))
 
     def _need(self, screened: Screened) -> float:
@@ -121,7 +140,7 @@ class Searcher:
         chosen: list[Suspect] = []
         for s in loud:
             same = sum(c.hypothesis.effect == s.hypothesis.effect for c in chosen)
-            if s.z**2 >= CLOSE * loud[0].z ** 2 and same < 2 and len(chosen) < TRIALS:
+            if s.z**2 >= CLOSE * loud[0].z ** 2 and same < self.trials // 3 and len(chosen) < self.trials:
                 chosen.append(s)
         return chosen
 
@@ -175,7 +194,7 @@ class Searcher:
     def _swap(self, current: Trial) -> Trial:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
         for k in range(len(current.fit.structure.causes) - 1):
-            for rival in self._replacements(current, k)[:3]:
+            for rival in self._replacements(current, k):
                 if rival.total < current.total - RIVAL:
                     current = rival
         return current
@@ -183,9 +202,18 @@ class Searcher:
     def _replacements(self, current: Trial, k: int) -> list[Trial]:
         structure = current.fit.structure
         bare = self.trial(_cooled(current.fit).without(k))
-        screened = self.screen.run(bare.fit)
-        suspects = [s for s in self._conspicuous(screened) if s.hypothesis != structure.causes[k]]
-        return sorted(self._try(bare, suspects), key=lambda t: t.total)
+        screened = self._screened(bare)
+        gained = bare.fit.objective - current.fit.objective
+        able = [
+            s for s in self._conspicuous(screened) if s.z**2 > ABLE * gained and s.hypothesis != structure.causes[k]
+        ]
+        return sorted(self._try(bare, able[:REPLACEMENTS]), key=lambda t: t.total)
+
+    def _screened(self, trial: Trial) -> Screened:
+        key = frozenset(trial.fit.structure.causes)
+        if key not in self.screens:
+            self.screens[key] = self.screen.run(trial.fit)
+        return self.screens[key]
 
     def _prune(self, current: Trial) -> Trial:
         for k in reversed(range(len(current.fit.structure.causes))):
