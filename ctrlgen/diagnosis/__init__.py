@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.adequacy import judge
 from ctrlgen.diagnosis.diagnosis import Diagnosis, errors, findings, verdict
 from ctrlgen.diagnosis.evidence import evidence
 from ctrlgen.diagnosis.fit import Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses
+from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses, nominal_links
 from ctrlgen.diagnosis.noise import estimate
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher
@@ -49,7 +49,7 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
     fitter = Fitter(recording, noise)
     acting = set(movable(device))
     sample_times = {r.sample_time for r in recording.records}
-    links = device.links(device.values())
+    links = nominal_links(device)
     look_back = min(sample_times) if np.isfinite(min(sample_times)) else None
     ambient = any(r.ambient is not None for r in recording.records)
     open_ = [

@@ -16,6 +16,7 @@ import numpy as np
 
 from ctrlgen.devices import Links
 from ctrlgen.diagnosis.fit import START_SIZE, Fit, Fitter
+from ctrlgen.diagnosis.hypotheses import nominal_links
 from ctrlgen.diagnosis.probe import with_probes
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.effect import Place
@@ -87,7 +88,7 @@ def acts_at(links: Links) -> Place:
 
 def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
     """The linearisation of `fit` along `record`."""
-    links = fit.structure.device.links(fit.structure.device.values())
+    links = nominal_links(fit.structure.device)
     place = acts_at(links)
     response, p, chosen = _probed(fitter, fit, record, place)
     start = _start(fitter, fit, record)
@@ -116,7 +117,7 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
 def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Response, np.ndarray, list[int]]:
     """The response with probes, its parameters, and which of them are the probes at `place`."""
     known = [unknown.path for unknown in fit.structure.unknowns]
-    device, probes = with_probes(fit.structure.described)
+    device, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
     key = ("along", fit.structure.causes, record.sample_time, record.linear)
     if key not in fitter.cache:

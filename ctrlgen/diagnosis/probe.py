@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import casadi as ca
 
 from ctrlgen.chain import channels
-from ctrlgen.devices import Device
+from ctrlgen.devices import Device, Links
 from ctrlgen.effect import Effect, Param, Place
 from ctrlgen.units import Quantity
 
@@ -26,9 +26,8 @@ class _Probe(Effect, listed=False):
         return p.delta
 
 
-def with_probes(device: Device) -> tuple[Device, dict[tuple[Place, int], str]]:
+def with_probes(device: Device, links: Links) -> tuple[Device, dict[tuple[Place, int], str]]:
     """The device with a probe everywhere, and the path of each by place and channel."""
-    links = device.links(device.values())
     probes, paths = [], {}
     for place in Place:
         if place is Place.HEAT and links.heat_signal is None:

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links
 from ctrlgen.diagnosis.probe import with_probes
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.recording import Record
@@ -64,7 +64,7 @@ class Slopes:
     def __init__(self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis]) -> None:
         self.fitter, self.fit, self.record = fitter, fit, record
         device = fit.structure.described
-        probed, probes = with_probes(device)
+        probed, probes = with_probes(device, nominal_links(fit.structure.device))
         self.numbers = [h for h in hypotheses if h.effect == PARAMETER]
         known = [u.path for u in fit.structure.unknowns]
         self.probe_paths = list(probes.values())
@@ -89,7 +89,7 @@ class Slopes:
     def _laws(self, hypotheses: list[Hypothesis], device: object) -> tuple[list[Column], SimpleNamespace]:
         """Columns, and the terms' derivatives by amplitude as functions along the motion."""
         m, structure = self.response.model, self.fit.structure
-        links = device.links(device.values())
+        links = nominal_links(structure.device)
         columns, terms, states, rates, stepped, clocks, blocks = [], [], [], [], [], [], []
         for h in hypotheses:
             law, where = h.law, structure.place(h)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ctrlgen.chain import channels
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nuisances, numbers, written
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links, nuisances, numbers, written
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.effect import Param, Where
 from ctrlgen.model import movable
@@ -61,7 +61,7 @@ class Structure:
 
     def place(self, cause: Hypothesis) -> Where:
         """The channel at which a cause acts; the first one where it acts at all of them."""
-        where = channels(self.device.links(self.device.values()), cause.law.place)
+        where = channels(nominal_links(self.device), cause.law.place)
         here = where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
         return here if cause.of is None else here.beside(next(w for w in where if w.channel == cause.of))
 
