@@ -86,12 +86,15 @@ class Hooks:
 
 
 def exact_step(axis: Axis, h: float) -> tuple[float, ...]:
-    """(a11, a12, a21, a22, b1, b2) of (q, v)+ = A (q, v) + b F, force F held over `h`: expm of the companion matrix."""
-    M = np.zeros((3, 3))
+    """(a11, a12, a21, a22, b1, b2, r1, r2) of (q, v)+ = A (q, v) + b F + r (F_end - F_begin), F the force in the middle of
+    `h` and straight from begin to end: expm of the companion matrix with the force and its slope as states."""
+    M = np.zeros((4, 4))
     M[0, 1] = 1.0
-    M[1] = [-axis.stiffness / axis.mass, -axis.damping / axis.mass, 1 / axis.mass]
+    M[1, :3] = [-axis.stiffness / axis.mass, -axis.damping / axis.mass, 1 / axis.mass]
+    M[2, 3] = 1 / h
     E = expm(M * h)
-    return E[0, 0], E[0, 1], E[1, 0], E[1, 1], E[0, 2], E[1, 2]
+    held, ramp = E[:2, 2], E[:2, 3]  # by the force at the beginning, and by its rise
+    return E[0, 0], E[0, 1], E[1, 0], E[1, 1], held[0], held[1], ramp[0] - held[0] / 2, ramp[1] - held[1] / 2
 
 
 def fine_drive(drive: Array, linear: bool) -> Array:
@@ -101,6 +104,13 @@ def fine_drive(drive: Array, linear: bool) -> Array:
     middle = (np.arange(SUBSTEPS) + 0.5) / SUBSTEPS
     following = np.append(drive[1:], drive[-1])
     return (drive[:, None] + (following - drive)[:, None] * middle).ravel()
+
+
+def fine_rise(drive: Array, linear: bool) -> Array:
+    """How much the command rises within every integration step, (n * SUBSTEPS,)."""
+    if not linear:
+        return np.zeros(len(drive) * SUBSTEPS)
+    return np.repeat(np.diff(drive, append=drive[-1:]) / SUBSTEPS, SUBSTEPS)
 
 
 @dataclass(frozen=True)
@@ -117,20 +127,27 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
          linear: bool = False) -> Motion:  # fmt: skip
     """Motion from rest under `drive` [V], or under a reference [m] where the axis has a loop."""
     h = (scene or Scene(axis)).step
-    a11, a12, a21, a22, b1, b2 = exact_step(axis, h)
+    a11, a12, a21, a22, b1, b2, r1, r2 = exact_step(axis, h)
     m, c, k, k_f, limit, loop = (
         axis.mass, axis.damping, axis.stiffness, axis.force_constant, axis.drive_limit, axis.loop,
     )  # fmt: skip
     on_drive = [x.drive for x in hooks if x.drive]
     on_force = [x.force for x in hooks if x.force]
-    q = v = summed = 0.0
+    q = v = summed = F_extra = 0.0
     t, half, F = start, h / 2, 0.0
     qs, vs, us = [], [], []
-    for u in fine_drive(np.asarray(drive, dtype=float), linear).tolist():
-        if loop is not None:
-            error = u - q
+    given = np.asarray(drive, dtype=float)
+    rises = fine_rise(given, linear).tolist() if loop is None else [0.0] * (len(given) * SUBSTEPS)
+    for u, rise in zip(fine_drive(given, linear).tolist(), rises, strict=True):
+        if loop is not None:  # the amplifier follows within the step: what it asks for in the middle of it
+            r, q_mid, v_mid = u, q + half * v, v
+            for _ in range(2):
+                error = r - q_mid
+                u = loop.velocity_gain * (loop.position_gain * error - v_mid) + loop.integral_gain * (summed + half * error)
+                u = min(max(u, -limit), limit)
+                v_mid = v + half * (k_f * u + F_extra - c * v_mid - k * q_mid) / m
+                q_mid = q + half * (v + v_mid) / 2
             summed += error * h
-            u = loop.velocity_gain * (loop.position_gain * error - v) + loop.integral_gain * summed
         u = min(max(u, -limit), limit)
         for law in on_drive:
             u = law(t + half, u)
@@ -141,7 +158,9 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
             q_mid = q + half * v
             for law in on_force:
                 F += law(t + half, q_mid, v_mid)
-        q, v = a11 * q + a12 * v + b1 * F, a21 * q + a22 * v + b2 * F
+            F_extra = F - k_f * u
+        dF = k_f * rise
+        q, v = a11 * q + a12 * v + b1 * F + r1 * dF, a21 * q + a22 * v + b2 * F + r2 * dF
         t += h
     return Motion(start + h * np.arange(len(qs)), np.array(qs), np.array(vs), np.array(us))
 

@@ -88,6 +88,8 @@ class Chain:
             s.state = None if self.links.state is None else self.links.state.expr[i]
             s.rest = None if self.links.state is None else self.links.rest[i]
             s.force = self.resisting[i]
+        known = place in (Place.POSE, Place.SENSOR) and self.v.numel() and not self.links.imposed
+        s.rate = ca.jtimes(s.value, self.z, self.v) if known else None
         where = channels(self.links, place)[s.index]
         s.scale, s.travel = where.scale, where.travel_scale
         return s

@@ -116,12 +116,12 @@ class Effect:
     """Base of every effect: one subclass per file in `ctrlgen/effects/`.
 
     `term(s, p)` is the contribution, in the unit of the place. `s` gives `value` (the signal at this place and
-    channel before any effect), `all` (the same for every channel, a vector), `index` (of this channel), `scale` and
-    `travel` (typical sizes of the signal and of the stage displacement), the effect's own states, `ambient` (rise of
-    the surroundings [K]), `sample_time` [s] where it is needed and, for axis channels, `displacement` (and
-    `displacements` of all axes), `velocity` (None for a device without inertia), `force` (that the stage takes at
-    this displacement) and the actuator's `state`, such as its temperature, with its `rest`. `p` gives the parameters
-    in SI.
+    channel before any effect), its `rate` [1/s] (None where the motion does not give it), `all` (the same for every
+    channel, a vector), `index` (of this channel), `scale` and `travel` (typical sizes of the signal and of the stage
+    displacement), the effect's own states, `ambient` (rise of the surroundings [K]), `sample_time` [s] where it is
+    needed and, for axis channels, `displacement` (and `displacements` of all axes), `velocity` (None for a device
+    without inertia), `force` (that the stage takes at this displacement) and the actuator's `state`, such as its
+    temperature, with its `rest`. `p` gives the parameters in SI.
 
     An effect of `pairs` couples two channels: `partner` is the index of the other one; a `mutual` one acts on both.
     `channel_unit` and `partner_unit` restrict it to channels of that dimension (`channel`: that of its own).

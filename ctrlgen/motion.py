@@ -17,6 +17,7 @@ from ctrlgen.model import Model
 SUBSTEP = 0.8  # of the fastest nominal eigenvalue, per step; what is not linear is then right to 1e-3 of itself
 FASTEST = 5.0  # eigenvalue times sample time beyond which a lag is over within a sample, and exact
 MOST_SUBSTEPS = 16
+SETTLED = 14.0  # time constants: e^-14 is a millionth
 
 
 class Sample(NamedTuple):
@@ -125,6 +126,19 @@ def _home_slope(model: Model) -> np.ndarray:
     at = ca.Function("A", [state, model.u, model.p, model.ambient_symbol], [A])
     here = np.concatenate([model.rest, 1e-3 * model.z_scale])
     return at(here, 0, model.p_nominal, 0).full()
+
+
+def settling_time(model: Model) -> float:
+    """How long [s] the actuators and the stage itself go on after a change of drive, to a millionth of it."""
+    if model.inertial:
+        slow = np.abs(np.linalg.eigvals(_home_slope(model)).real)
+    else:
+        A = ca.Function(
+            "A", [model.x, model.z, model.u, model.p, model.ambient_symbol], [ca.jacobian(model.rates, model.x)]
+        )
+        slow = np.abs(np.diag(A(model.rest, 1e-3 * model.z_scale, 0, model.p_nominal, 0).full())[: model.n_states])
+    slow = slow[slow > 1e-6]
+    return float(SETTLED / slow.min()) if slow.size else 0.0
 
 
 def substeps(A: np.ndarray, sample_time: float) -> int:

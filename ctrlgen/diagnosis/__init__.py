@@ -23,10 +23,12 @@ from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.errors import Fault, InputError
-from ctrlgen.model import movable
+from ctrlgen.model import build_model, movable
+from ctrlgen.motion import settling_time
 from ctrlgen.recording import Recording
 
 Progress = Callable[[str], None]
+SOME_TIME = 1e-3  # s: effects that look back by samples do not change how long a device settles
 
 
 def diagnose(device: Device, recording: Recording, seed: int = 0, progress: Progress | None = None) -> Diagnosis:
@@ -45,8 +47,9 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
     if missing:
         raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
     step("noise")
-    noise = estimate(recording)
+    noise = estimate(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
     fitter = Fitter(recording, noise)
+    spikes = fitter.mark_spikes(fitter.fit(Structure(device)))
     acting = set(movable(device))
     sample_times = {r.sample_time for r in recording.records}
     links = nominal_links(device)
@@ -59,8 +62,8 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
     step(f"refit of the device as described, {len(open_)} hypotheses")
     found = Searcher(fitter, Screen(fitter, open_, seed), step).run(Structure(device))
     step("judging")
-    before, after = judge(fitter, found.nominal.fit), judge(fitter, found.chosen.fit)
-    said = verdict(found, before, after, bool(noise.known.all()))
+    after = judge(fitter, found.chosen.fit)
+    said = verdict(found, after, bool(noise.known.all()))
     step("evidence")
     beside = evidence(fitter, found, after.passed, seed)
     return Diagnosis(
@@ -73,10 +76,10 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
         detectable=beside.detectable,
         next_experiment=beside.next_experiment,
         history=beside.history,
-        notes=(*recording.notes, *noise.said),
+        notes=(*recording.notes, *noise.said, *([spikes] if spikes else [])),
         device=device,
         next_device=found.chosen.fit.structure.described,
-        recording=recording,
+        recording=fitter.recording,
         search=found,
         fitter=fitter,
         extra=beside.extra,

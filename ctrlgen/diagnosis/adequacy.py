@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.fit import Fit, Fitter
 RATIO = 1.10  # held-out error over what is expected: the gate of the design
 SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
 NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
+SIGMAS = 2.6  # standard deviations of the noise's own estimate that are granted
 SMALL_SAMPLE = 0.001  # p of so large an error by chance, above which the gate's ratio says nothing
 LAGS = 20
 
@@ -53,9 +54,11 @@ def judge(fitter: Fitter, fit: Fit) -> Adequacy:
                     p["drive"].append(cross_correlation(e, record.drive[usable[:, i]]))
     ratio = tuple(np.sqrt(squares / np.maximum(expected, 1.0)))
     smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
-    smallest["size"] = min(1.0, n_y * min(map(float, stats.chi2.sf(squares, np.maximum(expected, 1.0)))))
-    above = any(r > RATIO for r in ratio) and smallest["size"] < SMALL_SAMPLE  # few poses scatter by more than the gate
     rejected = any(value < SURE for value in smallest.values()) and max(ratio, default=0.0) > NOTICED
+    doubt = 1 + SIGMAS / np.sqrt(2 * np.maximum(fitter.noise.count, 1.0))  # the noise itself is known no better
+    chance = min(1.0, n_y * min(map(float, stats.chi2.sf(squares / doubt**2, np.maximum(expected, 1.0)))))
+    smallest["size"] = chance
+    above = any(r > RATIO * d for r, d in zip(ratio, doubt, strict=True)) and chance < SMALL_SAMPLE
     return Adequacy(ratio, smallest, not (above or rejected))
 
 

@@ -15,8 +15,6 @@ from ctrlgen.diagnosis.search import Search
 from ctrlgen.recording import Recording
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
-LITTLE_LEFT = 0.1  # of the excess over the floor (in squares): more than that is not even partly explained
-NEAR = 1.5  # held-out error over the floor up to which a mismatch counts as partly explained
 CI = 1.959964  # standard deviations of a 95 % interval
 
 
@@ -74,15 +72,16 @@ class Diagnosis:
     extra: dict[str, Any] = field(default_factory=dict)
 
 
-def verdict(search: Search, before: Adequacy, after: Adequacy, known: bool) -> str:
-    """consistent | explained | partly | ambiguous | unexplained."""
+def verdict(search: Search, after: Adequacy, known: bool) -> str:
+    """consistent | explained | partly | ambiguous | unexplained.
+
+    Partly: causes are found, but nothing tells the noise, so that nobody can say whether all is explained.
+    """
     found = search.chosen.fit.structure.causes
     if not known:
         return (AMBIGUOUS if any(search.rivals) else PARTLY) if found else CONSISTENT
     if not after.passed:
-        excess = [max(r**2 - 1, 0.0) for r in (before.worst, after.worst)]
-        near = found and after.worst <= NEAR and excess[1] <= LITTLE_LEFT * excess[0]
-        return PARTLY if near else UNEXPLAINED
+        return UNEXPLAINED
     if not found:
         return CONSISTENT
     return AMBIGUOUS if any(search.rivals) else EXPLAINED

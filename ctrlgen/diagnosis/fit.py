@@ -6,10 +6,11 @@ within what is stated of them. Every parameter of every cause is fitted jointly 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from ctrlgen.diagnosis.noise import Noise
 from ctrlgen.diagnosis.structure import Structure
@@ -17,6 +18,8 @@ from ctrlgen.recording import Record, Recording
 
 STEPS = 40
 NEGLIGIBLE = 0.01
+SPIKE = 7.0
+MOST_SPIKES = 0.01
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
@@ -74,6 +77,27 @@ class Fitter:
         begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)])
         return problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
 
+    def mark_spikes(self, fit: Fit) -> str:
+        """Marks as not valid what stands out alone, for one or two samples, from what `fit` leaves over; says how many.
+
+        A mechanism cannot jump there and back within two samples, so this takes no physics away.
+        """
+        if self.recording.kind == "poses":
+            return ""
+        records, count = [], 0
+        for record in self.recording.records:
+            if record.role == "rest":
+                records.append(record)
+                continue
+            left = np.where(record.valid, record.observed - self.predicted(fit, record), 0.0)
+            spikes = record.valid & _alone(np.nan_to_num(left))
+            count += int(spikes.sum())
+            records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
+        self.recording = replace(self.recording, records=tuple(records))
+        self.to_fit = [r for r in records if r.role == "fit"]
+        self.held = [r for r in records if r.role == "hold_out"]
+        return f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
+
     def learn_noise(self, fit: Fit) -> None:
         """Where nothing but the misfit tells the noise: what `fit` leaves over, alike for all channels of one unit."""
         channels = self.recording.channels
@@ -87,7 +111,7 @@ class Fitter:
         for i in np.flatnonzero(~self.noise.known):
             alike = [k for k in range(len(channels)) if self.recording.units[k] == self.recording.units[i]]
             sd[i] = np.sqrt(squares[alike].sum() / (count[alike].sum() * (1 - used)))
-        self.noise = Noise(sd, self.noise.ar, self.noise.known, self.noise.said)
+        self.noise = replace(self.noise, sd=sd)
 
     def predicted(self, fit: Fit, record: Record) -> np.ndarray:
         """Readings (n, n_y) of a fitted structure on any record, started as the record itself says best."""
@@ -115,6 +139,17 @@ class Fitter:
         """Whitened sum of squares on the held-out records, and the number of usable samples."""
         total = sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)
         return total, int(sum(self.noise.usable(r.valid).sum() for r in self.held))
+
+
+def _alone(left: np.ndarray) -> np.ndarray:
+    """Samples (n, n_y) more than `SPIKE` robust deviations from the median of their neighbours; never over one percent."""
+    rough = left - median_filter(left, size=(7, 1), mode="nearest")
+    near = SPIKE * np.maximum(
+        1.4826 * np.median(np.abs(rough), axis=0), median_filter(np.abs(rough), size=(51, 1)) * 1.4826
+    )
+    found = np.abs(rough) > near
+    found[:, found.mean(axis=0) > MOST_SPIKES] = False
+    return found
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

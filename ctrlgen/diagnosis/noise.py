@@ -10,24 +10,26 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import detrend, lfilter
+from scipy.signal import lfilter
 
 from ctrlgen.recording import Record, Recording
 
 LONGEST_ORDER = 8
 SHORTEST_REST = 200  # samples; an AR model of order 8 needs some 25 a coefficient
-SETTLING_SHARE = 0.5  # of a dwell, left out
+DWELL_DEGREE = 4  # of the polynomial taken out of a dwell: creep and lags go on in it
+ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
 @dataclass(frozen=True)
 class Noise:
     """Per channel: innovation `sd` [SI], AR coefficients, and a sentence on where they come from; `known` False where
-    nothing but the misfit can tell."""
+    nothing but the misfit can tell; `count` independent samples that the estimate rests on (inf where it was stated)."""
 
     sd: np.ndarray
     ar: tuple[np.ndarray, ...]
     known: np.ndarray
     said: tuple[str, ...]
+    count: np.ndarray
 
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
         """`values` (n, n_y, ...) filtered to unit white noise; zero where a sample or one that it leans on is not `valid`."""
@@ -59,47 +61,53 @@ class Noise:
 
     def scaled(self, factor: np.ndarray) -> Noise:
         """The same colour with other deviations."""
-        return Noise(self.sd * factor, self.ar, self.known, self.said)
+        return Noise(self.sd * factor, self.ar, self.known, self.said, self.count)
 
 
-def estimate(recording: Recording) -> Noise:
-    """The noise of each observed channel."""
-    rows = [_channel(recording, i) for i in range(len(recording.channels))]
-    return Noise(
-        np.array([r[0] for r in rows]), tuple(r[1] for r in rows), np.array([r[2] for r in rows]), tuple(r[3] for r in rows)
-    )  # fmt: skip
+def estimate(recording: Recording, settling: float = 0.0) -> Noise:
+    """The noise of each observed channel. `settling` [s]: how long the device itself goes on after a change of drive."""
+    rows = [_channel(recording, i, settling) for i in range(len(recording.channels))]
+    sd, ar, known, said, count = zip(*rows, strict=True)
+    return Noise(np.array(sd), ar, np.array(known), said, np.array(count))
 
 
-def _channel(recording: Recording, i: int) -> tuple[float, np.ndarray, bool, str]:
+def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.ndarray, bool, str, float]:
     name, stated = recording.channels[i], recording.noise[i]
+    none = np.zeros(0)
     if recording.kind == "poses":
         if stated:
-            return stated, np.zeros(0), True, f"{name}: as stated"
-        return 1.0, np.zeros(0), False, f"{name}: not stated and no pose repeats; taken from what the best model leaves"
+            return stated, none, True, f"{name}: as stated", np.inf
+        return (
+            1.0,
+            none,
+            False,
+            f"{name}: not stated and no pose repeats; taken from what the best model leaves",
+            np.inf,
+        )
+    moving = [r for r in recording.records if r.role != "rest"]
     samples = {
-        "a record at rest": [_valid(r.observed[:, i], r.valid[:, i]) for r in recording.records if r.role == "rest"],
-        "repeated periods": [e for r in recording.records if r.role != "rest" for e in _repeats(r, i)],
-        "dwells of the drive": [e for r in recording.records if r.role != "rest" for e in _dwells(r, i)],
+        "a record at rest": (1, [r.observed[r.valid[:, i], i] for r in recording.records if r.role == "rest"]),
+        "repeated periods": (1, [e for r in moving for e in _repeats(r, i)]),
+        "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
     }
-    for source, parts in samples.items():
-        parts = [detrend(part) for part in parts if len(part) >= SHORTEST_REST]
+    for source, (degree, parts) in samples.items():
+        parts = [_flat(part, degree) for part in parts if len(part) >= SHORTEST_REST]
         if parts:
             sd, a = _autoregression(parts)
-            return sd, a, True, f"{name}: from {source}, autoregressive of order {len(a)}"
+            n = sum(map(len, parts))
+            return sd, a, True, f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}", float(n)
     if stated:
-        return stated, np.zeros(0), True, f"{name}: as stated, taken as white"
-    parts = [np.diff(_valid(r.observed[:, i], r.valid[:, i]), 3) for r in recording.records]
+        return stated, none, True, f"{name}: as stated, taken as white", np.inf
+    parts = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
     sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), 1e-300)  # 1 + 9 + 9 + 1: variance of third differences
-    return (
-        sd,
-        np.zeros(0),
-        True,
-        f"{name}: from the fastest part of the readings, taken as white; record some rest to know it",
-    )
+    said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
+    return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST
 
 
-def _valid(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    return values[valid]
+def _flat(part: np.ndarray, degree: int) -> np.ndarray:
+    """Without its slow part, a polynomial: what still settles is no noise."""
+    t = np.linspace(-1, 1, len(part))
+    return part - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, part, degree))
 
 
 def _robust(values: np.ndarray) -> float:
@@ -134,17 +142,13 @@ def _repeats(record: Record, i: int) -> list[np.ndarray]:
     return [d[np.isfinite(d)] for d in differences]
 
 
-def _dwells(record: Record, i: int) -> list[np.ndarray]:
-    """Readings while the drive stood still, without the time it took to settle."""
+def _dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
+    """Readings while the drive stood still, after the device has settled."""
     moved = np.any(np.diff(record.drive, axis=0) != 0, axis=1)
     edges = np.flatnonzero(np.concatenate([[True], moved, [True]]))
-    found = []
-    for a, b in pairwise(edges):
-        start = a + int(SETTLING_SHARE * (b - a))
-        part = _valid(record.observed[start:b, i], record.valid[start:b, i])
-        if len(part) >= SHORTEST_REST:
-            found.append(part)
-    return found
+    wait = int(np.ceil(settling / record.sample_time))
+    dwells = ((a + wait, b) for a, b in pairwise(edges) if b - a - wait >= SHORTEST_REST)
+    return [record.observed[a:b, i][record.valid[a:b, i]] for a, b in dwells]
 
 
 def _autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:

@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.slopes import Column, Slopes, Sums
 from ctrlgen.diagnosis.together import Suspect, Together
 
-OWN_LEFT = 1e-5  # of |s|^2: below, the hypothesis cannot be told from what is free already
+OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
 NULLS = 2000  # simulated records without mismatch
 
 

@@ -18,7 +18,10 @@ from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
-MOST_CAUSES = 12
+MOST_CAUSES = {"poses": 12, "series": 5}
+WORTHWHILE = (
+    0.05  # of the held-out excess over the noise that a further cause must take away: patches of a wrong law do not
+)
 TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
 
 TRIAL_STEPS = 8
@@ -65,6 +68,7 @@ class Searcher:
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
         self.fitter, self.screen, self.step = fitter, screen, step
         self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
+        self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
         self.known: dict[frozenset, tuple[Trial, int]] = {}
         self.screens: dict[frozenset, Screened] = {}
         self.trials = TRIALS * (3 if fitter.recording.kind == "poses" else 1)
@@ -99,7 +103,7 @@ class Searcher:
         while True:
             self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
             screened = self._screened(current)
-            if len(current.fit.structure.causes) >= MOST_CAUSES:
+            if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind]:
                 break
             trials = self._try(current, self._conspicuous(screened))
             trials = tuple(sorted((*trials, *self._together(current, screened, trials)), key=lambda t: t.total))
@@ -188,8 +192,16 @@ class Searcher:
     def _justified(self, before: Trial, after: Trial) -> bool:
         gained = before.fit.objective - after.fit.objective
         added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
-        needed = max(MATERIAL**2 * self.n_fit, 12.0 + added * np.log(max(self.n_fit, 2)))
-        return gained > needed and before.held - after.held > 2.0 and self._meant(after)
+        needed = 12.0 + added * np.log(max(self.n_fit, 2))
+        if gained <= needed or not self._meant(after):
+            return False
+        if (
+            before.fit.penalty - after.fit.penalty > 0.5 * gained
+        ):  # the device's numbers had to hide it: that shows nowhere else
+            return before.held - after.held > -4.0
+        excess = max(before.held - self.n_held, 0.0)
+        worth = max(2.0, WORTHWHILE * excess)
+        return gained > MATERIAL**2 * self.n_fit and before.held - after.held > worth
 
     def _swap(self, current: Trial) -> Trial:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
