@@ -133,21 +133,17 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
     )  # fmt: skip
     on_drive = [x.drive for x in hooks if x.drive]
     on_force = [x.force for x in hooks if x.force]
-    q = v = summed = F_extra = 0.0
+    q = v = summed = asked = 0.0
     t, half, F = start, h / 2, 0.0
     qs, vs, us = [], [], []
     given = np.asarray(drive, dtype=float)
     rises = fine_rise(given, linear).tolist() if loop is None else [0.0] * (len(given) * SUBSTEPS)
-    for u, rise in zip(fine_drive(given, linear).tolist(), rises, strict=True):
-        if loop is not None:  # the amplifier follows within the step: what it asks for in the middle of it
-            r, q_mid, v_mid = u, q + half * v, v
-            for _ in range(2):
-                error = r - q_mid
-                u = loop.velocity_gain * (loop.position_gain * error - v_mid) + loop.integral_gain * (summed + half * error)
-                u = min(max(u, -limit), limit)
-                v_mid = v + half * (k_f * u + F_extra - c * v_mid - k * q_mid) / m
-                q_mid = q + half * (v + v_mid) / 2
-            summed += error * h
+    for count, (u, rise) in enumerate(zip(fine_drive(given, linear).tolist(), rises, strict=True)):
+        if loop is not None:
+            if count % SUBSTEPS == 0:  # a digital controller: computed at the sample, held until the next
+                asked = loop.velocity_gain * (loop.position_gain * (u - q) - v) + loop.integral_gain * summed
+            summed += (u - q) * h
+            u = asked
         u = min(max(u, -limit), limit)
         for law in on_drive:
             u = law(t + half, u)
@@ -158,7 +154,6 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
             q_mid = q + half * v
             for law in on_force:
                 F += law(t + half, q_mid, v_mid)
-            F_extra = F - k_f * u
         dF = k_f * rise
         q, v = a11 * q + a12 * v + b1 * F + r1 * dF, a21 * q + a22 * v + b2 * F + r2 * dF
         t += h

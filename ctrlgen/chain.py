@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -32,6 +32,7 @@ class Chain:
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
+        self.held = self.held_value = ca.SX(0, 1)
         self.members: list[_Member] = []
         self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
@@ -107,6 +108,14 @@ class Chain:
         memory_rates = ca.vertcat(ca.SX(0, 1), *(m.rates[s.name] for m, s, _ in memories))
         acceleration = balance / ca.vertcat(*links.mass) if links.mass else ca.SX(0, 1)
         first = x.numel()
+        rates = ca.vertcat(links.rates(x, arriving), memory_rates, acceleration)
+        following = {first + k: m.stepped[s.name] for k, (m, s, _) in enumerate(memories) if s.stepped}
+        sampled = ca.substitute(rates, heat, produced)
+
+        def closed(expr: ca.SX) -> ca.SX:
+            return ca.substitute(ca.SX(expr), self.held, self.held_value)
+
+        signals = {role: replace(signal, expr=closed(signal.expr)) for role, signal in signals.items()}
         return dict(
             name=self.device.name,
             device=self.device,
@@ -118,7 +127,10 @@ class Chain:
             p=p,
             p_nominal=p_nominal,
             ambient=self.ambient,
-            stepped={first + k: m.stepped[s.name] for k, (m, s, _) in enumerate(memories) if s.stepped},
+            stepped={i: closed(value) for i, value in following.items()},
+            held=self.held,
+            held_value=self.held_value,
+            sampled_rates=sampled,
             clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
             x_names=(
                 *(() if state is None else (f"{state.name}_{axis}" for axis in links.axes)),
@@ -134,9 +146,9 @@ class Chain:
                 )
             ),
             heat=heat,
-            heat_of_drive=produced,
-            rates_of_heat=ca.vertcat(links.rates(x, arriving), memory_rates, acceleration),
-            balance=balance,
+            heat_of_drive=closed(produced),
+            rates_of_heat=closed(rates),
+            balance=closed(balance),
             signals=signals,
             force_parts=links.resistance_parts(z),
             limits=tuple(
@@ -173,7 +185,9 @@ class Chain:
         reading = self._with_terms(Place.SENSOR, pose)
         u = links.drive.expr
         command = links.feedback(u, reading, self.v, x) if links.feedback else u
-        drive = self._with_terms(Place.DRIVE, command)
+        if links.feedback:  # computed at every sample and held until the next
+            self.held, self.held_value = ca.SX.sym("held", n), command
+        drive = self._with_terms(Place.DRIVE, self.held if links.feedback else u)
         produced = u - reading if links.feedback else links.heat(drive)
         heat = ca.SX.sym("heat", n)  # an unknown of its own, so that the inverse need not take squares apart
         arriving = self._with_terms(Place.HEAT, heat)

@@ -87,7 +87,8 @@ def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) ->
     S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430, eqs. (26)-(29).
     """
     state = ca.vertcat(model.x, model.z)
-    f = ca.Function("f", [state, model.u, model.p, model.ambient_symbol], [ca.vertcat(model.rates, model.v)])
+    given = [state, model.held, model.u, model.p, model.ambient_symbol]
+    f = ca.Function("f", given, [ca.vertcat(model.sampled_rates, model.v)])
     A = _home_slope(model)
     count = substeps(A, sample_time)
     h, y = sample_time / count, state
@@ -103,7 +104,7 @@ def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) ->
 
     def N(y: ca.SX, share: float) -> ca.SX:
         u = model.u + share * (u_next - model.u) if linear else model.u
-        return f(y, u, model.p, model.ambient_symbol) - A @ y
+        return f(y, model.held_value, u, model.p, model.ambient_symbol) - A @ y
 
     for k in range(count):
         first = N(y, k / count)
@@ -120,18 +121,23 @@ def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) ->
 
 
 def _home_slope(model: Model) -> np.ndarray:
-    """df/dy of the nominal model near home, where a law with a corner at home is on one side of it."""
+    """df/dy of the nominal model near home, the drive held, where a law with a corner at home is on one side of it."""
     state = ca.vertcat(model.x, model.z)
-    A = ca.jacobian(ca.vertcat(model.rates, model.v), state)
-    at = ca.Function("A", [state, model.u, model.p, model.ambient_symbol], [A])
+    A = ca.jacobian(ca.vertcat(model.sampled_rates, model.v), state)
+    at = ca.Function("A", [state, model.held, model.u, model.p, model.ambient_symbol], [A])
     here = np.concatenate([model.rest, 1e-3 * model.z_scale])
-    return at(here, 0, model.p_nominal, 0).full()
+    return at(here, 0, 0, model.p_nominal, 0).full()
 
 
 def settling_time(model: Model) -> float:
     """How long [s] the actuators and the stage itself go on after a change of drive, to a millionth of it."""
     if model.inertial:
-        slow = np.abs(np.linalg.eigvals(_home_slope(model)).real)
+        state = ca.vertcat(model.x, model.z)
+        A = ca.Function(
+            "A", [state, model.u, model.p, model.ambient_symbol], [ca.jacobian(ca.vertcat(model.rates, model.v), state)]
+        )  # fmt: skip
+        here = np.concatenate([model.rest, 1e-3 * model.z_scale])
+        slow = np.abs(np.linalg.eigvals(A(here, 0, model.p_nominal, 0).full()).real)
     else:
         A = ca.Function(
             "A", [model.x, model.z, model.u, model.p, model.ambient_symbol], [ca.jacobian(model.rates, model.x)]

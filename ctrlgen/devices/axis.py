@@ -36,7 +36,10 @@ class Actuator(Section):
 
 
 class Loop(Section):
-    """The position controller, u = k_p k_v (r - y) - k_v q' + k_i int(r - y) dt, clipped at the drive limit."""
+    """The position controller, u = k_p k_v (r - y) - k_v q' + k_i int(r - y) dt, clipped at the drive limit.
+
+    Computed at every sample and held until the next, as a digital controller does.
+    """
 
     domain: ClassVar[str] = "actuator"
     tolerance: ClassVar[float | None] = 0.0

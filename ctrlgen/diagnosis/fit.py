@@ -12,12 +12,13 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import median_filter
 
-from ctrlgen.diagnosis.noise import Noise
+from ctrlgen.diagnosis.noise import Noise, autoregression
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.recording import Record, Recording
 
 STEPS = 40
 NEGLIGIBLE = 0.01
+LITTLE = 1.3  # times the noise: what leaves more is not noise
 SPIKE = 7.0
 MOST_SPIKES = 0.01
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
@@ -97,6 +98,23 @@ class Fitter:
         self.to_fit = [r for r in records if r.role == "fit"]
         self.held = [r for r in records if r.role == "hold_out"]
         return f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
+
+    def learn_colour(self, fit: Fit) -> bool:
+        """Where the noise was known from fewer samples than these: the colour of what `fit` leaves, if it leaves little.
+
+        Its size is not let grow beyond what the first estimate allows.
+        """
+        if self.recording.kind == "poses":
+            return False
+        sd, ar, floor = self.noise.sd.copy(), list(self.noise.ar), self.noise.floor
+        for i in np.flatnonzero(self.noise.count < sum(len(r.time) for r in self.to_fit)):
+            parts = [(r.observed - self.predicted(fit, r))[r.valid[:, i], i] for r in self.to_fit]
+            left = np.sqrt(np.mean(np.concatenate(parts) ** 2))
+            if left < LITTLE * floor[i]:
+                sd[i], ar[i] = autoregression(parts)
+                sd[i] *= min(1.0, floor[i] * (1 + 2.6 / np.sqrt(2 * self.noise.count[i])) / left)
+        self.noise = replace(self.noise, sd=sd, ar=tuple(ar))
+        return True
 
     def learn_noise(self, fit: Fit) -> None:
         """Where nothing but the misfit tells the noise: what `fit` leaves over, alike for all channels of one unit."""

@@ -17,6 +17,9 @@ from ctrlgen.recording import Record, Recording
 LONGEST_ORDER = 8
 SHORTEST_REST = 200  # samples; an AR model of order 8 needs some 25 a coefficient
 DWELL_DEGREE = 4  # of the polynomial taken out of a dwell: creep and lags go on in it
+STATED = 1000.0  # samples that a stated deviation is worth
+LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
+OFTEN = 0.2  # distinct values a sample, below which a reading is seen to be in steps
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
@@ -59,10 +62,6 @@ class Noise:
         shapes = [lfilter([1.0], np.concatenate([[1.0], -a]), impulse) for a in self.ar]
         return np.array([sd * np.sqrt(np.sum(s**2)) for sd, s in zip(self.sd, shapes, strict=True)])
 
-    def scaled(self, factor: np.ndarray) -> Noise:
-        """The same colour with other deviations."""
-        return Noise(self.sd * factor, self.ar, self.known, self.said, self.count)
-
 
 def estimate(recording: Recording, settling: float = 0.0) -> Noise:
     """The noise of each observed channel. `settling` [s]: how long the device itself goes on after a change of drive."""
@@ -91,15 +90,18 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
     }
     for source, (degree, parts) in samples.items():
-        parts = [_flat(part, degree) for part in parts if len(part) >= SHORTEST_REST]
+        parts = _quiet([_flat(part, degree) for part in parts if len(part) >= SHORTEST_REST])
         if parts:
-            sd, a = _autoregression(parts)
+            sd, a = autoregression(parts)
+            sd = max(sd, _step_of(recording, i) / np.sqrt(12.0))
             n = sum(map(len, parts))
             return sd, a, True, f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}", float(n)
     if stated:
-        return stated, none, True, f"{name}: as stated, taken as white", np.inf
+        return stated, none, True, f"{name}: as stated, taken as white", STATED
     parts = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
-    sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), 1e-300)  # 1 + 9 + 9 + 1: variance of third differences
+    sd = max(
+        _robust(np.concatenate(parts)) / np.sqrt(20.0), _step_of(recording, i) / np.sqrt(12.0), 1e-300
+    )  # 1 + 9 + 9 + 1: variance of third differences
     said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
     return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST
 
@@ -108,6 +110,19 @@ def _flat(part: np.ndarray, degree: int) -> np.ndarray:
     """Without its slow part, a polynomial: what still settles is no noise."""
     t = np.linspace(-1, 1, len(part))
     return part - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, part, degree))
+
+
+def _quiet(parts: list[np.ndarray]) -> list[np.ndarray]:
+    """Without the parts in which something happened."""
+    power = [float(np.var(part)) for part in parts]
+    return [part for part, p in zip(parts, power, strict=True) if p <= LOUD * np.median(power)]
+
+
+def _step_of(recording: Recording, i: int) -> float:
+    """The quantum of a reading, where values repeat so often that one is seen; else zero."""
+    values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
+    distinct = np.unique(values)
+    return float(np.diff(distinct).min()) if 1 < len(distinct) < OFTEN * len(values) else 0.0
 
 
 def _robust(values: np.ndarray) -> float:
@@ -151,7 +166,7 @@ def _dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
     return [record.observed[a:b, i][record.valid[a:b, i]] for a, b in dwells]
 
 
-def _autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
+def autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
     """Innovation deviation and coefficients by Yule-Walker over all parts; the order by BIC."""
     n = sum(map(len, parts))
     lags = np.array([sum(float(p[: len(p) - k] @ p[k:]) for p in parts) / n for k in range(LONGEST_ORDER + 1)])

@@ -65,9 +65,9 @@ class Screen:
             J = fit.J[first : first + n]
             first += n
             slopes.accumulate(sums, white, J, index, fit.starts[index] if fit.starts else None)
-        return self._judge(fit, columns, sums, fit.J[first:])
+        return self._judge(fit, columns, sums, fit.J[first:], fit.residual[first:])
 
-    def _judge(self, fit: Fit, columns: list[Column], sums: Sums, prior: np.ndarray) -> Screened:
+    def _judge(self, fit: Fit, columns: list[Column], sums: Sums, prior: np.ndarray, held: np.ndarray) -> Screened:
         if not columns or sums.SS is None:
             return Screened((), np.zeros((0, 0)), np.inf, {})
         norm = sums.norm2
@@ -76,7 +76,7 @@ class Screen:
         inverse = np.linalg.pinv(A / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
         project = inverse @ sums.JS
         own = norm - np.einsum("ij,ij->j", sums.JS, project)
-        score = sums.Sr - project.T @ sums.Jr
+        score = sums.Sr - project.T @ (sums.Jr + prior.T @ held)  # the rest of the gradient, zero at the optimum
         left = np.where(norm > 0, own / np.where(norm > 0, norm, 1.0), 0.0)
         seen = np.flatnonzero((left > OWN_LEFT) & (norm > 0) & np.isfinite(norm))
         gram = sums.SS - sums.JS.T @ project  # from the rows kept

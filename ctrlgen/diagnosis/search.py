@@ -116,6 +116,11 @@ class Searcher:
                 break
             visited.add(frozenset(current.fit.structure.causes))
             current = self._measured(self._polished(current))
+        if self.fitter.learn_colour(current.fit):
+            self.known.clear()
+            self.screens.clear()
+            current = self._prune(self._polished(current), least=0)
+            screened = self._screened(current)
         nominal = self.trial(structure, steps=40)
         rivals = tuple(self._rivals(current, k) for k in range(len(current.fit.structure.causes)))
         return Search(nominal, current, rivals, tuple(rounds), screened, self.fitter.held_out(current.fit)[1])
@@ -227,9 +232,9 @@ class Searcher:
             self.screens[key] = self.screen.run(trial.fit)
         return self.screens[key]
 
-    def _prune(self, current: Trial) -> Trial:
+    def _prune(self, current: Trial, least: int = 1) -> Trial:
         for k in reversed(range(len(current.fit.structure.causes))):
-            if len(current.fit.structure.causes) < 2:
+            if len(current.fit.structure.causes) <= least:
                 break
             bare = self.trial(_cooled(current.fit).without(k))
             if not self._justified(bare, current):

@@ -18,6 +18,8 @@ from ctrlgen.effect import Param, Where
 from ctrlgen.model import movable
 from ctrlgen.recording import Record, Recording
 
+FAR = 100.0  # standard deviations that a number may be off: the price of being off holds it, not a bound
+
 
 @dataclass(frozen=True)
 class Unknown:
@@ -92,7 +94,7 @@ class Structure:
         for path, sd in nuisances(self.device).items():
             if path in acting and path not in causes:
                 q = sections[path][1]
-                rows.append(Unknown(path, _unit(q.text), q.si, *_around(q.si, 5 * sd), sd, sd))
+                rows.append(Unknown(path, _unit(q.text), q.si, *_around(q.si, FAR * sd), sd, sd))
         k = len(self.device.effect)
         for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
             if cause.effect == PARAMETER:
