@@ -18,6 +18,7 @@ from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
+DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
 MOST_CAUSES = {"poses": 12, "series": 5}
 WORTHWHILE = (
     0.05  # of the held-out excess over the noise that a further cause must take away: patches of a wrong law do not
@@ -105,7 +106,7 @@ class Searcher:
             screened = self._screened(current)
             if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind]:
                 break
-            trials = self._try(current, self._conspicuous(screened))
+            trials = self._try(current, self._conspicuous(current, screened))
             trials = tuple(sorted((*trials, *self._together(current, screened, trials)), key=lambda t: t.total))
             rounds.append(Round(screened, trials, current))
             better = [t for t in trials if self._justified(current, t)]
@@ -138,12 +139,13 @@ class Searcher:
         self.screens.clear()
         return self.trial(_cooled(trial.fit))
 
-    def _need(self, screened: Screened) -> float:
-        """The z^2 that a cause must show."""
-        return max(screened.threshold**2, MATERIAL**2 * self.n_fit)
+    def _need(self, current: Trial, screened: Screened) -> float:
+        """The z^2 that a cause must show: of its own size in the readings, or of the price at which the device hides it."""
+        hidden = current.fit.penalty > DEAR + 2 * len(current.fit.structure.unknowns)
+        return screened.threshold**2 if hidden else max(screened.threshold**2, MATERIAL**2 * self.n_fit)
 
-    def _conspicuous(self, screened: Screened) -> list[Suspect]:
-        loud = [s for s in screened.suspects if s.z**2 > self._need(screened)]
+    def _conspicuous(self, current: Trial, screened: Screened) -> list[Suspect]:
+        loud = [s for s in screened.suspects if s.z**2 > self._need(current, screened)]
         if not loud:
             return []
         chosen: list[Suspect] = []
@@ -166,7 +168,7 @@ class Searcher:
         excess, trials = current.fit.objective - self.n_fit, []
         for size in (2, 3, 4):
             tried, used = 0, {}
-            enough = best + max(self._need(screened), 0.05 * (excess - best))
+            enough = best + max(self._need(current, screened), 0.05 * (excess - best))
             for promised, suspects in screened.together:
                 if len(suspects) != size or promised < enough or tried >= self.trials:
                     continue
@@ -222,7 +224,7 @@ class Searcher:
         screened = self._screened(bare)
         gained = bare.fit.objective - current.fit.objective
         able = [
-            s for s in self._conspicuous(screened) if s.z**2 > ABLE * gained and s.hypothesis != structure.causes[k]
+            s for s in self._conspicuous(bare, screened) if s.z**2 > ABLE * gained and s.hypothesis != structure.causes[k]
         ]
         return sorted(self._try(bare, able[:REPLACEMENTS]), key=lambda t: t.total)
 

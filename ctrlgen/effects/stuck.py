@@ -4,12 +4,12 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class Stuck(Effect):
-    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Holds also for a loose contact, s the time it is off."""
+    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0."""
 
     place = Place.SENSOR
     source = "R. Isermann, Fault-Diagnosis Systems (2006): sensor faults"
     params = (
-        Param("share", "1", (0.0, 1.0), "1 where nothing of the motion is seen", off=0.0),
+        Param("share", "1", (0.0, 1.2), "1 where nothing of the motion is seen", off=0.0, expected=(0.8, 1.2)),
         Param("level", "channel", (-1e3, 1e3), "what is reported", grid=(0.0, 1.0)),
     )
 
