@@ -32,6 +32,7 @@ class Chain:
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
+        self.rates: ca.SX | None = None
         self.members: list[_Member] = []
         self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
@@ -85,8 +86,9 @@ class Chain:
             i = min(i, len(self.links.axes) - 1)
             s.displacement, s.displacements = self.z[i], self.z
             s.velocity = self.velocity[i] if self.velocity.numel() else None
-            s.state = None if self.links.state is None else self.links.state.expr[i]
-            s.rest = None if self.links.state is None else self.links.rest[i]
+            heated = self.links.state is not None and self.links.heat_signal is not None
+            s.state = self.links.state.expr[i] if heated else None
+            s.rest = self.links.rest[i] if heated else None
             s.force = self.resisting[i]
         where = channels(self.links, place)[s.index]
         s.scale, s.travel = where.scale, where.travel_scale
@@ -119,7 +121,7 @@ class Chain:
             stepped={first + k: m.stepped[s.name] for k, (m, s, _) in enumerate(memories) if s.stepped},
             clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
             x_names=(
-                *(() if state is None else (f"{state.name}_{axis}" for axis in links.axes)),
+                *(() if state is None else (f"{state.name}_{channel}" for channel in state.channels)),
                 *(symbol.name() for *_, symbol in memories),
                 *(f"velocity_{axis}" for axis in links.axes[: self.v.numel()]),
             ),
@@ -133,7 +135,9 @@ class Chain:
             ),
             heat=heat,
             heat_of_drive=produced,
-            rates_of_heat=ca.vertcat(links.rates(x, arriving), memory_rates, acceleration),
+            rates_of_heat=ca.vertcat(
+                links.rates(x, arriving) if self.rates is None else self.rates, memory_rates, acceleration
+            ),
             balance=balance,
             signals=signals,
             force_parts=links.resistance_parts(z),
@@ -173,9 +177,12 @@ class Chain:
         command = links.feedback(u, reading, self.v, x) if links.feedback else u
         drive = self._with_terms(Place.DRIVE, command)
         produced = u - reading if links.feedback else links.heat(drive)
-        heat = ca.SX.sym("heat", n)  # an unknown of its own, so that the inverse need not take squares apart
+        heat = ca.SX.sym("heat", produced.numel())  # an unknown of its own: the inverse need not take squares apart
         arriving = self._with_terms(Place.HEAT, heat)
-        pushed = links.force(drive, x, z)
+        if links.moving:
+            pushed, self.rates = links.moving(drive, x, z, self.v)
+        else:
+            pushed = links.force(drive, x, z)
         balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z)
         if links.drag:
             balance -= links.drag(self.v)
@@ -265,7 +272,7 @@ def available(links: Links, sample_time: float | None = None) -> frozenset[str]:
         "unheated": links.heat_signal is None, "bipolar": links.bipolar, "actuator": not links.imposed,
         "velocity": links.mass is not None or links.imposed, "state": links.heat_signal is not None,
         "heat": links.heat_signal is not None, "ambient": True, "sample_time": sample_time is not None,
-        "force": same_dimension(links.force_unit, "N"), "spatial": len(links.components) == 6,
+        "force": any(same_dimension(links.force_unit, unit) for unit in ("N", "N*m")), "spatial": len(links.components) == 6,
     }  # fmt: skip
     return frozenset(name for name, there in present.items() if there)
 
