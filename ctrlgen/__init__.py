@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ctrlgen.comparison import Comparison, compare
     from ctrlgen.controller import Controller, Status
     from ctrlgen.devices import load_device
+    from ctrlgen.devices.user import user_device
     from ctrlgen.diagnosis.diagnosis import Diagnosis
     from ctrlgen.diagnosis.job import diagnose
     from ctrlgen.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
+    "devices.user": ("user_device",),
     "diagnosis.diagnosis": ("Diagnosis",), "diagnosis.job": ("diagnose",), "recording": ("load_recordings",),
     "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware": ("generate",),
     "job": ("Outcome", "run"), "model": ("Model", "build_model"), "readings": ("Record", "record_readings"), "scenario": ("load_scenario",),
@@ -69,4 +71,5 @@ __all__ = [
     "run",
     "simulate",
     "solve",
+    "user_device",
 ]

@@ -43,7 +43,7 @@ def main() -> None:
         status = INTERRUPTED
     if interruption.seen and status != 0:
         status = INTERRUPTED
-        print("interrupted; nothing was written", file=sys.stderr)
+        print("interrupted; nothing was written that was not finished", file=sys.stderr)
     sys.stdout.flush()
     sys.stderr.flush()
     if interruption.seen:

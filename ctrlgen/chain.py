@@ -33,6 +33,7 @@ class Chain:
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
         self.held = self.held_value = ca.SX(0, 1)
+        self.rates: ca.SX | None = None
         self.members: list[_Member] = []
         self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
@@ -86,8 +87,9 @@ class Chain:
             i = min(i, len(self.links.axes) - 1)
             s.displacement, s.displacements = self.z[i], self.z
             s.velocity = self.velocity[i] if self.velocity.numel() else None
-            s.state = None if self.links.state is None else self.links.state.expr[i]
-            s.rest = None if self.links.state is None else self.links.rest[i]
+            heated = self.links.state is not None and self.links.heat_signal is not None
+            s.state = self.links.state.expr[i] if heated else None
+            s.rest = self.links.rest[i] if heated else None
             s.force = self.resisting[i]
         known = place in (Place.POSE, Place.SENSOR) and self.v.numel() and not self.links.imposed
         s.rate = ca.jtimes(s.value, self.z, self.v) if known else None
@@ -108,7 +110,8 @@ class Chain:
         memory_rates = ca.vertcat(ca.SX(0, 1), *(m.rates[s.name] for m, s, _ in memories))
         acceleration = balance / ca.vertcat(*links.mass) if links.mass else ca.SX(0, 1)
         first = x.numel()
-        rates = ca.vertcat(links.rates(x, arriving), memory_rates, acceleration)
+        own = links.rates(x, arriving) if self.rates is None else self.rates
+        rates = ca.vertcat(own, memory_rates, acceleration)
         following = {first + k: m.stepped[s.name] for k, (m, s, _) in enumerate(memories) if s.stepped}
         sampled = ca.substitute(rates, heat, produced)
 
@@ -133,7 +136,7 @@ class Chain:
             sampled_rates=sampled,
             clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
             x_names=(
-                *(() if state is None else (f"{state.name}_{axis}" for axis in links.axes)),
+                *(() if state is None else (f"{state.name}_{channel}" for channel in state.channels)),
                 *(symbol.name() for *_, symbol in memories),
                 *(f"velocity_{axis}" for axis in links.axes[: self.v.numel()]),
             ),
@@ -189,9 +192,12 @@ class Chain:
             self.held, self.held_value = ca.SX.sym("held", n), command
         drive = self._with_terms(Place.DRIVE, self.held if links.feedback else u)
         produced = u - reading if links.feedback else links.heat(drive)
-        heat = ca.SX.sym("heat", n)  # an unknown of its own, so that the inverse need not take squares apart
+        heat = ca.SX.sym("heat", produced.numel())  # an unknown of its own: the inverse need not take squares apart
         arriving = self._with_terms(Place.HEAT, heat)
-        pushed = links.force(drive, x, z)
+        if links.moving:
+            pushed, self.rates = links.moving(drive, x, z, self.v)
+        else:
+            pushed = links.force(drive, x, z)
         balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z)
         if links.drag:
             balance -= links.drag(self.v)
@@ -281,7 +287,7 @@ def available(links: Links, sample_time: float | None = None) -> frozenset[str]:
         "unheated": links.heat_signal is None, "bipolar": links.bipolar, "actuator": not links.imposed,
         "velocity": links.mass is not None or links.imposed, "state": links.heat_signal is not None,
         "heat": links.heat_signal is not None, "ambient": True, "sample_time": sample_time is not None,
-        "force": same_dimension(links.force_unit, "N"), "spatial": len(links.components) == 6,
+        "force": any(same_dimension(links.force_unit, unit) for unit in ("N", "N*m")), "spatial": len(links.components) == 6,
     }  # fmt: skip
     return frozenset(name for name, there in present.items() if there)
 

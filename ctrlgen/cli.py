@@ -25,11 +25,15 @@ from ctrlgen.scenario import load_scenario
 from ctrlgen.terminal import (
     CHECK,
     complain,
+    counted,
     err,
     out,
+    print_batch,
+    print_bootstrap,
     print_comparison,
     print_diagnosis,
     print_recording,
+    print_reproduced,
     print_solution,
     progress,
     show_warning,
@@ -52,6 +56,20 @@ OutFolder = Annotated[
     typer.Option(
         "--out", help="Result folder; replaced whole when the work is done, never half written.", show_default=False
     ),
+]
+
+BootstrapCount = Annotated[
+    int,
+    typer.Option(
+        min=0, metavar="B", help="Replicates for intervals that do not trust the noise's model; 200 is usual."
+    ),
+]
+SchedulerAddress = Annotated[
+    str | None,
+    typer.Option(help="A dask.distributed scheduler, tcp://HOST:8786; by default this computer.", show_default=False),
+]
+JobCount = Annotated[
+    int | None, typer.Option(min=0, help="Processes of this computer; 0: none but this one.", show_default="one a core")
 ]
 
 
@@ -255,24 +273,7 @@ def reproduce(
     if json_:
         print(json.dumps(everything.as_json(rows), indent=1))
         return
-    colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
-    table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
-    for words in (table.columns[1], table.columns[-1]):
-        words.no_wrap = False  # long words break; the numbers never make way for them
-    for row in rows:
-        if differing and row.status is Status.REPRODUCED:
-            continue
-        ours = "" if row.ours is None else f"{row.ours:.6g}"
-        status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
-        table.add_row(
-            row.source,
-            escape(row.where),
-            escape(row.printed if row.unit == "1" else f"{row.printed} {row.unit}"),
-            ours,
-            status,
-            escape(row.reason),
-        )
-    out.print(table)
+    print_reproduced([row for row in rows if not (differing and row.status is Status.REPRODUCED)])
     counts = everything.counts(rows)
     for name in chosen:
         numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in Status)
@@ -288,6 +289,9 @@ def diagnose(
     ],
     out_folder: OutFolder,
     seed: Annotated[int, typer.Option(help="Of everything drawn at random; the same seed gives the same answer.")] = 0,
+    bootstrap: BootstrapCount = 0,
+    scheduler: SchedulerAddress = None,
+    jobs: JobCount = None,
 ) -> None:
     """Find what a device file leaves out: where, which physics by name, with numbers, proved on held-out records.
 
@@ -296,16 +300,55 @@ def diagnose(
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
-    from ctrlgen.diagnosis.job import diagnose_into
+    from ctrlgen.diagnosis.job import Replicates, diagnose_into
 
     try:
+        replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         with progress() as advance:
-            found = diagnose_into(device, recording, out_folder, seed, advance)
+            found = diagnose_into(device, recording, out_folder, seed, advance, replicates)
     except InputError as error:
         complain(error)
         raise typer.Exit(2) from None
     print_diagnosis(found)
+    if replicates is not None:
+        print_bootstrap(found.extra["bootstrap"])
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+
+
+@app.command()
+def batch(
+    list_: Annotated[
+        Path, typer.Argument(metavar="JOBS.toml", help="What to diagnose; see ctrlgen/batch.py.", show_default=False)
+    ],
+    out_folder: Annotated[
+        Path, typer.Option("--out", help="Gets one result folder a diagnosis, and results.csv.", show_default=False)
+    ],
+    seed: Annotated[
+        int | None, typer.Option(help="Of everything drawn at random, instead of the list's.", show_default=False)
+    ] = None,
+    bootstrap: BootstrapCount = 0,
+    scheduler: SchedulerAddress = None,
+    jobs: JobCount = None,
+) -> None:
+    """Diagnose many recordings, on all cores or on a cluster; results that are there already are kept.
+
+    Stop it whenever you like: every finished diagnosis stays, and the same command goes on with the rest. The exit
+    status is 1 when a diagnosis failed, and 2 for a list that cannot be used.
+
+    Example:  ctrlgen batch jobs.toml --out out/jobs --scheduler tcp://cluster:8786
+    """
+    from ctrlgen.batch import load_batch, run_batch
+
+    try:
+        with counted("diagnosing") as told:
+            rows = run_batch(load_batch(list_, seed, bootstrap), out_folder, scheduler, jobs, told)
+    except InputError as error:
+        complain(error)
+        raise typer.Exit(2) from None
+    print_batch(rows)
+    out.print(f"[bold]table[/bold]  {escape(str(out_folder / 'results.csv'))}", soft_wrap=True)
+    if any(row.state == "failed" for row in rows):
+        raise typer.Exit(1)
 
 
 def _exit(outcome: job.Outcome) -> None:

@@ -97,7 +97,7 @@ class Where:
         """The unit here, such as 'N/um^3'."""
         unit = number.unit
         for word, here in (("channel", self.unit), ("travel", self.travel_unit), ("partner", self.partner_unit)):
-            unit = unit.replace(word, here if here.isalnum() else f"({here})")
+            unit = unit.replace(word, here if here.isalnum() or number.unit == word else f"({here})")
         return unit
 
     def si(self, value: float, number: Param | State) -> float:

@@ -107,8 +107,11 @@ class Scenario:
         return samples
 
 
-def load_scenario(path: Path | str) -> Scenario:
-    """The scenario in a folder (its scenario.toml) or in a TOML file, with its device. Raises InputError."""
+def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:
+    """The scenario in a folder (its scenario.toml) or in a TOML file, with its device. Raises InputError.
+
+    A `device` made in Python is used instead of a file; the scenario's `device` is then its name.
+    """
     path = Path(path)
     file_path = path / FILE if path.is_dir() else path
     table = read_toml(file_path)
@@ -116,9 +119,14 @@ def load_scenario(path: Path | str) -> Scenario:
         what = 'describes a device; name a scenario, or write one that has device = "..." with this file\'s path'
         raise InputError(file_path, [Fault("file", what)])
     file = validate(ScenarioFile, table, file_path)
-    device_path = file_path.parent / file.device
-    device = load_device(device_path)
-    texts = {"scenario": read_text(file_path), "device": read_text(device_path)}
+    if device is None:
+        device_path = file_path.parent / file.device
+        device, described = load_device(device_path), read_text(device_path)
+    elif file.device != device.name:
+        raise InputError(file_path, [Fault("device", f"{file.device!r} is not {device.name!r}, the device given")])
+    else:
+        described = "\n".join(f"{path} = {number.text}" for path, number in device.quantities())
+    texts = {"scenario": read_text(file_path), "device": described}
     if isinstance(file.path, Poses) and file.path.file:
         texts["poses"] = read_text(file_path.parent / file.path.file)
     digest = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ctrlgen import job, report
@@ -20,7 +20,10 @@ from ctrlgen.recording import Recording
 from ctrlgen.units import show
 
 if TYPE_CHECKING:
+    from ctrlgen.batch import Row
+    from ctrlgen.diagnosis.bootstrap import Bootstrap
     from ctrlgen.diagnosis.diagnosis import Diagnosis
+    from ctrlgen.reproduce.row import Row as Reproduced
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
@@ -131,6 +134,84 @@ def print_diagnosis(found: Diagnosis) -> None:
         out.print(f"note: {note}", markup=False, soft_wrap=True)
     for step in next_steps(found):
         out.print(f"next: {step}", markup=False, soft_wrap=True)
+
+
+def print_reproduced(rows: Sequence[Reproduced]) -> None:
+    """Printed, ours, status and why, number by number."""
+    from ctrlgen.reproduce.row import Status
+
+    colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
+    table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
+    for words in (table.columns[1], table.columns[-1]):
+        words.no_wrap = False  # long words break; the numbers never make way for them
+    for row in rows:
+        ours = "" if row.ours is None else f"{row.ours:.6g}"
+        status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
+        table.add_row(
+            row.source,
+            escape(row.where),
+            escape(row.printed if row.unit == "1" else f"{row.printed} {row.unit}"),
+            ours,
+            status,
+            escape(row.reason),
+        )
+    out.print(table)
+
+
+def print_bootstrap(found: Bootstrap) -> None:
+    """Percentile intervals, and how often a finding vanished."""
+    from ctrlgen.diagnosis.words import interval
+
+    out.print(f"bootstrap: {found.replicates} replicates; {found.note}", markup=False, soft_wrap=True)
+    table = table_of(("number", "left"), ("95 % of the replicates", "left"))
+    for path, estimate in found.values.items():
+        table.add_row(escape(path), interval(estimate))
+    out.print(table)
+    for name, share in found.vanished.items():
+        out.print(f"{name} vanished in {share:.0%} of them", markup=False, soft_wrap=True)
+    for reason in found.failed:
+        out.print(f"some failed: {reason}", markup=False, soft_wrap=True)
+
+
+def print_batch(rows: Sequence[Row]) -> None:
+    """One line a diagnosis, then what failed and why."""
+    from ctrlgen.diagnosis.words import number
+
+    names = ("verdict", "left"), ("found", "left"), ("before", "right"), ("after", "right"), ("noise", "right")
+    table = table_of(("result", "left"), *names)
+    for row in rows:
+        if row.state == "failed":
+            table.add_row(escape(row.name), "[red]failed[/red]")
+            continue
+        known = ["not known" if v is None else f"{number(v)} {row.unit}" for v in (row.before, row.after, row.noise)]
+        table.add_row(escape(row.name), row.verdict, escape(row.findings) or "-", *known)
+    out.print(table)
+    for row in rows:
+        if row.error:
+            out.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
+    made, kept, failed = (sum(row.state == state for row in rows) for state in ("done", "done before", "failed"))
+    out.print(f"{made} diagnosed, {kept} there already, {failed} failed")
+
+
+@contextmanager
+def counted(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on standard error for work whose pieces are counted."""
+    check = CHECK.get()
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=err, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+
+        def told(done: int, of: int) -> None:
+            check()
+            bar.update(task, completed=done, total=of)
+
+        yield told
 
 
 @contextmanager

@@ -10,13 +10,13 @@ from conftest import ROOT
 PACKAGE = ROOT / "ctrlgen"
 LAYERS = [
     "_version errors units",
-    "files", "reference_models reference_models.hinge_fem", "measuring_chain",
+    "executor", "files", "reference_models reference_models.hinge_fem", "measuring_chain",
     "physics.screw", "physics.flexure", "physics.circular_hinge", "physics.circular_hinge_table",
     "physics.thermal_actuator", "physics.xy_stage physics.hexapod physics.meso_hexapod",
     "physics.piezo_stack", "physics.rrr_stage",
     "effect", "effects",
-    "devices.section", "devices.sensor", "devices.base", "devices.hinge",
-    "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis", "devices",
+    "devices.section", "devices.ports", "devices.sensor", "devices.base", "devices.hinge",
+    "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis devices.user", "devices",
     "calibration pose_errors",
     "chain", "model", "marking recording_formats recording_file", "gate", "recording",
     "motion", "simulation inverse", "readings", "controller linearisation",
@@ -32,7 +32,8 @@ LAYERS = [
     "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
     "diagnosis.empirical diagnosis.detectable diagnosis.profile diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
     "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",
-    "diagnosis.writeback diagnosis.picture_maps diagnosis.picture_sure", "diagnosis.pictures", "diagnosis.page", "diagnosis.job",
+    "diagnosis.writeback diagnosis.picture_maps diagnosis.picture_sure", "diagnosis.pictures", "diagnosis.page",
+    "diagnosis.bootstrap", "diagnosis.job", "batch",
     "job", "terminal", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}

@@ -68,6 +68,8 @@ class Links:
     standing in balance. With `feedback` (u, reading, d', x) -> drive the loop is closed: u is the reference, and
     `heat` (u - reading) drives the states. An `imposed` device is moved by its drive (displacement, velocity,
     acceleration) and reads the force that takes. `bipolar` says whether the drive has both signs.
+    `moving` (drive, x, d, d') -> force and rates of the states stands instead of `force` and `rates` where they depend
+    on the velocity too, or the states on the displacement.
     """
 
     axes: tuple[str, ...]
@@ -95,6 +97,7 @@ class Links:
     command_signal: tuple[str, str, str, float] | None = None
     imposed: bool = False
     bipolar: bool = True
+    moving: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
 
 
 class Device(Section):
@@ -111,8 +114,9 @@ class Device(Section):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        kind = cls.model_fields["kind"].annotation
-        Device.library[getattr(kind, "__args__", ("",))[0]] = cls
+        kinds = getattr(cls.model_fields["kind"].annotation, "__args__", ())
+        if kinds:  # a device that is no file has no word for its kind
+            Device.library[kinds[0]] = cls
 
     def links(self, p: SimpleNamespace) -> Links:
         """The device's physics with the values `p` (numbers, or symbols where they are free)."""

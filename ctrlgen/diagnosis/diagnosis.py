@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import Adequacy
-from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.search import Search
+from ctrlgen.diagnosis.structure import Structure, changed
 from ctrlgen.recording import Recording
+from ctrlgen.units import from_si, to_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 CI = 1.959964  # standard deviations of a 95 % interval
@@ -71,6 +74,22 @@ class Diagnosis:
     fitter: Fitter
     extra: dict[str, Any] = field(default_factory=dict)
 
+    @cached_property
+    def values(self) -> dict[str, Estimate]:
+        """Every fitted number by its path in `corrected`, uncertain ones of the device included, with 95 % intervals.
+
+        A device written in Python has no file: this is what to put into its code.
+        """
+        return values(self.search.chosen.fit)
+
+    @cached_property
+    def corrected(self) -> Device:
+        """The device with all that was found in it, as device.next.toml describes it."""
+        fit = self.search.chosen.fit
+        own = {u.path: float(v) for u, v in zip(fit.structure.unknowns, fit.theta, strict=True) if u.cause is None}
+        starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
+        return changed(Structure(fit.structure.device, fit.structure.causes, starts).described, own)
+
 
 def verdict(search: Search, after: Adequacy, known: bool) -> str:
     """consistent | explained | partly | ambiguous | unexplained.
@@ -89,8 +108,6 @@ def verdict(search: Search, after: Adequacy, known: bool) -> str:
 
 def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:
     """Held-out root mean square of each channel, nominal and chosen."""
-    from ctrlgen.units import from_si, to_si
-
     found = {}
     floor = fitter.noise.floor
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
@@ -103,10 +120,19 @@ def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, Chann
     return found
 
 
+def values(fit: Fit) -> dict[str, Estimate]:
+    """Every unknown of a fit, in its reader's unit."""
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if len(fit.theta) else np.zeros(0)
+    found = {}
+    for unknown, value, s in zip(fit.structure.unknowns, fit.theta, sd, strict=True):
+        ends = (value, max(value - CI * s, unknown.low), min(value + CI * s, unknown.high))
+        shown = [float(from_si(v, unknown.unit)) for v in ends]
+        found[unknown.path] = Estimate(shown[0], (shown[1], shown[2]), unknown.unit)
+    return found
+
+
 def findings(search: Search) -> tuple[Finding, ...]:
     """The causes of the chosen structure with intervals and rivals, the most important first."""
-    from ctrlgen.units import from_si
-
     fit, rows = search.chosen.fit, []
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if len(fit.theta) else np.zeros(0)
     held = search.nominal.held

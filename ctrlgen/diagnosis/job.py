@@ -5,14 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ctrlgen import diagnosis as engine
 from ctrlgen.devices import Device, load_device
+from ctrlgen.diagnosis.bootstrap import Bootstrap, bootstrap
 from ctrlgen.diagnosis.diagnosis import Diagnosis
 from ctrlgen.diagnosis.page import Provenance, page
-from ctrlgen.diagnosis.record import as_dict
+from ctrlgen.diagnosis.record import as_dict, plain
 from ctrlgen.diagnosis.writeback import write_next
 from ctrlgen.files import read_toml, whole_folder, write_text
 from ctrlgen.model import build_model
@@ -21,6 +23,24 @@ from ctrlgen.recording_file import FILE
 
 Progress = Callable[[str], None]
 Paths = Path | str | Sequence[Path | str]
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """How many bootstrap replicates, and where they run (see `ctrlgen.executor`)."""
+
+    count: int
+    scheduler: str | None = None
+    jobs: int | None = None
+
+    def of(self, found: Diagnosis, seed: int, step: Progress) -> Bootstrap:
+        """The bootstrap of a diagnosis; `step` is told how far it is."""
+        step(f"bootstrap, {self.count} replicates")
+
+        def told(done: int, of: int) -> None:
+            step(f"bootstrap, {done} of {of} replicates")
+
+        return bootstrap(found, self.count, seed, self.scheduler, self.jobs, told)
 
 
 def diagnose(
@@ -45,17 +65,28 @@ def diagnose_into(
     out: Path | str,
     seed: int = 0,
     progress: Progress | None = None,
+    replicates: Replicates | None = None,
 ) -> Diagnosis:
-    """The same, reported into the folder `out`, which is replaced whole or left alone. Raises InputError."""
+    """The same, reported into the folder `out`, which is replaced whole or left alone. Raises InputError.
+
+    With `replicates` bootstrap.json is written too, and stands in the diagnosis' `extra` as "bootstrap".
+    """
     step = progress or (lambda _: None)
     with whole_folder(Path(out)) as draft:
         found = diagnose(device, recordings, seed, step)
+        if replicates is not None:
+            found.extra["bootstrap"] = replicates.of(found, seed, step)
+            write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
         step("report")
-        digests = {name: _digest(path) for name, path in _files(Path(device), recordings)}
         write_next(found, Path(device), draft / "device.next.toml")
         write_text(draft / "diagnosis.json", json.dumps(as_dict(found), indent=1, allow_nan=False) + "\n")
-        write_text(draft / "report.html", page(found, Provenance(digests, seed)))
+        write_text(draft / "report.html", page(found, Provenance(digests(Path(device), recordings), seed)))
     return found
+
+
+def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:
+    """SHA-256 of every file that a diagnosis reads, by name."""
+    return {name: _digest(path) for name, path in _files(device, recordings)}
 
 
 def _digest(path: Path) -> str:

@@ -224,7 +224,9 @@ class Searcher:
         screened = self._screened(bare)
         gained = bare.fit.objective - current.fit.objective
         able = [
-            s for s in self._conspicuous(bare, screened) if s.z**2 > ABLE * gained and s.hypothesis != structure.causes[k]
+            s
+            for s in self._conspicuous(bare, screened)
+            if s.z**2 > ABLE * gained and s.hypothesis != structure.causes[k]
         ]
         return sorted(self._try(bare, able[:REPLACEMENTS]), key=lambda t: t.total)
 

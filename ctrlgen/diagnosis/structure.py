@@ -187,14 +187,14 @@ def _unit(text: str) -> str:
     return written_unit(text)
 
 
-_MOVABLE: dict[int, frozenset[str]] = {}
+_MOVABLE: dict[int, tuple[Device, frozenset[str]]] = {}
 
 
 def _movable(device: Device) -> frozenset[str]:
-    key = id(device)
-    if key not in _MOVABLE:
-        _MOVABLE[key] = frozenset(movable(device))
-    return _MOVABLE[key]
+    if id(device) not in _MOVABLE:
+        _MOVABLE.clear()  # the device is kept with its answer, so that no other one gets its id meanwhile
+        _MOVABLE[id(device)] = (device, frozenset(movable(device)))
+    return _MOVABLE[id(device)][1]
 
 
 def changed(device: Device, values: dict[str, float]) -> Device:

@@ -1,0 +1,131 @@
+"""Named vectors that a user's functions read, and what those functions return: asked, and checked with every fault."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+
+from ctrlgen.errors import Fault
+
+Law = Callable[..., Any] | ca.Function
+
+
+class Ports:
+    """A vector whose components have names: `u.motor`, `u["motor"]` and `u[0]`; `u.vector` is all of it (n,), SI."""
+
+    def __init__(self, what: str, names: Sequence[str], vector: ca.SX) -> None:
+        self.what, self.names, self.vector = what, tuple(names), vector
+
+    def __getattr__(self, name: str) -> ca.SX:
+        if name.startswith("__") or name in ("names", "what", "vector"):
+            raise AttributeError(name)
+        if name not in self.names:
+            raise AttributeError(f"{self.what} has no {name!r}; {near(name, self.names)}")
+        return self.vector[self.names.index(name)]
+
+    def __getitem__(self, key: str | int) -> ca.SX:
+        return getattr(self, key) if isinstance(key, str) else self.vector[range(len(self.names))[key]]
+
+    def __iter__(self) -> Iterator[ca.SX]:
+        return (self.vector[i] for i in range(len(self.names)))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def near(name: str, names: Sequence[str]) -> str:
+    """'did you mean ...?', or what there is."""
+    like = difflib.get_close_matches(name, names, n=1)
+    return f"did you mean {like[0]!r}?" if like else f"it has {', '.join(names) or 'nothing'}"
+
+
+def ask(where: str, law: Law, offered: Mapping[str, Ports], names: Sequence[str]) -> tuple[ca.SX, list[Fault]]:
+    """What `law` returns for the vectors `offered`, one component for each of `names`; zeros with faults where it cannot.
+
+    A Python function is given the vectors that its arguments name; a `ca.Function` those that its inputs name, where
+    the name of a single parameter will do too.
+    """
+    nothing = ca.SX.zeros(len(names), 1)
+    try:
+        given, faults = (_inputs if isinstance(law, ca.Function) else _arguments)(where, law, offered)
+    except (TypeError, ValueError) as error:
+        return nothing, [Fault(where, f"is no function: {error}")]
+    if faults:
+        return nothing, faults
+    try:
+        value = law(*given)
+    except Exception as error:  # a user's code may raise anything; it is told with its name and place
+        said = str(error).strip().splitlines()
+        return nothing, [Fault(where, f"raised {type(error).__name__}: {said[-1] if said else 'no message'}")]
+    if isinstance(law, ca.Function) and law.n_out() != 1:
+        return nothing, [Fault(where, f"{law.name()} has {law.n_out()} outputs; give a function with one")]
+    rows, faults = _rows(where, value, names)
+    if not faults:
+        known = {s.element_hash() for ports in offered.values() for s in ca.symvar(ports.vector)}
+        strange = sorted({s.name() for s in ca.symvar(rows) if s.element_hash() not in known})
+        faults = [Fault(where, f"contains the symbol {name!r}, which is none of its arguments") for name in strange]
+    return (nothing, faults) if faults else (rows, [])
+
+
+def _arguments(where: str, law: Callable[..., Any], offered: Mapping[str, Ports]) -> tuple[list[Ports], list[Fault]]:
+    """The vectors that a Python function's arguments name."""
+    kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    wanted = [
+        q for q in inspect.signature(law).parameters.values() if q.default is inspect.Parameter.empty or q.name in offered
+    ]  # fmt: skip
+    unknown = [q.name for q in wanted if q.name not in offered or q.kind in kinds]
+    may = ", ".join(offered)
+    faults = [Fault(where, f"asks for {name!r}; its arguments may be {may}, by name and position") for name in unknown]
+    return [offered[q.name] for q in wanted if q.name in offered], faults
+
+
+def _inputs(where: str, law: ca.Function, offered: Mapping[str, Ports]) -> tuple[list[ca.SX], list[Fault]]:
+    """The values that a CasADi function's inputs name."""
+    given, faults, numbers = [], [], offered["p"]
+    for i in range(law.n_in()):
+        name, size = law.name_in(i), law.size_in(i)
+        if name in offered:
+            value, listed = offered[name].vector, f" ({', '.join(offered[name].names)})"
+        elif name in numbers.names:
+            value, listed = numbers[name], ""
+        else:
+            what = f"has an input {name!r}; name its inputs {', '.join(offered)} or as a parameter: {', '.join(numbers.names)}"
+            faults.append(Fault(where, f"{law.name()} {what}"))
+            continue
+        if size != (value.numel(), 1):
+            what = f"input {name!r} of {law.name()} is {size[0]} x {size[1]}, and {name} has {value.numel()}{listed}"
+            faults.append(Fault(where, what))
+        given.append(value)
+    return given, faults
+
+
+def _rows(where: str, value: Any, names: Sequence[str]) -> tuple[ca.SX, list[Fault]]:
+    """A vector (len(names),) from a mapping by name, a vector, a list or one number."""
+    nothing = ca.SX.zeros(len(names), 1)
+    if isinstance(value, Mapping):
+        faults = [
+            Fault(where, f"returns {k!r}, which is no name here; {near(str(k), names)}")
+            for k in set(value) - set(names)
+        ]
+        faults += [Fault(where, f"returns no {name!r}") for name in names if name not in value]
+        if faults:
+            return nothing, sorted(faults, key=str)
+        value = [value[name] for name in names]
+    if isinstance(value, Ports):
+        value = value.vector
+    if isinstance(value, ca.MX):
+        return nothing, [Fault(where, "returns MX; build it from the arguments it is given, which are SX")]
+    try:
+        parts = [value] if isinstance(value, (ca.SX, ca.DM, int, float)) else list(value)
+        rows = ca.densify(ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.SX(part)) for part in parts)))
+    except (TypeError, NotImplementedError, RuntimeError):
+        return nothing, [
+            Fault(where, f"returns {type(value).__name__}; return {len(names)} numbers: {', '.join(names)}")
+        ]
+    if rows.numel() != len(names):
+        return nothing, [Fault(where, f"returns {rows.numel()} numbers; {len(names)} needed: {', '.join(names)}")]
+    return rows, []
