@@ -67,10 +67,10 @@ def run_case(folder: Path, name: str, command: Sequence[str], timeout: float, ag
     if kept.exists() and not again:
         return json.loads(kept.read_text())
     out.mkdir(parents=True, exist_ok=True)
-    (out / "diagnosis.json").unlink(missing_ok=True)
+    (out / "report" / "diagnosis.json").unlink(missing_ok=True)
     begin = time.perf_counter()
     with (out / "log.txt").open("w") as log:
-        files = [str(case / "device.toml"), str(case / "recording.toml"), "--out", str(out)]
+        files = [str(case / "device.toml"), str(case / "recording.toml"), "--out", str(out / "report")]
         process = subprocess.Popen([*command, *files], stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
         try:
             code: int | str = process.wait(timeout)
@@ -86,7 +86,7 @@ def run_case(folder: Path, name: str, command: Sequence[str], timeout: float, ag
 def load(folder: Path, name: str, state: dict[str, Any]) -> Judgement:
     """The judgement of one case that was run."""
     answer = unseal(folder / "answers" / f"{name}.json")
-    path = folder / "results" / name / "diagnosis.json"
+    path = folder / "results" / name / "report" / "diagnosis.json"
     diagnosis = None
     if state["exit"] == 0 and path.exists():
         try:

@@ -30,6 +30,7 @@ from ctrlgen.diagnosis.where import where
 from ctrlgen.recording import Record, Recording, load_recordings
 
 H, N, NOISE = 1e-3, 2500, 5e-9
+SETTLING = 0.5  # s, some dozen time constants of the stage
 M, C, K, KF = 0.5, 30.0, 2e5, 10.0
 AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
 CREEP, DRIFT, CUBIC = (
@@ -78,7 +79,7 @@ def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=No
         y = change(move(given, force, numbers=numbers), given) + NOISE * (e if white is None else white(e))
         parts.append(record(given, y, role, first=0.0 if role == "fit" else n * H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
-    fitter = Fitter(recording, estimate(recording))
+    fitter = Fitter(recording, estimate(recording, SETTLING))
     fitter.cache = CACHE
     return fitter
 
@@ -177,7 +178,7 @@ def pose_fitter(meso, on_drive, on_pose):
     parts = [record(u[a], y[a], role, h=np.inf) for role, a in (("fit", slice(0, 40)), ("hold_out", slice(40, 60)))]
     units = ("deg",) * 3 + ("um",) * 3
     recording = Recording("t", device.name, "poses", channels, units, tuple(noise), tuple(parts), ())
-    return Fitter(recording, estimate(recording))
+    return Fitter(recording, estimate(recording, SETTLING))
 
 
 def test_a_weak_actuator_and_a_wrong_reading_are_told_apart(meso):

@@ -63,7 +63,7 @@ class Noise:
         return np.array([sd * np.sqrt(np.sum(s**2)) for sd, s in zip(self.sd, shapes, strict=True)])
 
 
-def estimate(recording: Recording, settling: float = 0.0) -> Noise:
+def estimate(recording: Recording, settling: float) -> Noise:
     """The noise of each observed channel. `settling` [s]: how long the device itself goes on after a change of drive."""
     rows = [_channel(recording, i, settling) for i in range(len(recording.channels))]
     sd, ar, known, said, count = zip(*rows, strict=True)
