@@ -68,6 +68,8 @@ class Links:
     standing in balance. With `feedback` (u, reading, d', x) -> drive the loop is closed: u is the reference, and
     `heat` (u - reading) drives the states. An `imposed` device is moved by its drive (displacement, velocity,
     acceleration) and reads the force that takes. `bipolar` says whether the drive has both signs.
+    `second_order` is what finite turns of a linear mechanism's links add to `pose`, `yielding` by how much less stages
+    yield to the links' load at d than at home.
     """
 
     axes: tuple[str, ...]
@@ -95,6 +97,8 @@ class Links:
     command_signal: tuple[str, str, str, float] | None = None
     imposed: bool = False
     bipolar: bool = True
+    second_order: Callable[[ca.SX], ca.SX] | None = None
+    yielding: Callable[[ca.SX], ca.SX] | None = None
 
 
 class Device(Section):

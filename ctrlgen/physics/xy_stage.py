@@ -58,6 +58,17 @@ def force(d: Scalar, s: Any, a: Any) -> Scalar:
     return linear_force(d, s, a) + nonlinear_force(d, s)
 
 
+def stiffened(d: Matrix, s: Any, a: Any) -> Matrix:
+    """c(0) - c(d) [m/N] of each axis: how much less a plate at `d` (n,) yields to a force along its axis than at home.
+
+    c = r / (dF/dd), the force on the plate being 1/r of that on the bar. Source: S1 eq. (12), differentiated.
+    """
+    r = s.lever_long / s.lever_short
+    slope = ca.vertcat(*(ca.gradient(force(x, s, a), x) for x in ca.vertsplit(d)))
+    home = linear_force(1.0, s, a)
+    return r / home - r / slope
+
+
 def notch_compliance(s: Any) -> Matrix:
     """[C^c] of a circular notch about its free end, x along the flexure, shape (6, 6). Source: S1 eq. (7).
 
