@@ -29,7 +29,8 @@ class Chain:
         self.device, self.links, self.ambient, self.sample_time = device, links, ambient, sample_time
         self.z = ca.SX.sym("d", len(links.axes))
         reach = REACH * links.displacement_scale
-        self.resisting = links.resistance(ca.fmin(ca.fmax(self.z, -reach), reach))
+        self.within_reach = ca.fmin(ca.fmax(self.z, -reach), reach)
+        self.resisting = links.resistance(self.within_reach)
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
@@ -103,7 +104,7 @@ class Chain:
     @cached_property
     def yielding(self) -> ca.SX:
         """How much less the stages yield to the links' load than at home; built when an effect asks."""
-        return self.links.yielding(self.z)
+        return self.links.yielding(self.within_reach)
 
     def parts(self, p: ca.SX, p_nominal: np.ndarray) -> dict[str, Any]:
         """The fields of `ctrlgen.model.Model`."""

@@ -64,7 +64,9 @@ def stiffened(d: Matrix, s: Any, a: Any) -> Matrix:
     c = r / (dF/dd), the force on the plate being 1/r of that on the bar. Source: S1 eq. (12), differentiated.
     """
     r = s.lever_long / s.lever_short
-    slope = ca.vertcat(*(ca.gradient(force(x, s, a), x) for x in ca.vertsplit(d)))
+    at = ca.SX.sym("d")
+    slope = ca.gradient(force(at, s, a), at)
+    slope = ca.vertcat(*(ca.substitute(slope, at, x) for x in ca.vertsplit(ca.SX(d))))
     home = linear_force(1.0, s, a)
     return r / home - r / slope
 
