@@ -40,7 +40,9 @@ def ctrlgen(*words: str, progress: bool = False) -> str:
         [sys.executable, "-m", "ctrlgen", *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=shown, text=True
     )
     if done.returncode:
-        raise RuntimeError(f"ctrlgen {' '.join(words)}: exit {done.returncode}: {(done.stderr or done.stdout or '').strip()}")
+        raise RuntimeError(
+            f"ctrlgen {' '.join(words)}: exit {done.returncode}: {(done.stderr or done.stdout or '').strip()}"
+        )
     return done.stdout
 
 

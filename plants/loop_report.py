@@ -84,12 +84,12 @@ def draw(before: Measured, after: Measured) -> plt.Figure:
         label = f"{name}: mean error {m.overall:.2f} %"
         plane.plot(*_closed(c[:, 3:5] + MAGNIFIED * error[:, 3:5]).T, color=COLOURS[name], lw=1.4, label=label)
         along.semilogy(share, 1e3 * np.linalg.norm(error[:, 3:], axis=1), color=COLOURS[name])
-        turns.semilogy(share, 1e6 * np.linalg.norm(error[:, :3], axis=1), color=COLOURS[name])
+        turns.plot(share, 1e6 * np.linalg.norm(error[:, :3], axis=1), color=COLOURS[name])
     plane.set(xlabel="delta_x [um]", ylabel="delta_y [um]", aspect="equal", title=f"circle, error drawn {MAGNIFIED}x")
     plane.legend(loc="center", fontsize=8, frameon=False)
     along.set(ylabel="|error of delta| [nm]", title="generated C on the plant, along the circle", xlim=(0, 1))
     along.tick_params(labelbottom=False)
-    turns.set(xlabel="share of a turn", ylabel="|rotation| [urad]", xlim=(0, 1))
+    turns.set(xlabel="share of a turn", ylabel="|rotation| [urad]", xlim=(0, 1), ylim=(0, None))
     for axes in (plane, along, turns):
         axes.grid(alpha=0.3)
     return figure

@@ -20,11 +20,11 @@ from plants.mems_hexapod import MemsHexapod
 
 def test_the_recording_is_one_that_ctrlgen_reads(tmp_path, device):
     poses = record(MemsHexapod(), tmp_path)
-    (recorded,) = (load_recordings([tmp_path], build_model(device)),)
+    recorded = load_recordings([tmp_path], build_model(device))
     fit, held = recorded.records
     assert recorded.kind == "poses" and (fit.role, held.role) == ("fit", "hold_out")
     assert poses == len(fit.time) + len(held.time) and 60 <= poses <= 120
-    assert not recorded.notes or all("marked" not in note for note in recorded.notes)
+    assert all(record.valid.all() for record in recorded.records)
 
 
 def test_what_is_held_out_is_of_another_class():
@@ -45,7 +45,7 @@ def loop(tmp_path_factory) -> Loop:
 
 
 @pytest.mark.long
-def test_the_diagnosis_halves_the_error_eight_times_over(loop):
+def test_the_corrected_c_errs_less_than_half_a_percent(loop):
     """S1 prints 3.38 % against its own finite elements; the plant without the correction gives 3.97 %."""
     assert loop.before.overall == pytest.approx(3.97, abs=0.05)
     assert loop.after.overall < 0.5
@@ -55,12 +55,13 @@ def test_the_diagnosis_halves_the_error_eight_times_over(loop):
 
 @pytest.mark.long
 def test_the_missing_physics_is_named(loop):
-    """The lever gives way: the platform gets some 4 % less travel at every stage."""
-    assert loop.diagnosis["verdict"] in ("explained", "ambiguous", "partly")
-    assert any(found["location"].startswith("stage:") for found in loop.diagnosis["findings"])
+    """Stages that stiffen and struts that turn are in the plant; which number of the lever is off, poses alone cannot tell."""
+    assert loop.diagnosis["verdict"] in ("explained", "ambiguous")
+    found = {(f["effect"], f["location"]) for f in loop.diagnosis["findings"]}
+    assert {("link_load", "stage:all"), ("turning_links", "mechanism:all")} <= found
 
 
 @pytest.mark.long
 def test_the_corrected_device_is_one_that_ctrlgen_reads(loop, tmp_path_factory):
     (path,) = tmp_path_factory.getbasetemp().glob("loop*/after/circle20/device.toml")
-    assert load_device(path).effect or loop.diagnosis["findings"]
+    assert load_device(path).effect
