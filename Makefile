@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long bench battery lint clean
+.PHONY: run test test-long bench battery loop lint clean
 
 run: $(VENV)/installed
 	$(BIN)/ctrlgen run scenarios/circle20 --out out/circle20
@@ -25,6 +25,11 @@ OPPONENTS ?= 4
 battery: $(VENV)/installed-test
 	test -e out/battery_$(SIZE)_$(SEED)/battery.json || $(BIN)/python -m battery make --out out/battery_$(SIZE)_$(SEED) --seed $(SEED) --size $(SIZE)
 	$(BIN)/python -m battery score out/battery_$(SIZE)_$(SEED) --run "$(BIN)/ctrlgen diagnose" --opponents $(OPPONENTS)
+
+# make loop    drives the independent plant with generated C, diagnoses it, corrects the device, drives it again (minutes)
+loop: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[plant]'
+	$(BIN)/python -m plants.loop --out out/loop
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

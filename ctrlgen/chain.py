@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,12 +29,14 @@ class Chain:
         self.device, self.links, self.ambient, self.sample_time = device, links, ambient, sample_time
         self.z = ca.SX.sym("d", len(links.axes))
         reach = REACH * links.displacement_scale
-        self.resisting = links.resistance(ca.fmin(ca.fmax(self.z, -reach), reach))
+        self.within_reach = ca.fmin(ca.fmax(self.z, -reach), reach)
+        self.resisting = links.resistance(self.within_reach)
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.before: dict[Place, ca.SX] = {}
         self.held = self.held_value = ca.SX(0, 1)
         self.rates: ca.SX | None = None
+        self.carried = self.z
         self.members: list[_Member] = []
         self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
@@ -83,6 +86,7 @@ class Chain:
             value=before[i], all=before, index=i, partner=partner, ambient=self.ambient, sample_time=self.sample_time,
             **states,
         )  # fmt: skip
+        s.second_order, s.yielding = (lambda: self.second_order), (lambda: self.yielding)
         if place not in (Place.POSE, Place.SENSOR):
             i = min(i, len(self.links.axes) - 1)
             s.displacement, s.displacements = self.z[i], self.z
@@ -96,6 +100,16 @@ class Chain:
         where = channels(self.links, place)[s.index]
         s.scale, s.travel = where.scale, where.travel_scale
         return s
+
+    @cached_property
+    def second_order(self) -> ca.SX:
+        """What finite turns add to the pose at the displacement carried; built when an effect asks."""
+        return self.links.second_order(self.carried)
+
+    @cached_property
+    def yielding(self) -> ca.SX:
+        """How much less the stages yield to the links' load than at home; built when an effect asks."""
+        return self.links.yielding(self.within_reach)
 
     def parts(self, p: ca.SX, p_nominal: np.ndarray) -> dict[str, Any]:
         """The fields of `ctrlgen.model.Model`."""
@@ -184,6 +198,7 @@ class Chain:
         """Signals, force balance, arriving heat, the symbol of heat and what it is of the drive."""
         links, z, n = self.links, self.z, len(self.links.axes)
         displacement = self._with_terms(Place.DISPLACEMENT, z)
+        self.carried = displacement
         pose = self._with_terms(Place.POSE, links.pose(displacement))
         reading = self._with_terms(Place.SENSOR, pose)
         u = links.drive.expr
@@ -288,6 +303,7 @@ def available(links: Links, sample_time: float | None = None) -> frozenset[str]:
         "velocity": links.mass is not None or links.imposed, "state": links.heat_signal is not None,
         "heat": links.heat_signal is not None, "ambient": True, "sample_time": sample_time is not None,
         "force": any(same_dimension(links.force_unit, unit) for unit in ("N", "N*m")), "spatial": len(links.components) == 6,
+        "second_order": links.second_order is not None, "yielding": links.yielding is not None,
     }  # fmt: skip
     return frozenset(name for name, there in present.items() if there)
 

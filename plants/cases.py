@@ -16,7 +16,7 @@ import numpy as np
 
 from plants.frame import Array
 from plants.mems_hexapod import MemsHexapod
-from plants.numbers import number
+from plants.numbers import UNITS, number
 from plants.paper import error
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -77,13 +77,17 @@ def _solved(scenario: str) -> tuple[Array, Array]:
         done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
         if done.returncode:
             raise RuntimeError(f"ctrlgen solve {scenario} failed: {done.stderr.strip()}")
-        with open(out / "trajectory.csv", newline="", encoding="utf-8") as file:
-            header, *rows = csv.reader(file)
-    values = np.array(rows, dtype=float)
-
-    def column(start: str) -> Array:
-        (place,) = (i for i, name in enumerate(header) if name.startswith(f"{start} ["))
-        return values[:, place] * number(f"1 {header[place].partition('[')[2].rstrip(']')}")
-
+        columns = table(out / "trajectory.csv")
     axes = [f"F_{stage}{direction}" for stage in (1, 2, 3) for direction in "XY"]
-    return np.column_stack([column(name) for name in CHANNELS]), np.column_stack([column(name) for name in axes])
+    return tuple(np.column_stack([columns[name] for name in names]) for names in (CHANNELS, axes))
+
+
+def table(path: Path) -> dict[str, Array]:
+    """The columns of a trajectory.csv by name, in the units of this folder."""
+    with open(path, newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    columns = {}
+    for column, values in zip(header, np.array(rows, dtype=float).T, strict=True):
+        name, _, unit = column.partition(" [")
+        columns[name] = values * (number(f"1 {unit.rstrip(']')}") if unit.rstrip("]") in UNITS else np.nan)
+    return columns

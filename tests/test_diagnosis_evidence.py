@@ -394,7 +394,9 @@ def test_noise_of_one_colour_is_taken_at_its_density():
     e = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], np.random.default_rng(4).standard_normal(N)) * NOISE
     parts = (record(drive(), move(drive()) + e, "fit"), record(drive(), move(drive()) + e[::-1], "hold_out", N * H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), parts, ())
-    noise = Noise(np.array([NOISE * np.sqrt(1 - 0.9**2)]), (np.array([0.9]),), np.array([True]), ("given",), np.array([np.inf]))
+    noise = Noise(
+        np.array([NOISE * np.sqrt(1 - 0.9**2)]), (np.array([0.9]),), np.array([True]), ("given",), np.array([np.inf])
+    )
     fitter = Fitter(recording, noise)
     fitter.cache = CACHE
     left = mapped(fitter)[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -139,6 +140,35 @@ def test_struts_have_the_linear_jacobian_when_they_move_little(device, springs):
         column = struts.pose(struts.solve(1e-2 * np.eye(6)[k])) / 1e-2
         scale = np.abs(J).max(axis=1)
         assert np.abs((column - J[:, k]) / scale).max() < 1e-4
+
+
+def test_turning_struts_are_the_second_order(device):
+    """What rigid stages leave over of the linear Jacobian; 2 % are the wires' bending and the third order."""
+    p = device.values()
+    C = linear_stage.stage_compliance(p.stage, p.actuator) * 1e-9
+    J = np.array(ca.DM(linear_hexapod.jacobian(p.hexapod, C)))
+    struts, scale = Hexapod(NUMBERS), np.array([1, 1, 1, 1e-6, 1e-6, 1e-6])
+    for d in (np.array([30.0, 0, 0, 0, 0, 0]), np.array([26.0, 32.0, 10.0, 37.0, 21.0, 23.0])):
+        left = struts.pose(struts.solve(d)) * scale - J @ (d * 1e-6)
+        expected = np.array(ca.DM(linear_hexapod.second_order(ca.DM(d * 1e-6), p.hexapod))).ravel()
+        for part in (slice(0, 3), slice(3, 6)):
+            assert np.abs(left[part] - expected[part]).max() < 0.02 * np.abs(expected[part]).max()
+
+
+def test_stages_yield_less_to_the_struts_the_further_they_are_driven(whole, device):
+    """The whole beside stages alone: what is left after Jacobian and turning struts is at least halved by `stage_loads`."""
+    p = device.values()
+    C = linear_stage.stage_compliance(p.stage, p.actuator)
+    J = ca.DM(linear_hexapod.jacobian(p.hexapod, C))
+    loads = ca.DM(linear_hexapod.stage_loads(p.hexapod, C, J))
+    stage, forces = Stage(NUMBERS), np.tile([0.04, 0.06], 3)
+    free = {F: stage.displacement(stage.path(np.linspace(0, F, 5))[-1]) for F in (0.04, 0.06)}
+    d = ca.DM([free[F] * 1e-6 for F in forces])
+    pose = whole.pose(whole.path(np.linspace(0, 1, 5)[:, None] * forces)[-1]) * [1, 1, 1, 1e-6, 1e-6, 1e-6]
+    left = np.array(ca.solve(J, ca.DM(pose) - linear_hexapod.second_order(d, p.hexapod)) - d).ravel()
+    x = ca.SX.sym("d", 6)
+    given = ca.Function("c", [x], [linear_stage.stiffened(x, p.stage, p.actuator)])(d)
+    assert np.linalg.norm(left - np.array(given * (loads @ d)).ravel()) < 0.5 * np.linalg.norm(left)
 
 
 def test_struts_are_refined_enough():

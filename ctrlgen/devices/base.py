@@ -70,6 +70,8 @@ class Links:
     acceleration) and reads the force that takes. `bipolar` says whether the drive has both signs.
     `moving` (drive, x, d, d') -> force and rates of the states stands instead of `force` and `rates` where they depend
     on the velocity too, or the states on the displacement.
+    `second_order` is what finite turns of a linear mechanism's links add to `pose`, `yielding` by how much less stages
+    yield to the links' load at d than at home.
     """
 
     axes: tuple[str, ...]
@@ -98,6 +100,8 @@ class Links:
     imposed: bool = False
     bipolar: bool = True
     moving: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
+    second_order: Callable[[ca.SX], ca.SX] | None = None
+    yielding: Callable[[ca.SX], ca.SX] | None = None
 
 
 class Device(Section):

@@ -213,6 +213,8 @@ class MemsHexapod(Device):
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
             bipolar=False,
+            yielding=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
+            second_order=lambda d: hexapod.second_order(d, h),
         )
 
 

@@ -70,9 +70,9 @@ def _of_law(
                     yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, other.channel)
         return
     fitting = [where for where in places if law.fits(where)]
-    for where in fitting:
+    for where in () if law.whole else fitting:
         yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel)
-    if len(fitting) > 1 and law.place not in (Place.POSE, Place.SENSOR):
+    if law.whole or (len(fitting) > 1 and law.place not in (Place.POSE, Place.SENSOR)):
         yield Hypothesis(law.kind, f"{domain}:all", "all")
 
 

@@ -91,6 +91,7 @@ class Slopes:
         m, structure = self.response.model, self.fit.structure
         links = nominal_links(structure.device)
         columns, terms, states, rates, stepped, clocks, blocks = [], [], [], [], [], [], []
+        amplitudes, offs, sizes = [], [], []
         for h in hypotheses:
             law, where = h.law, structure.place(h)
             names = [w.channel for w in channels(links, law.place)]
@@ -112,8 +113,10 @@ class Slopes:
                     new = instance.update(s, p)
                     s.__dict__.update(new)
                     change = {state.name: ca.SX(float(state.clock)) for state in law.states} | instance.rates(s, p)
-                    term = ca.substitute(ca.jacobian(ca.SX(instance.term(s, p)), a), a, off)
-                    terms.append(term * size)
+                    terms.append(ca.SX(instance.term(s, p)))
+                    amplitudes.append(a)
+                    offs.append(off)
+                    sizes.append(size)
                     blocks.append(list(range(len(states), len(states) + len(m_states))))
                     states += list(m_states.values())
                     rates += [ca.substitute(ca.SX(change[state.name]), a, off) for state in law.states]
@@ -124,6 +127,10 @@ class Slopes:
                 meant = amplitude.expected or (low - off, high - off)
                 span = (meant[0] / size, meant[1] / size)
                 columns.append(Column(h, shape, tuple(self.probe_index[law.place, i] for i, _ in at), size, side, span))
+        if terms:  # each term depends on its own amplitude alone: one derivative of all of them
+            every, a = ca.vertcat(*terms), ca.vertcat(*amplitudes)
+            slope = ca.substitute(ca.jtimes(every, a, ca.DM(sizes)), a, ca.DM(offs))
+            terms = ca.vertsplit(slope)
         return columns, SimpleNamespace(
             terms=terms, states=states, rates=rates, stepped=stepped, clocks=clocks, blocks=blocks
         )

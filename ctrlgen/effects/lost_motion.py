@@ -13,7 +13,7 @@ class LostMotion(Effect):
     place = Place.DISPLACEMENT
     needs = frozenset({"force"})
     source = "S. T. Smith, Flexures: Elements of Elastic Mechanisms (2000): levers"
-    params = (Param("compliance", "um/N", (-10.0, 10.0), "lost travel per force", off=0.0),)
+    params = (Param("compliance", "um/N", (-100.0, 100.0), "lost travel per force", off=0.0),)
 
     def term(self, s, p):
         return -p.compliance * s.force

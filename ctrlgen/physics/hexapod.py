@@ -125,6 +125,28 @@ def kinematic_jacobian(h: Any) -> Matrix:
     return ca.solve(ca.vertcat(*rows_p), ca.vertcat(*rows_d))
 
 
+def second_order(d: Matrix, h: Any) -> Matrix:
+    """What finite turns of struts and platform add to the twist (6,) of `kinematic_jacobian`, to second order in `d` (6,) [m].
+
+    A strut between the middles of its wires keeps its length l. With the first-order twist (theta, delta), a = A_i and
+    w = delta + theta x a - b_i, which lies across n_i: n_i . (delta' + theta' x a) = -n_i . theta x (theta x a)/2 - w.w/(2 l).
+    Left out: third order, (d/l)^2 of the motion. Source: |A_i + delta + ... - B_i - b_i| = l, expanded.
+    """
+    g = geometry(h)
+    first = ca.mtimes(kinematic_jacobian(h), d)
+    theta, delta = first[:3], first[3:]
+    rows, rest = [], []
+    for i in range(6):
+        R, length = _strut_frame(g, i)
+        n, j = R[:, 0], STAGE_OF_STRUT[i]
+        a = g.platform[i] - n * h.wire_length / 2
+        w = delta + ca.cross(theta, a) - ca.mtimes(g.turn[j][:, :2], d[2 * j : 2 * j + 2])
+        turned = ca.cross(theta, ca.cross(theta, a)) / 2
+        rows.append(ca.horzcat(ca.cross(g.platform[i], n).T, n.T))
+        rest.append(-ca.dot(n, turned) - ca.dot(w, w) / (2 * (length - h.wire_length)))
+    return solve(ca.vertcat(*rows), ca.vertcat(*rest))
+
+
 def jacobian(h: Any, C_XY: Matrix) -> Matrix:
     """J = [C_j^T (C_j^Hex + C_j^XY)^-1 M_j], j = 1..3: twist of the platform per stage displacement, shape (6, 6).
 
@@ -142,6 +164,21 @@ def jacobian(h: Any, C_XY: Matrix) -> Matrix:
         wrench = solve(series((C_T, pair[j], stage[j])), _travel(g, j))  # eq. (16)
         columns.append(ca.mtimes(C_T, wrench))  # eq. (17)
     return ca.horzcat(*columns)
+
+
+def stage_loads(h: Any, C_XY: Matrix, J: Matrix) -> Matrix:
+    """Force of the struts against each actuated axis per stage displacement [N/m], shape (6, 6).
+
+    In-plane components of W_j of `wire_loads`; the stage yields to them by C_j^XY W_j. Source: S1 eq. (16).
+    """
+    g = geometry(h)
+    pair, stage = [inverse(K) for K in _pairs(_global_struts(g, h))], _global_stages(g, C_XY)
+    rows = []
+    for j in range(3):
+        travel = ca.horzcat(*(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)))
+        W = solve(series((pair[j], stage[j])), travel - J)
+        rows.append(ca.mtimes(g.turn[j][:, :2].T, W[:3, :]))
+    return ca.vertcat(*rows)
 
 
 @dataclass(frozen=True)

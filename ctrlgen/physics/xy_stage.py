@@ -58,6 +58,19 @@ def force(d: Scalar, s: Any, a: Any) -> Scalar:
     return linear_force(d, s, a) + nonlinear_force(d, s)
 
 
+def stiffened(d: Matrix, s: Any, a: Any) -> Matrix:
+    """c(0) - c(d) [m/N] of each axis: how much less a plate at `d` (n,) yields to a force along its axis than at home.
+
+    c = r / (dF/dd), the force on the plate being 1/r of that on the bar. Source: S1 eq. (12), differentiated.
+    """
+    r = s.lever_long / s.lever_short
+    at = ca.SX.sym("d")
+    slope = ca.gradient(force(at, s, a), at)
+    slope = ca.vertcat(*(ca.substitute(slope, at, x) for x in ca.vertsplit(ca.SX(d))))
+    home = linear_force(1.0, s, a)
+    return r / home - r / slope
+
+
 def notch_compliance(s: Any) -> Matrix:
     """[C^c] of a circular notch about its free end, x along the flexure, shape (6, 6). Source: S1 eq. (7).
 

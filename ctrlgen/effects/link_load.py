@@ -1,0 +1,19 @@
+"""Stages that stiffen: they yield less to the load of the links, the further they are driven."""
+
+from ctrlgen.effect import Effect, Param, Place
+
+
+class LinkLoad(Effect):
+    """Delta d = g (c(0) - c(d)) W, W the links' load on the stage and c(d) its compliance at d; a linear mechanism yields by c(0) W always.
+
+    Holds to first order in the load.
+    """
+
+    place = Place.DISPLACEMENT
+    needs = frozenset({"yielding"})
+    whole = True
+    source = "S1 eq. (12) and (16): stages in series with struts, at the stage's tangent stiffness"
+    params = (Param("share", "1", (-2.0, 4.0), "1 for the stage's own law", off=0.0),)
+
+    def term(self, s, p):
+        return p.share * s.yielding()[s.index]
