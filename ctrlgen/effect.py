@@ -139,6 +139,7 @@ class Effect:
     mutual: ClassVar[bool] = False
     channel_unit: ClassVar[str | None] = None
     partner_unit: ClassVar[str | None] = None
+    several: ClassVar[bool] = False  # may act more than once at one place, as harmonics do
     active: ClassVar[bool] = False  # may put energy into the stage
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 

@@ -230,7 +230,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
         and "<link" not in text
     )
     assert "A flexure or its glue keeps moving" in text and "Explained" in text.split("<h2>")[0]
-    assert text.count("<figure>") == 5 and "seed 7" in text and "0" * 64 in text
+    assert text.count("<figure>") == 7 and "seed 7" in text and "0" * 64 in text
     assert text.index("device.next.toml") < text.index("<figure>")
 
 
@@ -241,7 +241,8 @@ def test_a_title_cannot_write_html(found):
 
 def test_the_page_shows_whatever_evidence_there_is(found):
     part = {"label": "reading.axis", "excess": 4.0, "ci95": (3.0, 5.0)}
-    where = {"output": [part], "direction": {"axis": [{**part, "label": "forward"}]}, "said": ["more below 1 Hz"]}
+    nominal = {"output": [part], "direction": {"axis": [{**part, "label": "forward"}]}, "said": ["more below 1 Hz"]}
+    where = {"nominal": nominal, "left": {"said": []}}
     profile = {
         "effect": "creep", "location": "stage:axis", "parameter": "tau", "value": 0.2, "ci95": (0.1, 0.3), "unit": "s",
         "points": ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)),

@@ -5,8 +5,8 @@ Every effect of the library at every place where it can act, and every number of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 from ctrlgen.chain import available, channels
@@ -24,13 +24,25 @@ PARAMETER = "parameter"
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One effect at one place, `at` a channel (or "all") `of` another; or, for `effect` "parameter", one number of the device."""
+    """One effect at one place, `at` a channel (or "all") `of` another; or, for `effect` "parameter", one number of the device.
+
+    `count` says how many of its kind a structure has there already, where it may have several.
+    """
 
     effect: str
     location: str
     at: str = ""
     of: str | None = None
     path: str = ""
+    count: int = 0
+
+    def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
+        """The same where `causes` are there already: itself, one more of it, or None where there can be no more."""
+        there = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
+        if not there:
+            return self
+        several = self.effect != PARAMETER and self.law.several
+        return replace(self, count=1 + max(c.count for c in there)) if several else None
 
     @property
     def law(self) -> type[Effect]:

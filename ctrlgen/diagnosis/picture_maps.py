@@ -21,8 +21,10 @@ SHARE = 0.01  # of its variance: maps that show less are left out
 
 
 def draw_where(diagnosis: Diagnosis) -> Figure | None:
-    """Excess of squares over the noise's by output, actuator, band, region, time, direction; None where nothing is known."""
-    groups = {name: rows for name, value in plain(diagnosis.where).items() if (rows := excesses(value))}
+    """Excess of squares of the device as described over the noise's by output, actuator, band, region, time, direction;
+    None where nothing is known."""
+    found = plain(diagnosis.where).get("nominal", {}).items()
+    groups = {name: rows for name, value in found if (rows := excesses(value))}
     if not groups:
         return None
     heights = [0.35 + 0.2 * min(len(rows), PARTS) for rows in groups.values()]

@@ -12,6 +12,7 @@ class Cyclic(Effect):
     """
 
     place = Place.SENSOR
+    several = True
     source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
     params = (
         Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
