@@ -227,6 +227,8 @@ class _Check:
             elif derivative.of in units and not same_dimension(
                 f"({units[derivative.of]})/s^{derivative.order}", units[name]
             ):
-                self._fault(where, f"derivative {derivative.order} of {derivative.of} is not of the dimension of {name}")
+                self._fault(
+                    where, f"derivative {derivative.order} of {derivative.of} is not of the dimension of {name}"
+                )
             if any(name in w.columns_of(r) for r in w.record):
                 self._fault(where, "is a column as well; give one of the two")

@@ -186,10 +186,14 @@ class Searcher:
         return True
 
     def _justified(self, before: Trial, after: Trial) -> bool:
+        return self._worth(before, after) and self._meant(after)
+
+    def _worth(self, before: Trial, after: Trial) -> bool:
+        """Whether `after` explains enough more than `before` for its numbers, fitted and held out."""
         gained = before.fit.objective - after.fit.objective
         added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
         needed = max(MATERIAL**2 * self.n_fit, 12.0 + added * np.log(max(self.n_fit, 2)))
-        return gained > needed and before.held - after.held > 2.0 and self._meant(after)
+        return gained > needed and before.held - after.held > 2.0
 
     def _swap(self, current: Trial) -> Trial:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
@@ -220,7 +224,7 @@ class Searcher:
             if len(current.fit.structure.causes) < 2:
                 break
             bare = self.trial(_cooled(current.fit).without(k))
-            if not self._justified(bare, current):
+            if not self._worth(bare, current):
                 current = bare
         return current
 

@@ -116,7 +116,7 @@ class Structure:
             for p in law.params:
                 if p.expected:  # it is so or it is not: nothing to fit
                     continue
-                low, high = (where.si(b, p) for b in p.bounds)
+                low, high = cause.bounds(p, where)
                 off = 0.0 if p.off is None else where.si(p.off, p)
                 size = (
                     max(abs(start[p.name] - off), 1e-6 * (high - low))
