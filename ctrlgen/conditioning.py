@@ -18,6 +18,11 @@ def low_passed(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
     return sosfiltfilt(butter(ORDER, cutoff, fs=1 / sample_time, output="sos"), values)
 
 
+def shifted(values: np.ndarray, time: np.ndarray, lag: float) -> np.ndarray:
+    """`values` (n,) at `time` (n,), taken `lag` [s] before; straight between samples, NaN before the first."""
+    return np.interp(time - lag, time, values, left=np.nan, right=np.nan)
+
+
 def derived(values: np.ndarray, sample_time: float, order: int) -> np.ndarray:
     """The first or second derivative in time of `values` (n,) by central differences; one-sided at the ends."""
     for _ in range(order):

@@ -212,7 +212,13 @@ class _Reader:
             return None
         time, period = self._clock(kind, clock, n)
         if kind == "series" and n > 1:
-            values = self._conditioned(values, float(np.median(np.diff(time))))
+            late = {name: c.later.si for name, c in self.columns.items() if c.later and name in values}
+            values |= {name: conditioning.shifted(values[name], time, lag) for name, lag in late.items()}
+            rows = slice(*(r.rows or (0, n)))
+            inside = self._conditioned({k: v[rows] for k, v in values.items()}, float(np.median(np.diff(time))))
+            values = {name: np.full(n, np.nan) for name in inside}
+            for name, column in inside.items():
+                values[name][rows] = column
         if any(name not in values for name in names.drives):
             return None
         return self._record(names, values, time, period, ambient)
@@ -316,14 +322,14 @@ class _Reader:
 
 def _conditioned(written: RecordingFile) -> list[str]:
     """What was done to the columns before they were judged."""
-    if written.low_pass is None and not written.derivatives and written.keep_every == 1:
-        return []
-    done = [f"derivative {d.order} of {d.of} taken as {name}" for name, d in written.derivatives.items()]
+    columns = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.later}
+    done = [f"{name} taken as {c.later.text} later than its rows" for name, c in columns.items()]
+    done += [f"derivative {d.order} of {d.of} taken as {name}" for name, d in written.derivatives.items()]
     if written.low_pass is not None:
         done.insert(0, f"every column low-passed alike at {written.low_pass.text}, forward and backward")
     if written.keep_every > 1:
         done.append(f"one row in {written.keep_every} kept")
-    return ["Before anything else: " + "; ".join(done) + "."]
+    return [] if not done else ["Before anything else: " + "; ".join(done) + "."]
 
 
 def _contradicts(stated: str | None, scale: tuple[float, float], unit: str) -> bool:

@@ -20,7 +20,8 @@ class Column(Section):
     """A column of a measurement file: its name or number from 0, its unit, the stated standard deviation of its noise.
 
     `file` where it stands in another file than the record's, row by row the same samples. Its numbers times `scale`
-    are in `unit`: newtons per volt of an amplifier that was read in volt, -1 for a wire the other way round.
+    are in `unit`: newtons per volt of an amplifier that was read in volt, -1 for a wire the other way round. They belong
+    `later` than their row's time: a command of which the effect comes a cycle after it was recorded.
     """
 
     column: str | Annotated[int, Field(strict=True, ge=0)]
@@ -28,6 +29,7 @@ class Column(Section):
     noise: str | None = None
     file: str | None = None
     scale: float = 1.0
+    later: quantity("s") | None = None
 
 
 class Derivative(Section):
