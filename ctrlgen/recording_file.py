@@ -199,6 +199,9 @@ class _Check:
         except ValueError as error:
             self._fault(where, f"{error}; write for example {unit!r}")
 
+    def _observed(self, record: RecordTable) -> set[str]:
+        return {name for name in self.written.columns_of(record) if not name.startswith("drive.")}
+
     def _check_rows(self, k: int, record: RecordTable) -> None:
         """Rows are a stretch, and none is both fitted and held out."""
         if record.rows and record.judged[0] >= record.judged[1]:
@@ -210,6 +213,7 @@ class _Check:
                 record.file == other.file
                 and max(a[0], b[0]) < min(a[1], b[1])
                 and "rest" not in (record.role, other.role)
+                and self._observed(record) & self._observed(other)
             ):
                 what = f"share rows of {record.file} with record[{i}]; no sample may be fitted twice, or fitted and held out"
                 self._fault(f"record[{k}].rows", what)

@@ -148,8 +148,15 @@ class Searcher:
         trials = []
         for s in suspects:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
-            trials.append(self.trial(_warm(current.fit, s.hypothesis, s.start), s.hypothesis))
+            trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis)
         return tuple(sorted(trials, key=lambda t: t.total))
+
+    def _attempt(self, structure: Structure, cause: Hypothesis) -> list[Trial]:
+        """The trial; none where no device can be built with the numbers suspected."""
+        try:
+            return [self.trial(structure, cause)]
+        except ValueError:
+            return []
 
     def _together(self, current: Trial, screened: Screened, singles: tuple[Trial, ...]) -> list[Trial]:
         """Sets of suspects that promise more than any single one gave; each size must promise more than the smaller."""
@@ -168,7 +175,7 @@ class Searcher:
                     used[s.hypothesis] = used.get(s.hypothesis, 0) + 1
                     structure = structure.with_cause(s.hypothesis, s.start)
                 self.step("trying " + ", ".join(f"{s.hypothesis.effect} at {s.hypothesis.location}" for s in suspects))
-                trials.append(self.trial(structure, suspects[-1].hypothesis))
+                trials += self._attempt(structure, suspects[-1].hypothesis)
                 tried += 1
             best = max([best, *(current.fit.objective - t.fit.objective for t in trials if self._meant(t))])
         return trials

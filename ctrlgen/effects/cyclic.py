@@ -3,12 +3,13 @@
 import casadi as ca
 
 from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.units import same_dimension
 
 
 class Cyclic(Effect):
     """Delta y = A sin(2 pi y/Lambda + phi). One harmonic; use several for a distorted one.
 
-    Holds for A below Lambda/2 pi, so that the reading still rises with the position.
+    Holds for A below Lambda/2 pi, so that the reading still rises with the position; of positions and angles alone.
     """
 
     place = Place.SENSOR
@@ -22,6 +23,10 @@ class Cyclic(Effect):
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home", grid=(0.0, 90.0)),
     )  # fmt: skip
+
+    @classmethod
+    def fits(cls, where):
+        return any(same_dimension(where.unit, unit) for unit in ("m", "rad"))
 
     def term(self, s, p):
         return p.amplitude * ca.sin(2 * ca.pi * s.value / p.period + p.phase)
