@@ -1,6 +1,6 @@
 """Prints the relative force errors of EMPS, norm(error)/norm(force), beside the owner's.
 
-    python scenarios/emps/account.py
+python scenarios/emps/account.py
 """
 
 from __future__ import annotations

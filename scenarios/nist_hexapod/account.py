@@ -1,6 +1,6 @@
 """Prints what `ctrlgen diagnose` finds in this recording: each correction by its size, and the errors beside the paper's.
 
-    python scenarios/nist_hexapod/account.py
+python scenarios/nist_hexapod/account.py
 """
 
 from __future__ import annotations
