@@ -3,7 +3,6 @@
 import casadi as ca
 
 from ctrlgen.effect import Effect, Param, Place
-from ctrlgen.units import same_dimension
 
 
 class Cyclic(Effect):
@@ -14,6 +13,7 @@ class Cyclic(Effect):
 
     place = Place.SENSOR
     several = True
+    channel_unit = ("m", "rad")
     source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
     params = (
         Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
@@ -23,10 +23,6 @@ class Cyclic(Effect):
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home", grid=(0.0, 90.0)),
     )  # fmt: skip
-
-    @classmethod
-    def fits(cls, where):
-        return any(same_dimension(where.unit, unit) for unit in ("m", "rad"))
 
     def term(self, s, p):
         return p.amplitude * ca.sin(2 * ca.pi * s.value / p.period + p.phase)

@@ -52,9 +52,10 @@ def main() -> None:
     print(f"the same 30, paper's 36 numbers, which were fitted to them too {means(unseen)}")
     print(f"all 54, paper's                        {means(paper)}")
     print("without one correction, the others as they are:")
-    rows = [(errors_without(found, k), cause, fit.values(k)) for k, cause in enumerate(fit.structure.causes)]
-    for errors, cause, values in sorted(rows, key=lambda row: -row[0].translation.mean()):
-        numbers = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+    rows = [(errors_without(found, k), k, cause, fit.values(k)) for k, cause in enumerate(fit.structure.causes)]
+    for errors, k, cause, values in sorted(rows, key=lambda row: -row[0].translation.mean()):
+        fitted = {u.name for u in fit.structure.unknowns if u.cause == k}
+        numbers = ", ".join(f"{name} = {value:.6g}" for name, value in values.items() if name in fitted) or "no number"
         print(f"  {means(errors)}  {cause.effect} at {cause.location} (SI: {numbers})")
 
 
