@@ -139,8 +139,9 @@ class Effect:
     pairs: ClassVar[bool] = False
     whole: ClassVar[bool] = False  # one law of all channels: suspected at all of them at once
     mutual: ClassVar[bool] = False
-    channel_unit: ClassVar[str | None] = None
+    channel_unit: ClassVar[str | tuple[str, ...] | None] = None  # or of one of these dimensions
     partner_unit: ClassVar[str | None] = None
+    several: ClassVar[bool] = False  # may act more than once at one place, as harmonics do
     active: ClassVar[bool] = False  # may put energy into the stage
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 
@@ -167,7 +168,8 @@ class Effect:
     @classmethod
     def fits(cls, where: Where) -> bool:
         """Whether the law makes sense at this channel (for an effect of pairs: `beside` the other one)."""
-        if cls.channel_unit is not None and not same_dimension(where.unit, cls.channel_unit):
+        units = (cls.channel_unit,) if isinstance(cls.channel_unit, str) else cls.channel_unit
+        if units is not None and not any(same_dimension(where.unit, unit) for unit in units):
             return False
         if not cls.pairs:
             return True

@@ -161,7 +161,7 @@ def _clock(record: Record, where: str) -> tuple[float, list[str], list[Fault]]:
         return np.nan, [], [Fault(f"{where}.time", what)]
     period = float(np.median(step))
     regular = step[step <= BREAK * period]
-    period = float(regular.mean())
+    period = float(f"{regular.mean():.9g}")  # the same for records that differ by rounding
     jitter = float(np.sqrt(np.mean((regular / period - 1) ** 2)))
     if jitter > JITTER:
         what = (

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen import gate
+from ctrlgen import conditioning, gate
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.files import read_toml, validate
 from ctrlgen.model import Model
@@ -29,7 +29,8 @@ class Record:
     recording.toml, k for settled poses; `sample_time` [s], inf for settled poses; `drive` (n, n_u) in the order of
     `model.signals["drive"].channels`, always finite; `observed` (n, n_y) in the order of `Recording.channels`, NaN
     where not `valid` (n, n_y): missing, in a gap, spike, stuck, or a pose that belongs to the other part. `linear`:
-    the drive goes straight between samples, else it is held. `ambient` (n,) [K], None where not given.
+    the drive goes straight between samples, else it is held. `ambient` (n,) [K], None where not given. `period` [s] after
+    which the run is stated to repeat itself.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Record:
     linear: bool
     ambient: np.ndarray | None
     valid: np.ndarray
+    period: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +149,8 @@ class _File:
         for k, (record, columns) in enumerate(zip(self.written.record, self.columns, strict=True)):
             where = f"{self.prefix}record[{k}]"
             sound = {name: column for name, column in columns.items() if fits(name, column, self.model)}
-            reader = _Reader(self.path.parent, record, sound, where)
-            raw = reader.read(names, self.written.kind)
+            reader = _Reader(self.path.parent, self.written, record, sound, where)
+            raw = reader.read(names)
             faults += reader.faults
             if raw is None:
                 continue
@@ -159,7 +161,7 @@ class _File:
             faults += found.faults
             if found.records:
                 spans.append((k, record, found.records[0].time[0], found.records[-1].time[-1]))
-        return records, notes, faults + self._overlaps(spans)
+        return records, _conditioned(self.written) + notes, faults + self._overlaps(spans)
 
     def _overlaps(self, spans: list[tuple[int, RecordTable, float, float]]) -> list[Fault]:
         """Records that the common clock, where one is stated, has run at the same time."""
@@ -179,14 +181,16 @@ class _File:
 class _Reader:
     """Reads one record's files; collects faults on the way."""
 
-    def __init__(self, folder: Path, record: RecordTable, columns: dict[str, Column], where: str) -> None:
-        self.folder, self.record, self.columns, self.where = folder, record, columns, where
+    def __init__(
+        self, folder: Path, written: RecordingFile, record: RecordTable, columns: dict[str, Column], where: str
+    ) -> None:
+        self.folder, self.written, self.record, self.columns, self.where = folder, written, record, columns, where
         self.faults: list[Fault] = []
         self.tables: dict[str, Table | None] = {}
 
-    def read(self, names: gate.Names, kind: str) -> Record | None:
+    def read(self, names: gate.Names) -> Record | None:
         """The record before any judgement; None where drives or clock cannot be read. `valid`: the channel was read."""
-        r = self.record
+        r, kind = self.record, self.written.kind
         read = {name: self._column(f"{self.where}.columns.{name!r}", column) for name, column in self.columns.items()}
         values = {name: column for name, column in read.items() if column is not None}
         clock = None if r.time is None else self._column(f"{self.where}.time", r.time)
@@ -204,9 +208,42 @@ class _Reader:
             what = f"{list(r.rows)} ends after the last of {n} rows of {r.file}"
             self.faults.append(Fault(f"{self.where}.rows", what))
         timed = kind == "poses" or clock is not None or (r.time is None and r.sample_rate is not None)
-        if not timed or any(name not in values for name in names.drives):
+        if not timed:
             return None
-        return self._record(names, values, *self._clock(kind, clock, n), ambient)
+        time, period = self._clock(kind, clock, n)
+        if kind == "series" and n > 1:
+            late = {name: c.later.si for name, c in self.columns.items() if c.later and name in values}
+            values |= {name: conditioning.shifted(values[name], time, lag) for name, lag in late.items()}
+            rows = slice(*(r.rows or (0, n)))
+            inside = self._conditioned({k: v[rows] for k, v in values.items()}, float(np.median(np.diff(time))))
+            values = {name: np.full(n, np.nan) for name in inside}
+            for name, column in inside.items():
+                values[name][rows] = column
+        if any(name not in values for name in names.drives):
+            return None
+        return self._record(names, values, time, period, ambient)
+
+    def _conditioned(self, values: dict[str, np.ndarray], sample_time: float) -> dict[str, np.ndarray]:
+        """The columns after the file's low-pass, with its derivatives; nothing where that cannot be done."""
+        w = self.written
+        if w.low_pass is not None:
+            broken = [name for name, column in values.items() if not np.isfinite(column).all()]
+            highest = conditioning.widest(sample_time, w.keep_every)
+            if not 0 < w.low_pass.si <= highest:
+                what = f"{w.low_pass.text} is too high for the rows that are kept; write {highest:.4g} Hz or less"
+                self.faults.append(Fault(f"{self.where}: low_pass", what))
+            if broken:
+                what = f"{', '.join(broken)} has rows without a number, which a filter smears; leave them out by rows"
+                self.faults.append(Fault(f"{self.where}: low_pass", what))
+            if broken or not 0 < w.low_pass.si <= highest:
+                return {}
+            values = {k: conditioning.low_passed(v, sample_time, w.low_pass.si) for k, v in values.items()}
+        made = {
+            name: conditioning.derived(values[d.of], sample_time, d.order)
+            for name, d in w.derivatives.items()
+            if d.of in values
+        }
+        return values | made
 
     def _clock(self, kind: str, clock: np.ndarray | None, n: int) -> tuple[np.ndarray, float]:
         """Time of every row of the file (n,) [s] and the sample time [s], NaN where the gate must find it."""
@@ -226,21 +263,24 @@ class _Reader:
         period: float,
         ambient: np.ndarray | float | None,
     ) -> Record:
-        r, n = self.record, len(time)
-        chosen = slice(*(r.rows or (0, n)))
+        r, n, every = self.record, len(time), self.written.keep_every
+        chosen = slice(*(r.rows or (0, n)), every)
         observed = np.full((n, len(names.observed)), np.nan)
         for i, name in enumerate(names.observed):
             observed[:, i] = values.get(name, np.nan)
+        judged = (np.arange(n) >= r.judged[0])[:, None]
+        there = np.array([name in values for name in names.observed])
         return Record(
             name=r.file + (f"[{r.rows[0]}:{r.rows[1]}]" if r.rows else ""),
             role=r.role,
             time=time[chosen],
-            sample_time=period,
+            sample_time=period * every,
             drive=np.column_stack([values[name] for name in names.drives])[chosen],
-            observed=observed[chosen],
+            observed=np.where(judged, observed, np.nan)[chosen],
             linear=r.between_samples == "linear",
             ambient=None if ambient is None else (np.zeros(n) + ambient)[chosen],
-            valid=np.tile([name in values for name in names.observed], (n, 1))[chosen],
+            valid=(judged & there)[chosen],
+            period=None if r.period is None else r.period.si,
         )
 
     def _ambient(self, given: Any) -> np.ndarray | float | None:
@@ -274,10 +314,22 @@ class _Reader:
             scale = to_si(1.0, column.unit), to_si(0.0, column.unit)
         except ValueError:  # the check of the file has said so
             return None
-        if _contradicts(table.units.get(name), scale, column.unit):
+        if column.scale == 1 and _contradicts(table.units.get(name), scale, column.unit):
             said = f"{file} says {table.units[name]}, recording.toml says {column.unit}; one of them is wrong"
             self.faults.append(Fault(where, said))
-        return values * (scale[0] - scale[1]) + scale[1]
+        return column.scale * values * (scale[0] - scale[1]) + scale[1]
+
+
+def _conditioned(written: RecordingFile) -> list[str]:
+    """What was done to the columns before they were judged."""
+    columns = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.later}
+    done = [f"{name} taken as {c.later.text} later than its rows" for name, c in columns.items()]
+    done += [f"derivative {d.order} of {d.of} taken as {name}" for name, d in written.derivatives.items()]
+    if written.low_pass is not None:
+        done.insert(0, f"every column low-passed alike at {written.low_pass.text}, forward and backward")
+    if written.keep_every > 1:
+        done.append(f"one row in {written.keep_every} kept")
+    return [] if not done else ["Before anything else: " + "; ".join(done) + "."]
 
 
 def _contradicts(stated: str | None, scale: tuple[float, float], unit: str) -> bool:

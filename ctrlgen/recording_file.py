@@ -13,18 +13,30 @@ from ctrlgen.model import Model
 from ctrlgen.units import parse, quantity, same_dimension
 
 FILE = "recording.toml"
+ENDLESS = 1 << 62
 
 
 class Column(Section):
     """A column of a measurement file: its name or number from 0, its unit, the stated standard deviation of its noise.
 
-    `file` where it stands in another file than the record's, row by row the same samples.
+    `file` where it stands in another file than the record's, row by row the same samples. Its numbers times `scale`
+    are in `unit`: newtons per volt of an amplifier that was read in volt, -1 for a wire the other way round. They belong
+    `later` than their row's time: a command of which the effect comes a cycle after it was recorded.
     """
 
     column: str | Annotated[int, Field(strict=True, ge=0)]
     unit: str
     noise: str | None = None
     file: str | None = None
+    scale: float = 1.0
+    later: quantity("s") | None = None
+
+
+class Derivative(Section):
+    """A signal that was not recorded: the `order`-th derivative in time of another one, by central differences."""
+
+    of: str
+    order: Literal[1, 2]
 
 
 class Conditions(Section):
@@ -34,7 +46,11 @@ class Conditions(Section):
 
 
 class RecordTable(Section):
-    """One [[record]] as written."""
+    """One [[record]] as written.
+
+    `lead_in` of its `rows`, the first, only bring the device's memories up to date and are not judged; after `period`
+    the run repeats itself, as far as its noise lets it.
+    """
 
     file: str
     role: Literal["fit", "hold_out", "rest"]
@@ -44,18 +60,33 @@ class RecordTable(Section):
     start: quantity("s") | None = None
     between_samples: Literal["held", "linear"] = "held"
     rows: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
+    lead_in: Annotated[int, Field(ge=0)] = 0
+    period: quantity("s", positive=True) | None = None
     conditions: Conditions = Conditions()
     columns: dict[str, Column] = {}
 
+    @property
+    def judged(self) -> tuple[int, int]:
+        """The rows that count, half open; without an end where the file has it."""
+        a, b = self.rows or (0, ENDLESS)
+        return a + self.lead_in, b
+
 
 class RecordingFile(Section):
-    """recording.toml as written; `columns` are every record's, which may override single ones."""
+    """recording.toml as written; `columns` are every record's, which may override single ones.
+
+    Of a series, `low_pass` is a cut-off that all columns and `derivatives` get alike, without phase, and `keep_every`
+    the rows that are kept after it.
+    """
 
     title: str
     device: str
     source: str = ""
     kind: Literal["series", "poses"]
+    low_pass: quantity("Hz", positive=True) | None = None
+    keep_every: Annotated[int, Field(ge=1)] = 1
     columns: dict[str, Column] = {}
+    derivatives: dict[str, Derivative] = {}
     record: Annotated[tuple[RecordTable, ...], Field(min_length=1)]
 
     def columns_of(self, record: RecordTable) -> dict[str, Column]:
@@ -107,6 +138,7 @@ class _Check:
             self._check_time(f"record[{k}]", record)
             self._check_channels(f"record[{k}]", written.columns_of(record))
             self._check_rows(k, record)
+        self._check_filter()
 
     def _fault(self, where: str, what: str) -> None:
         fault = Fault(where, what)
@@ -148,7 +180,7 @@ class _Check:
             else:
                 self._check_unit(f"{own}.{name!r}", column, units[name])
         for name, unit in units.items():
-            if name.startswith("drive.") and name not in columns:
+            if name.startswith("drive.") and name not in columns and name not in self.written.derivatives:
                 what = f'is missing, and the device cannot be simulated without; add "{name}" = {{ column = "...", unit = "{unit}" }}'
                 self._fault(f"{where}.columns", f"{name} {what}")
         if all(name.startswith("drive.") for name in columns):
@@ -167,16 +199,42 @@ class _Check:
         except ValueError as error:
             self._fault(where, f"{error}; write for example {unit!r}")
 
+    def _observed(self, record: RecordTable) -> set[str]:
+        return {name for name in self.written.columns_of(record) if not name.startswith("drive.")}
+
     def _check_rows(self, k: int, record: RecordTable) -> None:
         """Rows are a stretch, and none is both fitted and held out."""
-        if record.rows and record.rows[0] >= record.rows[1]:
-            self._fault(f"record[{k}].rows", f"{list(record.rows)} is empty; write [first, one past the last]")
+        if record.rows and record.judged[0] >= record.judged[1]:
+            what = f"{list(record.rows)} is empty" + (f" after a lead-in of {record.lead_in}" if record.lead_in else "")
+            self._fault(f"record[{k}].rows", f"{what}; write [first, one past the last]")
         for i, other in enumerate(self.written.record[:k]):
-            a, b = record.rows or (0, 1 << 62), other.rows or (0, 1 << 62)
+            a, b = record.judged, other.judged
             if (
                 record.file == other.file
                 and max(a[0], b[0]) < min(a[1], b[1])
                 and "rest" not in (record.role, other.role)
+                and self._observed(record) & self._observed(other)
             ):
                 what = f"share rows of {record.file} with record[{i}]; no sample may be fitted twice, or fitted and held out"
                 self._fault(f"record[{k}].rows", what)
+
+    def _check_filter(self) -> None:
+        """Derivatives are of recorded columns, in time, and need a clock; so does a cut-off."""
+        w, units = self.written, signal_units(self.model)
+        timed = {"derivatives": w.derivatives, "low_pass": w.low_pass, "keep_every": w.keep_every > 1}
+        if w.kind == "poses":
+            for key in (key for key, given in timed.items() if given):
+                self._fault(key, 'belongs to a series; leave it out, or write kind = "series"')
+        for name, derivative in w.derivatives.items():
+            where = f"derivatives.{name!r}"
+            if name not in units or not all(derivative.of in w.columns_of(r) for r in w.record):
+                what = f"a signal of {self.model.device.name}, `of` a column of every record, is needed"
+                self._fault(where, f"{what}; got {name} of {derivative.of}")
+            elif derivative.of in units and not same_dimension(
+                f"({units[derivative.of]})/s^{derivative.order}", units[name]
+            ):
+                self._fault(
+                    where, f"derivative {derivative.order} of {derivative.of} is not of the dimension of {name}"
+                )
+            if any(name in w.columns_of(r) for r in w.record):
+                self._fault(where, "is a column as well; give one of the two")

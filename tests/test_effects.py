@@ -208,7 +208,7 @@ def apply(effect: type[Effect], s: SimpleNamespace, numbers: list) -> tuple[list
 
 def place_unit(effect: type[Effect]) -> str:
     if effect.channel_unit:
-        return effect.channel_unit
+        return effect.channel_unit if isinstance(effect.channel_unit, str) else effect.channel_unit[0]
     return {Place.DRIVE: "V", Place.HEAT: "W", Place.FORCE: "N"}.get(effect.place, "m")
 
 

@@ -18,7 +18,7 @@ LAYERS = [
     "devices.section", "devices.ports", "devices.sensor", "devices.base", "devices.hinge",
     "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis devices.user", "devices",
     "calibration pose_errors",
-    "chain", "model", "marking recording_formats recording_file", "gate", "recording",
+    "chain", "model", "marking conditioning recording_formats recording_file", "gate", "recording",
     "motion", "simulation inverse", "readings", "controller linearisation",
     "paths", "scenario", "workspace", "programme", "shortfall", "solution",
     "cprint", "firmware", "reference", "comparison",

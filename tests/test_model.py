@@ -49,12 +49,13 @@ def test_a_step_of_coupled_states_equals_the_matrix_exponential(model):
 
     A = np.diag(np.full(6, -200.0)) + np.diag(np.full(5, 80.0), 1)
     coupled = replace(model, rates_of_heat=ca.mtimes(ca.DM(A), model.x) + 1000 * model.u)
-    x, u, h = np.linspace(1, 2, 6), np.linspace(0, 1, 6), 2e-3
-    exact = expm(h * A) @ x + np.linalg.solve(A, (expm(h * A) - np.eye(6)) @ (1000 * u))
-    value = ca.Function("step", [coupled.x, coupled.u], [coupled.step(h)])(x, u).full().ravel()
-    assert value == pytest.approx(exact, rel=1e-9)  # truncation of the series at order 12 for |hA| < 0.6
+    x, u = np.linspace(1, 2, 6), np.linspace(0, 1, 6)
+    for h in (2e-3, 0.02, 0.1):  # |hA| 0.6, 6, 30
+        exact = expm(h * A) @ x + np.linalg.solve(A, (expm(h * A) - np.eye(6)) @ (1000 * u))
+        value = ca.Function("step", [coupled.x, coupled.u], [coupled.step(h)])(x, u).full().ravel()
+        assert value == pytest.approx(exact, rel=1e-9)  # truncation of the series at order 12
     with pytest.raises(InputError, match="too long"):
-        coupled.step(0.1)
+        coupled.step(10.0)
 
 
 def test_the_state_space_has_the_closed_form_gain_and_pole(device, model):

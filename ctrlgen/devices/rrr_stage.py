@@ -50,12 +50,14 @@ class Piezo(Section):
 class RrrStage(Device):
     """Stack voltage -> force on the input == stiffness of the input -> output displacement.
 
-    `frame_angle` turns the output frame from that of Link 1.
+    `frame_angle` turns the output frame from that of Link 1. `inputs` says whether the input compliance is that of the
+    whole linear model or, as the paper prints it (B.83), without what the inputs give with the platform held.
     """
 
     kind: Literal["rrr_stage"]
     axes: tuple[str, str, str]
     frame_angle: quantity("deg")
+    inputs: Literal["whole", "printed"] = "whole"
     lengths: Lengths
     material: Material
     hinge1: Hinge
@@ -92,7 +94,7 @@ class RrrStage(Device):
         none pulls on its input is not checked.
         """
         k = stage(self, p)
-        K_in, J = k.input_stiffness, k.complete_J
+        K_in, J = input_stiffness(self, k), (k.complete_J if self.inputs == "whole" else k.J)
         limit, stroke = self.piezo.voltage_limit.si, self.piezo.stroke.si
         # The least that any voltages give: an input is pushed back a little when the others push.
         lowest = float(np.minimum(input_per_voltage(self), 0).sum(axis=1).min()) * limit
@@ -146,10 +148,15 @@ def stage(device: RrrStage, p: SimpleNamespace | None = None) -> Kinetostatics:
     return rrr_stage.kinetostatics([hinge_compliance(device, name, p) for name in device.hinges], g)
 
 
+def input_stiffness(device: RrrStage, k: Kinetostatics) -> Matrix:
+    """Input force per input displacement (3, 3) [N/m], by what the device's `inputs` says."""
+    return k.input_stiffness if device.inputs == "whole" else ca.inv(k.C_inFin)
+
+
 def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.ndarray:
     """Input displacement per stack voltage at rest, (3, 3) [m/V]: (C_in^-1 + k_p)^-1 F_b/V_max."""
     p = device.values() if p is None else p
-    K = stage(device, p).input_stiffness + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
+    K = input_stiffness(device, stage(device, p)) + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
     return ca.DM(ca.inv(K) * piezo_stack.blocked_force(1.0, p.piezo)).full()
 
 

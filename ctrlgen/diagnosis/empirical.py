@@ -98,7 +98,9 @@ def _held(fitter: Fitter, fit: Fit, held: Along, term: np.ndarray, delta: np.nda
     """Excess squares of one held-out record without the term and with it, the start fitted anew."""
     response = fit.structure.responses(fitter.recording, fitter.cache)[held.record.sample_time, held.record.linear]
     slopes = response.sensitivities(held.record, fit.theta)[1]
-    Y = np.nan_to_num(fitter.noise.whiten(slopes, held.record.valid)).reshape(-1, slopes.shape[2])
+    Y = np.nan_to_num(fitter.noise.whiten(slopes, held.record.valid)).reshape(
+        held.record.valid.size, -1 if slopes.size else 0
+    )
     r = held.white.ravel()
     # fit.J is the residual's slope, hence + : the numbers move back by what the term takes over
     changed = r - term - Y[:, : len(delta)] @ delta

@@ -5,14 +5,14 @@ Every effect of the library at every place where it can act, and every number of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 from ctrlgen.chain import available, channels
 from ctrlgen.devices import Device, Links
 from ctrlgen.devices.base import Section
-from ctrlgen.effect import Effect, Place, Where
+from ctrlgen.effect import Effect, Param, Place, Where
 from ctrlgen.units import Quantity, from_si
 
 DOMAIN = {
@@ -20,17 +20,32 @@ DOMAIN = {
     Place.POSE: "mechanism", Place.SENSOR: "sensor",
 }  # fmt: skip
 PARAMETER = "parameter"
+HALF = 0.49  # of the sampling rate: frequencies beyond look like lower ones, and half of it like nothing or an offset
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One effect at one place, `at` a channel (or "all") `of` another; or, for `effect` "parameter", one number of the device."""
+    """One effect at one place, `at` a channel (or "all") `of` another; or, for `effect` "parameter", one number of the device.
+
+    `count` says how many of its kind a structure has there already, where it may have several; `highest` [Hz] what the
+    samples can tell from its aliases, infinite where there is no clock.
+    """
 
     effect: str
     location: str
     at: str = ""
     of: str | None = None
     path: str = ""
+    count: int = 0
+    highest: float = float("inf")
+
+    def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
+        """The same where `causes` are there already: itself, one more of it, or None where there can be no more."""
+        there = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
+        if not there:
+            return self
+        several = self.effect != PARAMETER and self.law.several
+        return replace(self, count=1 + max(c.count for c in there)) if several else None
 
     @property
     def law(self) -> type[Effect]:
@@ -40,8 +55,19 @@ class Hypothesis:
     def shapes(self, where: Where) -> list[dict[str, float]]:
         """Every combination of the grids of the shape parameters [SI]; one empty one for laws without shape."""
         shaped = [p for p in self.law.params if p is not self.law.amplitude()]
-        grids = [[where.si(value, p) for value in p.grid or (sum(p.bounds) / 2,)] for p in shaped]
+        grids = [self._grid(p, where) for p in shaped]
         return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
+
+    def _grid(self, p: Param, where: Where) -> list[float]:
+        """The values tried of a shape parameter [SI]."""
+        low, high = self.bounds(p, where)
+        grid = [where.si(value, p) for value in p.grid or (sum(p.bounds) / 2,)]
+        return [value for value in grid if value <= high] or [(low + high) / 2]
+
+    def bounds(self, p: Param, where: Where) -> tuple[float, float]:
+        """Of a parameter [SI], here and with these samples."""
+        low, high = (where.si(b, p) for b in p.bounds)
+        return low, max(low, min(high, self.highest)) if p.unit == "Hz" else high
 
 
 def hypotheses(
@@ -59,6 +85,7 @@ def _of_law(
     if not law.needs <= there or (law.place is Place.HEAT and links.heat_signal is None):
         return
     domain = law.domain or DOMAIN[law.place]
+    highest = HALF / sample_time if sample_time else float("inf")
     places = channels(links, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
@@ -67,13 +94,15 @@ def _of_law(
         for k, where in enumerate(places):
             for j, other in enumerate(channels(links, law.place)):
                 if law.fits(where.beside(other)) and not (law.mutual and j < k):
-                    yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, other.channel)
+                    yield Hypothesis(
+                        law.kind, f"{domain}:{where.channel}", where.channel, other.channel, highest=highest
+                    )
         return
     fitting = [where for where in places if law.fits(where)]
     for where in () if law.whole else fitting:
-        yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel)
+        yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, highest=highest)
     if law.whole or (len(fitting) > 1 and law.place not in (Place.POSE, Place.SENSOR)):
-        yield Hypothesis(law.kind, f"{domain}:all", "all")
+        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
 
 
 def _numbers(device: Device) -> Iterator[tuple[str, str]]:

@@ -148,7 +148,7 @@ def period(drive: np.ndarray) -> int | None:
 
 def _repeats(record: Record, i: int) -> list[np.ndarray]:
     """Differences of neighbouring periods, the first left out for its transient, with the noise's own size."""
-    P = period(record.drive)
+    P = period(record.drive) if record.period is None else round(record.period / record.sample_time)
     if P is None or len(record.time) < 3 * P:
         return []
     y = np.where(record.valid[:, i], record.observed[:, i], np.nan)

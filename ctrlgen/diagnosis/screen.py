@@ -52,8 +52,8 @@ class Screen:
 
     def run(self, fit: Fit) -> Screened:
         """All hypotheses that the fit does not contain yet."""
-        taken = {(c.effect, c.location, c.of) for c in fit.structure.causes}
-        open_ = [h for h in self.hypotheses if (h.effect, h.location, h.of) not in taken]
+        beside = (h.beside(fit.structure.causes) for h in self.hypotheses)
+        open_ = [h for h in beside if h is not None]
         sums = Sums()
         columns: list[Column] = []
         first = 0

@@ -159,8 +159,15 @@ class Searcher:
         trials = []
         for s in suspects:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
-            trials.append(self.trial(_warm(current.fit, s.hypothesis, s.start), s.hypothesis))
+            trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis)
         return tuple(sorted(trials, key=lambda t: t.total))
+
+    def _attempt(self, structure: Structure, cause: Hypothesis) -> list[Trial]:
+        """The trial; none where no device can be built with the numbers suspected."""
+        try:
+            return [self.trial(structure, cause)]
+        except ValueError:
+            return []
 
     def _together(self, current: Trial, screened: Screened, singles: tuple[Trial, ...]) -> list[Trial]:
         """Sets of suspects that promise more than any single one gave; each size must promise more than the smaller."""
@@ -179,7 +186,7 @@ class Searcher:
                     used[s.hypothesis] = used.get(s.hypothesis, 0) + 1
                     structure = structure.with_cause(s.hypothesis, s.start)
                 self.step("trying " + ", ".join(f"{s.hypothesis.effect} at {s.hypothesis.location}" for s in suspects))
-                trials.append(self.trial(structure, suspects[-1].hypothesis))
+                trials += self._attempt(structure, suspects[-1].hypothesis)
                 tried += 1
             best = max([best, *(current.fit.objective - t.fit.objective for t in trials if self._meant(t))])
         return trials
@@ -197,17 +204,18 @@ class Searcher:
         return True
 
     def _justified(self, before: Trial, after: Trial) -> bool:
+        return self._worth(before, after) and self._meant(after)
+
+    def _worth(self, before: Trial, after: Trial) -> bool:
+        """Whether `after` explains enough more than `before` for its numbers, fitted and held out."""
         gained = before.fit.objective - after.fit.objective
         added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
         needed = 12.0 + added * np.log(max(self.n_fit, 2))
-        if gained <= needed or not self._meant(after):
+        if gained <= needed:
             return False
-        if (
-            before.fit.penalty - after.fit.penalty > 0.5 * gained
-        ):  # the device's numbers had to hide it: that shows nowhere else
+        if before.fit.penalty - after.fit.penalty > 0.5 * gained:  # the device hid it at a price: it shows nowhere else
             return before.held - after.held > -4.0
-        excess = max(before.held - self.n_held, 0.0)
-        worth = max(2.0, WORTHWHILE * excess)
+        worth = max(2.0, WORTHWHILE * max(before.held - self.n_held, 0.0))
         return gained > MATERIAL**2 * self.n_fit and before.held - after.held > worth
 
     def _swap(self, current: Trial) -> Trial:
@@ -241,7 +249,7 @@ class Searcher:
             if len(current.fit.structure.causes) <= least:
                 break
             bare = self.trial(_cooled(current.fit).without(k))
-            if not self._justified(bare, current):
+            if not self._worth(bare, current):
                 current = bare
         return current
 

@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.response import Response
 from ctrlgen.effect import Param, Where
 from ctrlgen.model import movable
 from ctrlgen.recording import Record, Recording
+from ctrlgen.units import Quantity
 
 FAR = 100.0  # standard deviations that a number may be off: the price of being off holds it, not a bound
 
@@ -73,7 +74,9 @@ class Structure:
         added, values = [], {}
         for cause, start in zip(self.causes, self.starts, strict=True):
             if cause.effect == PARAMETER:
-                values[cause.path] = start["value"]
+                number = next(q for path, _, q in numbers(self.device) if path == cause.path)
+                low, high = _reach(number)
+                values[cause.path] = min(max(start["value"], low), high)  # a stage of negative size cannot be built
                 continue
             where = self.place(cause)
             law = cause.law
@@ -99,15 +102,13 @@ class Structure:
         for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
             if cause.effect == PARAMETER:
                 q = sections[cause.path][1]
-                span = max(abs(q.si), 1e-3) * 0.9 if _unit(q.text) not in ("deg", "rad") else 0.5
                 rows.append(
                     Unknown(
                         cause.path,
                         _unit(q.text),
                         q.si,
-                        q.si - span,
-                        q.si + 10 * span,
-                        max(abs(q.si), 1e-3) * 1e-3,
+                        *_reach(q),
+                        (abs(q.si) or 1e-3) * 1e-3,
                         None,
                         index,
                         True,
@@ -118,7 +119,7 @@ class Structure:
             for p in law.params:
                 if p.expected:  # it is so or it is not: nothing to fit
                     continue
-                low, high = (where.si(b, p) for b in p.bounds)
+                low, high = cause.bounds(p, where)
                 off = 0.0 if p.off is None else where.si(p.off, p)
                 size = (
                     max(abs(start[p.name] - off), 1e-6 * (high - low))
@@ -179,6 +180,12 @@ def _around(value: float, reach: float) -> tuple[float, float]:
     """Bounds of an uncertain number, which does not change its sign."""
     low, high = value - reach, value + reach
     return (max(low, 1e-3 * value), high) if value > 0 else (low, min(high, 1e-3 * value)) if value < 0 else (low, high)
+
+
+def _reach(number: Quantity) -> tuple[float, float]:
+    """How far a suspected number is looked for [SI]: a tenth to ten times of it, half a radian for an angle."""
+    span = (abs(number.si) or 1e-3) * 0.9 if _unit(number.text) not in ("deg", "rad") else 0.5
+    return number.si - span, number.si + 10 * span
 
 
 def _unit(text: str) -> str:

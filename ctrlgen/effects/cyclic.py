@@ -8,10 +8,12 @@ from ctrlgen.effect import Effect, Param, Place
 class Cyclic(Effect):
     """Delta y = A sin(2 pi y/Lambda + phi). One harmonic; use several for a distorted one.
 
-    Holds for A below Lambda/2 pi, so that the reading still rises with the position.
+    Holds for A below Lambda/2 pi, so that the reading still rises with the position; of positions and angles alone.
     """
 
     place = Place.SENSOR
+    several = True
+    channel_unit = ("m", "rad")
     source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
     params = (
         Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),

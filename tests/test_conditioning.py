@@ -1,0 +1,76 @@
+"""Columns that are filtered, derived, shifted, scaled and thinned before they are judged."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+import ctrlgen
+from ctrlgen import conditioning
+from ctrlgen.errors import InputError
+from ctrlgen.model import build_model
+from ctrlgen.recording import load_recordings
+
+H, N = 1e-3, 4000
+T = H * np.arange(N)
+FILE = """
+title = "t"
+device = "emps"
+kind = "series"
+{top}
+[derivatives]
+"drive.velocity" = {{ of = "drive.position", order = 1 }}
+"drive.acceleration" = {{ of = "drive.position", order = 2 }}
+[[record]]
+file = "r.csv"
+role = "fit"
+sample_rate = "1 kHz"
+rows = [10, 2000]
+[[record]]
+file = "r.csv"
+role = "hold_out"
+sample_rate = "1 kHz"
+rows = [10, 4000]
+lead_in = 1990
+[columns]
+"drive.position" = {{ column = "q", unit = "mm" }}
+"reading.force" = {{ column = "u", unit = "N", scale = -2.0, later = "1 ms" }}
+"""
+
+
+@pytest.fixture
+def loaded(tmp_path):
+    """A function: keys on top of the file -> the recording of a 2 Hz sine whose force is minus half of it, 1 ms early."""
+    q = 50 * np.sin(2 * np.pi * 2 * T)
+    u = -0.5 * 50 * np.sin(2 * np.pi * 2 * (T + 1e-3))
+    np.savetxt(tmp_path / "r.csv", np.column_stack([q, u]), delimiter=",", header="q,u", comments="")
+    model = build_model(ctrlgen.load_device(ROOT / "scenarios" / "emps" / "device.toml"))
+
+    def load(top: str):
+        (tmp_path / "recording.toml").write_text(FILE.format(top=top))
+        return load_recordings([tmp_path / "recording.toml"], model)
+
+    return load
+
+
+def test_derivatives_scale_and_shift_give_what_was_meant(loaded):
+    fit, held = loaded('low_pass = "100 Hz"\nkeep_every = 4').records
+    w = 2 * np.pi * 2
+    assert fit.sample_time == pytest.approx(4e-3) and len(fit.time) == 498
+    inner = slice(20, -20)  # of the filter's ends
+    q, v, a = fit.drive[inner].T
+    assert v == pytest.approx(0.05 * w * np.cos(w * fit.time[inner]), abs=1e-4 * 0.05 * w)
+    assert a == pytest.approx(-(w**2) * q, abs=1e-3 * 0.05 * w**2)
+    assert fit.observed[inner, 0] == pytest.approx(1e3 * q, abs=0.01)  # N, in phase with the position in mm
+    assert not held.valid[:495].any() and held.valid[500:].all() and np.isfinite(held.drive).all()
+
+
+def test_a_cut_off_that_the_kept_rows_cannot_hold_is_refused(loaded):
+    with pytest.raises(InputError, match="too high for the rows that are kept"):
+        loaded('low_pass = "100 Hz"\nkeep_every = 10')
+
+
+def test_a_low_pass_has_no_phase():
+    y = conditioning.low_passed(np.sin(2 * np.pi * 20 * T), H, 100.0)
+    assert y[200:-200] == pytest.approx(np.sin(2 * np.pi * 20 * T)[200:-200], abs=1e-3)
