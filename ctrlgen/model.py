@@ -92,6 +92,10 @@ class Model:
         """`ambient` as an argument of a function: the symbol, or one that nothing depends on."""
         return self.ambient if self.ambient.is_symbolic() else ca.SX.sym("ambient")
 
+    def closed(self, expr: ca.SX) -> ca.SX:
+        """An effect's expression without the symbols of heat and of a held drive."""
+        return ca.substitute(ca.substitute(ca.SX(expr), self.heat, self.heat_of_drive), self.held, self.held_value)
+
     @cached_property
     def moved_by(self) -> frozenset[str]:
         """Names of all symbols in the equations of motion and the readings."""

@@ -37,7 +37,8 @@ def diagnose(device: Device, recording: Recording, seed: int = 0, progress: Prog
     Deterministic for a given `seed`. `progress` is called with a sentence before each step. Raises InputError where the
     recording holds nothing to fit or to hold out.
     """
-    with threadpool_limits(1):  # the matrices are small; threads that wait for each other cost more than they do
+    # one thread: the matrices are small; no warnings: a trial may leave the numbers, and is then rejected
+    with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _diagnose(device, recording, seed, progress or (lambda _: None))
 
 

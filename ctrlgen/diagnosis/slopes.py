@@ -151,13 +151,12 @@ class Slopes:
         S, e = ca.vertcat(m.x, m.z), r.ambient
         memory = ca.vertcat(ca.SX(0, 1), *law.states)
         dx = ca.vertcat(ca.SX(0, 1), *law.rates)
-        heated = lambda expr: ca.substitute(expr, m.heat, m.heat_of_drive)  # noqa: E731
         given = [S, m.u, e, m.p]
         inputs = [at.T, record.drive.T, r._ambients(record)[None, :], np.tile(self.p[:, None], (1, n))]
         values = np.zeros((0, n))
         if memory.numel():
-            values = self._memories(memory, heated(dx), given, inputs)
-        f = ca.Function("terms", [*given, memory], [heated(ca.vertcat(*law.terms))], {"cse": True})
+            values = self._memories(memory, m.closed(dx), given, inputs)
+        f = ca.Function("terms", [*given, memory], [m.closed(ca.vertcat(*law.terms))], {"cse": True})
         found = f.map(n)(*inputs, values).full().T
         lost = ~np.all(np.abs(found) < LOST, axis=0)  # memories that have left the numbers say nothing
         found[:, lost] = 0.0
@@ -178,7 +177,7 @@ class Slopes:
                     after[i] = memory[i] + h * ca.DM(phi[k : k + 1]) @ rates[block]
         for i, new in enumerate(law.stepped):
             if new is not None:
-                after[i] = ca.substitute(new, m.heat, m.heat_of_drive)
+                after[i] = m.closed(new)
             elif law.clocks[i]:
                 after[i] = memory[i] + (1.0 if settled else h)
         step = ca.Function("memories", [memory, *given], [ca.vertcat(*after)], {"cse": True})

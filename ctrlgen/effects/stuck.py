@@ -4,7 +4,7 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class Stuck(Effect):
-    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0."""
+    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Holds for one that is dead all the time."""
 
     place = Place.SENSOR
     source = "R. Isermann, Fault-Diagnosis Systems (2006): sensor faults"
