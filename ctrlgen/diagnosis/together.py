@@ -11,6 +11,7 @@ from ctrlgen.diagnosis.hypotheses import Hypothesis
 TOO_ALIKE = 0.04  # of a slope left beside the others of a set, below which amplitudes mean nothing
 BEAM = 200  # sets kept at each size
 LARGEST_SET = 4
+RIDGE = 1e-9  # keeps sets of two slopes that are all but one solvable
 LOOSE = 0.35  # how far beyond its bounds a linear estimate of an amplitude may lie, relative
 
 
@@ -60,7 +61,7 @@ class Together:
         for gain, members in beam:
             K = list(members)
             if K:
-                W = np.linalg.solve(self.C[np.ix_(K, K)], self.C[K])
+                W = np.linalg.solve(self.C[np.ix_(K, K)] + RIDGE * np.eye(len(K)), self.C[K])
                 rest = 1 - np.einsum("kj,kj->j", self.C[K], W)
                 score = self.z - W.T @ self.z[K]
             else:
@@ -76,7 +77,7 @@ class Together:
 
     def _amplitudes(self, members: tuple[int, ...]) -> np.ndarray:
         K = list(members)
-        return np.linalg.solve(self.C[np.ix_(K, K)], self.z[K]) / self.root[K]
+        return np.linalg.solve(self.C[np.ix_(K, K)] + RIDGE * np.eye(len(K)), self.z[K]) / self.root[K]
 
     def _sensible(self, members: tuple[int, ...], b: np.ndarray) -> bool:
         """Whether amplitudes are about inside their bounds, and in the range that the effect expects."""
