@@ -52,10 +52,13 @@ class Hypothesis:
         """The effect's class. Raises KeyError for a parameter."""
         return Effect.library[self.effect]
 
-    def shapes(self, where: Where) -> list[dict[str, float]]:
-        """Every combination of the grids of the shape parameters [SI]; one empty one for laws without shape."""
+    def shapes(self, where: Where, lines: tuple[float, ...] = ()) -> list[dict[str, float]]:
+        """Every combination of the grids of the shape parameters [SI]; one empty one for laws without shape.
+
+        `lines` [Hz] that stand out of what is left over are tried beside the frequencies of the grids.
+        """
         shaped = [p for p in self.law.params if p is not self.law.amplitude()]
-        grids = [self._grid(p, where) for p in shaped]
+        grids = [[*self._grid(p, where), *(lines if p.unit == "Hz" else ())] for p in shaped]
         return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
 
     def _grid(self, p: Param, where: Where) -> list[float]:

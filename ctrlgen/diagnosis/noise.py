@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
 from ctrlgen.recording import Record, Recording
@@ -18,6 +19,9 @@ LONGEST_ORDER = 8
 SHORTEST_REST = 200  # samples; an AR model of order 8 needs some 25 a coefficient
 DWELL_DEGREE = 4  # of the polynomial taken out of a dwell: creep and lags go on in it
 STATED = 1000.0  # samples that a stated deviation is worth
+LINES = 3  # at most, taken out of a rest
+NEAR_BINS = 15  # of the spectrum, over which noise is level
+OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
 LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
 OFTEN = 0.2  # distinct values a sample, below which a reading is seen to be in steps
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
@@ -90,7 +94,7 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
     }
     for source, (degree, parts) in samples.items():
-        parts = _quiet([_flat(part, degree) for part in parts if len(part) >= SHORTEST_REST])
+        parts = _quiet([_without_lines(_flat(part, degree)) for part in parts if len(part) >= SHORTEST_REST])
         if parts:
             sd, a = autoregression(parts)
             sd = max(sd, _step_of(recording, i) / np.sqrt(12.0))
@@ -110,6 +114,21 @@ def _flat(part: np.ndarray, degree: int) -> np.ndarray:
     """Without its slow part, a polynomial: what still settles is no noise."""
     t = np.linspace(-1, 1, len(part))
     return part - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, part, degree))
+
+
+def _without_lines(part: np.ndarray) -> np.ndarray:
+    """Without sinusoids that stand out of the spectrum: a vibration is a disturbance with a cause, no noise."""
+    n = len(part)
+    for _ in range(LINES):
+        power = np.abs(np.fft.rfft(part * np.hanning(n), n=8 * n)) ** 2
+        peak = int(np.argmax(power / np.maximum(median_filter(power, 8 * NEAR_BINS, mode="reflect"), 1e-300)))
+        around = np.median(power[max(0, peak - 4 * NEAR_BINS) : peak + 4 * NEAR_BINS])
+        if power[peak] < OUTSTANDING * around:
+            break
+        phase = 2 * np.pi * peak / (8 * n) * np.arange(n)
+        basis = np.column_stack([np.sin(phase), np.cos(phase)])
+        part = part - basis @ np.linalg.lstsq(basis, part, rcond=None)[0]
+    return part
 
 
 def _quiet(parts: list[np.ndarray]) -> list[np.ndarray]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
@@ -21,6 +22,8 @@ from ctrlgen.diagnosis.slopes import Column, Slopes, Sums
 from ctrlgen.diagnosis.together import Suspect, Together
 
 OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
+LINES = 3  # of the spectrum of what is left, tried as frequencies
+ZEROS = 8  # padding of that spectrum
 NULLS = 2000  # simulated records without mismatch
 
 
@@ -56,9 +59,9 @@ class Screen:
         open_ = [h for h in beside if h is not None]
         sums = Sums()
         columns: list[Column] = []
-        first = 0
+        first, lines = 0, self._lines(fit)
         for index, record in enumerate(self.fitter.to_fit):
-            slopes = Slopes(self.fitter, fit, record, open_)
+            slopes = Slopes(self.fitter, fit, record, open_, lines)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)
@@ -66,6 +69,20 @@ class Screen:
             first += n
             slopes.accumulate(sums, white, J, index, fit.starts[index] if fit.starts else None)
         return self._judge(fit, columns, sums, fit.J[first:], fit.residual[first:])
+
+    def _lines(self, fit: Fit) -> tuple[float, ...]:
+        """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
+        records = self.fitter.to_fit
+        if self.fitter.recording.kind == "poses" or not records:
+            return ()
+        k = int(np.argmax([r.valid.size for r in records]))
+        begin = sum(r.valid.size for r in records[:k])
+        left = fit.residual[begin : begin + records[k].valid.size].reshape(records[k].valid.shape)
+        window = np.hanning(len(left))[:, None]
+        power = np.sum(np.abs(np.fft.rfft(left * window, n=ZEROS * len(left), axis=0)) ** 2, axis=1)
+        peaks, _ = find_peaks(power, distance=4 * ZEROS)
+        best = peaks[np.argsort(-power[peaks])[:LINES]]
+        return tuple(float(f) for f in np.sort(best) / (ZEROS * len(left) * records[k].sample_time))
 
     def _judge(self, fit: Fit, columns: list[Column], sums: Sums, prior: np.ndarray, held: np.ndarray) -> Screened:
         if not columns or sums.SS is None:

@@ -23,6 +23,7 @@ MOST_CAUSES = {"poses": 12, "series": 5}
 WORTHWHILE = (
     0.05  # of the held-out excess over the noise that a further cause must take away: patches of a wrong law do not
 )
+LEARNINGS = 8  # of the noise from what is left, at most
 TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
 
 TRIAL_STEPS = 8
@@ -134,10 +135,15 @@ class Searcher:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""
         if self.fitter.noise.known.all():
             return trial
-        self.fitter.learn_noise(trial.fit)
-        self.known.clear()
-        self.screens.clear()
-        return self.trial(_cooled(trial.fit))
+        for _ in range(LEARNINGS):  # the numbers move as the noise that holds them shrinks
+            before = self.fitter.noise.sd
+            self.fitter.learn_noise(trial.fit)
+            self.known.clear()
+            self.screens.clear()
+            trial = self.trial(_cooled(trial.fit), trial.cause, steps=40)
+            if np.allclose(before, self.fitter.noise.sd, rtol=0.02):
+                break
+        return trial
 
     def _need(self, current: Trial, screened: Screened) -> float:
         """The z^2 that a cause must show: of its own size in the readings, or of the price at which the device hides it."""

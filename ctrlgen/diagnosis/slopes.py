@@ -61,8 +61,10 @@ class Sums:
 class Slopes:
     """The slopes of the readings by every hypothesis' amplitude on one record."""
 
-    def __init__(self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis]) -> None:
-        self.fitter, self.fit, self.record = fitter, fit, record
+    def __init__(
+        self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis], lines: tuple[float, ...]
+    ) -> None:
+        self.fitter, self.fit, self.record, self.lines = fitter, fit, record, lines
         device = fit.structure.described
         probed, probes = with_probes(device, nominal_links(fit.structure.device))
         self.numbers = [h for h in hypotheses if h.effect == PARAMETER]
@@ -103,7 +105,7 @@ class Slopes:
             low, high = (where.si(b, amplitude) for b in amplitude.bounds)
             off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
             side = 1 if off <= low else -1 if off >= high else 0
-            for shape in h.shapes(where):
+            for shape in h.shapes(where, self.lines):
                 for i, other in at:
                     m_states = {s.name: ca.SX.sym(f"m{len(states)}_{s.name}") for s in law.states}
                     a = ca.SX.sym("a")
