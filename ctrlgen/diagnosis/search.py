@@ -19,7 +19,7 @@ from ctrlgen.diagnosis.structure import Structure
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
 DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
-MOST_CAUSES = {"poses": 12, "series": 5}
+MOST_CAUSES = {"poses": 12, "series": 8}
 WORTHWHILE = (
     0.05  # of the held-out excess over the noise that a further cause must take away: patches of a wrong law do not
 )
@@ -198,11 +198,11 @@ class Searcher:
         return trials
 
     @staticmethod
-    def _meant(trial: Trial) -> bool:
-        """Whether every cause has an amplitude inside its bounds."""
+    def _meant(trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
+        """Whether every cause but those `accepted` has an amplitude inside its bounds."""
         structure = trial.fit.structure
         for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
-            if not unknown.amplitude:
+            if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
                 continue
             span = 1e-6 * (unknown.high - unknown.low)
             if value >= unknown.high - span or (value <= unknown.low + span and unknown.low != unknown.nominal):
@@ -210,7 +210,7 @@ class Searcher:
         return True
 
     def _justified(self, before: Trial, after: Trial) -> bool:
-        return self._worth(before, after) and self._meant(after)
+        return self._worth(before, after) and self._meant(after, before.fit.structure.causes)
 
     def _worth(self, before: Trial, after: Trial) -> bool:
         """Whether `after` explains enough more than `before` for its numbers, fitted and held out."""
