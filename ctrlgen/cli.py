@@ -295,8 +295,8 @@ def diagnose(
 ) -> None:
     """Find what a device file leaves out: where, which physics by name, with numbers, proved on held-out records.
 
-    Leaves in --out: report.html (open this first), diagnosis.json, and device.next.toml, the device file with what
-    was found. The exit status is 0 whatever the verdict, and 2 for input that cannot be used.
+    Leaves in --out: report.html (open this first), diagnosis.json, device.next.toml, the device file with what was
+    found, and next_experiment/ where another recording would settle a doubt. The exit status is 0 whatever the verdict, and 2 for input that cannot be used.
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
