@@ -296,7 +296,8 @@ def diagnose(
     """Find what a device file leaves out: where, which physics by name, with numbers, proved on held-out records.
 
     Leaves in --out: report.html (open this first), diagnosis.json, device.next.toml, the device file with what was
-    found, and next_experiment/ where another recording would settle a doubt. The exit status is 0 whatever the verdict, and 2 for input that cannot be used.
+    found, and next_experiment/ where another recording would settle a doubt. The exit status is 0 whatever the
+    verdict, and 2 for input that cannot be used.
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
