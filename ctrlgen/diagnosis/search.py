@@ -29,7 +29,7 @@ TRIALS = 6  # suspects fitted a round, and as many sets of each size; three time
 TRIAL_STEPS = 8
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
-REPLACEMENTS = 4  # rivals fitted for a cause
+REPLACEMENTS = 6  # rivals fitted for a cause
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
 
 
