@@ -69,7 +69,6 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
     beside = evidence(fitter, found, after.passed, seed)
     return Diagnosis(
         verdict=said,
-        summary="",
         findings=findings(found),
         held_out=errors(fitter, found, noise.known),
         adequacy=after,
@@ -79,7 +78,6 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
         history=beside.history,
         notes=(*recording.notes, *noise.said, *([spikes] if spikes else [])),
         device=device,
-        next_device=found.chosen.fit.structure.described,
         recording=fitter.recording,
         search=found,
         fitter=fitter,

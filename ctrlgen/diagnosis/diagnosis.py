@@ -15,7 +15,7 @@ from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.search import Search
 from ctrlgen.diagnosis.structure import Structure, changed
 from ctrlgen.recording import Recording
-from ctrlgen.units import from_si, to_si
+from ctrlgen.units import difference, from_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 CI = 1.959964  # standard deviations of a 95 % interval
@@ -23,7 +23,7 @@ CI = 1.959964  # standard deviations of a 95 % interval
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its 95 % interval, in `unit`; `sided` says "two", "upper" or "lower" where the data only bound it."""
+    """A number with its 95 % interval, in `unit`."""
 
     value: float
     ci95: tuple[float, float]
@@ -55,10 +55,9 @@ class ChannelError:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The answer. `next_device` is the device file's content with the findings in it; `search` the evidence."""
+    """The answer; `search` is how it was found."""
 
     verdict: str
-    summary: str
     findings: tuple[Finding, ...]
     held_out: dict[str, ChannelError]
     adequacy: Adequacy
@@ -68,7 +67,6 @@ class Diagnosis:
     history: tuple[dict[str, Any], ...]
     notes: tuple[str, ...]
     device: Device
-    next_device: Device
     recording: Recording
     search: Search
     fitter: Fitter
@@ -111,7 +109,7 @@ def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, Chann
     found = {}
     floor = fitter.noise.floor
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
-        scale = from_si(1.0, unit) - from_si(0.0, unit) if to_si(0.0, unit) else from_si(1.0, unit)
+        scale = difference(1.0, unit)
         rms = []
         for trial in (search.nominal, search.chosen):
             squares = [((r.observed - fitter.predicted(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held]
@@ -134,31 +132,21 @@ def values(fit: Fit) -> dict[str, Estimate]:
 def findings(search: Search) -> tuple[Finding, ...]:
     """The causes of the chosen structure with intervals and rivals, the most important first."""
     fit, rows = search.chosen.fit, []
-    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if len(fit.theta) else np.zeros(0)
-    held = search.nominal.held
+    estimates = values(fit)
     for k, cause in enumerate(fit.structure.causes):
-        parameters = {}
-        for i, unknown in enumerate(fit.structure.unknowns):
-            if unknown.cause == k:
-                name = cause.path.rpartition(".")[2] if cause.effect == PARAMETER else unknown.path.rpartition(".")[2]
-                low, high = fit.theta[i] - CI * sd[i], fit.theta[i] + CI * sd[i]
-                parameters[name] = Estimate(
-                    float(from_si(fit.theta[i], unknown.unit)),
-                    (
-                        float(from_si(max(low, unknown.low), unknown.unit)),
-                        float(from_si(min(high, unknown.high), unknown.unit)),
-                    ),
-                    unknown.unit,
-                )
+        number = cause.path.rpartition(".")[2]
+        parameters = {
+            number if cause.effect == PARAMETER else unknown.name: estimates[unknown.path]
+            for unknown in fit.structure.unknowns
+            if unknown.cause == k
+        }
         for p in () if cause.effect == PARAMETER else cause.law.params:
             if p.expected:
                 middle = sum(p.expected) / 2
                 parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
         rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
-        gain = _gain(search, k)
         source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source
-        rows.append(Finding(cause.effect, cause.location, parameters, rivals, gain, source, cause))
-    del held
+        rows.append(Finding(cause.effect, cause.location, parameters, rivals, _gain(search, k), source, cause))
     return tuple(sorted(rows, key=lambda f: -f.held_out_gain))
 
 

@@ -8,7 +8,7 @@ anywhere among all hypotheses, if it is material (a tenth of the noise), and if 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,11 +21,10 @@ MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller 
 DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
 MOST_CAUSES = {"poses": 12, "series": 8}
 WORTHWHILE = (
-    0.05  # of the held-out excess over the noise that a further cause must take away: patches of a wrong law do not
+    0.05  # of the held-out excess over the noise: what a further cause must take away; patches of a wrong law do not
 )
 LEARNINGS = 8  # of the noise from what is left, at most
 TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
-
 TRIAL_STEPS = 8
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
@@ -61,7 +60,6 @@ class Search:
     rivals: tuple[tuple[Trial, ...], ...]
     rounds: tuple[Round, ...]
     last: Screened
-    n_held: int = field(default=0)
 
 
 class Searcher:
@@ -80,14 +78,13 @@ class Searcher:
         structure: Structure,
         cause: Hypothesis | None = None,
         steps: int = TRIAL_STEPS,
-        theta: np.ndarray | None = None,
     ) -> Trial:
         """Fits one structure and judges it on the held-out records."""
         key = frozenset(structure.causes)
         known, done = self.known.get(key, (None, 0))
         if known is not None and done >= steps:
             return replace(known, cause=cause)
-        fit = self.fitter.fit(structure, theta, steps)
+        fit = self.fitter.fit(structure, steps=steps)
         if known is not None and known.fit.objective <= fit.objective:
             self.known[key] = (known, steps)
             return replace(known, cause=cause)
@@ -125,7 +122,7 @@ class Searcher:
             screened = self._screened(current)
         nominal = self.trial(structure, steps=40)
         rivals = tuple(self._rivals(current, k) for k in range(len(current.fit.structure.causes)))
-        return Search(nominal, current, rivals, tuple(rounds), screened, self.fitter.held_out(current.fit)[1])
+        return Search(nominal, current, rivals, tuple(rounds), screened)
 
     def _polished(self, trial: Trial) -> Trial:
         """The same fit driven to its end; trials stop early."""

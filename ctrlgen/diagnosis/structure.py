@@ -12,12 +12,13 @@ import numpy as np
 
 from ctrlgen.chain import channels
 from ctrlgen.devices import Device
+from ctrlgen.devices.section import Section
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links, nuisances, numbers, written
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.effect import Param, Where
 from ctrlgen.model import movable
-from ctrlgen.recording import Record, Recording
-from ctrlgen.units import Quantity
+from ctrlgen.recording import Recording
+from ctrlgen.units import Quantity, written_unit
 
 FAR = 100.0  # standard deviations that a number may be off: the price of being off holds it, not a bound
 
@@ -97,7 +98,7 @@ class Structure:
         for path, sd in nuisances(self.device).items():
             if path in acting and path not in causes:
                 q = sections[path][1]
-                rows.append(Unknown(path, _unit(q.text), q.si, *_around(q.si, FAR * sd), sd, sd))
+                rows.append(Unknown(path, written_unit(q.text), q.si, *_around(q.si, FAR * sd), sd, sd))
         k = len(self.device.effect)
         for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
             if cause.effect == PARAMETER:
@@ -105,7 +106,7 @@ class Structure:
                 rows.append(
                     Unknown(
                         cause.path,
-                        _unit(q.text),
+                        written_unit(q.text),
                         q.si,
                         *_reach(q),
                         (abs(q.si) or 1e-3) * 1e-3,
@@ -184,14 +185,8 @@ def _around(value: float, reach: float) -> tuple[float, float]:
 
 def _reach(number: Quantity) -> tuple[float, float]:
     """How far a suspected number is looked for [SI]: a tenth to ten times of it, half a radian for an angle."""
-    span = (abs(number.si) or 1e-3) * 0.9 if _unit(number.text) not in ("deg", "rad") else 0.5
+    span = (abs(number.si) or 1e-3) * 0.9 if written_unit(number.text) not in ("deg", "rad") else 0.5
     return number.si - span, number.si + 10 * span
-
-
-def _unit(text: str) -> str:
-    from ctrlgen.units import written_unit
-
-    return written_unit(text)
 
 
 _MOVABLE: dict[int, tuple[Device, frozenset[str]]] = {}
@@ -208,9 +203,6 @@ def changed(device: Device, values: dict[str, float]) -> Device:
     """The device with some of its numbers at other values [SI]."""
 
     def walk(node: object, prefix: str) -> object:
-        from ctrlgen.devices.base import Section
-        from ctrlgen.units import Quantity, written_unit
-
         if isinstance(node, Quantity):
             return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
         if isinstance(node, Section):
@@ -225,8 +217,3 @@ def changed(device: Device, values: dict[str, float]) -> Device:
         return node
 
     return walk(device, "") if values else device
-
-
-def starts_of(record: Record, responses: dict[tuple[float, bool], Response]) -> int:
-    """How many numbers a record may start with."""
-    return len(responses[record.sample_time, record.linear].initial)
