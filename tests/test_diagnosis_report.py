@@ -270,6 +270,8 @@ def test_a_verdict_says_what_to_do(found):
     assert first[UNEXPLAINED][1].startswith("Not a cause I know")
     assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[AMBIGUOUS])
     assert "thermal_lag" not in sentence(told[EXPLAINED])
+    for settles, said in ((True, "Run the next experiment"), (False, "No drive I tried")):
+        assert next_steps(replace(told[AMBIGUOUS], next_experiment={"settles": settles}))[0].startswith(said)
     assert "no cause I know" in sentence(replace(found, verdict=UNEXPLAINED, findings=()))
 
 

@@ -32,7 +32,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Finding:
-    """One cause that was left out."""
+    """One cause that was left out.
+
+    `held_out_gain`: what is lost without it, in shares of the nominal whitened squares on the held-out records.
+    """
 
     effect: str
     location: str
@@ -146,15 +149,6 @@ def findings(search: Search) -> tuple[Finding, ...]:
                 parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
         rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
         source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source
-        rows.append(Finding(cause.effect, cause.location, parameters, rivals, _gain(search, k), source, cause))
+        gain = float((search.bare[k].held - search.chosen.held) / search.nominal.held)
+        rows.append(Finding(cause.effect, cause.location, parameters, rivals, gain, source, cause))
     return tuple(sorted(rows, key=lambda f: -f.held_out_gain))
-
-
-def _gain(search: Search, k: int) -> float:
-    """Share of the nominal held-out squares that goes with this cause, from the round that added it."""
-    cause = search.chosen.fit.structure.causes[k]
-    for round_ in search.rounds:
-        for trial in round_.trials:
-            if trial.cause == cause and trial.fit.structure.causes[-1] == cause:
-                return float((round_.before.held - trial.held) / search.nominal.held)
-    return float((search.nominal.held - search.chosen.held) / search.nominal.held)

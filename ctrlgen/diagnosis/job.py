@@ -79,7 +79,8 @@ def diagnose_into(
             write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
         step("report")
         write_next(found, Path(device), draft / "device.next.toml")
-        for name, content in found.extra.get("files", {}).items():
+        settles = (found.next_experiment or {}).get("settles")
+        for name, content in found.extra["files"].items() if settles else ():
             write_text(draft / "next_experiment" / name, content)
         write_text(draft / "diagnosis.json", json.dumps(as_dict(found), indent=1, allow_nan=False) + "\n")
         write_text(draft / "report.html", page(found, Provenance(digests(Path(device), recordings), seed)))

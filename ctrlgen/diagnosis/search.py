@@ -53,10 +53,12 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The nominal fit, the chosen one, per cause the rivals that explain alike, and the rounds in order."""
+    """The nominal fit, the chosen one, the chosen one without each of its causes, per cause the rivals that explain alike,
+    and the rounds in order."""
 
     nominal: Trial
     chosen: Trial
+    bare: tuple[Trial, ...]
     rivals: tuple[tuple[Trial, ...], ...]
     rounds: tuple[Round, ...]
     last: Screened
@@ -121,8 +123,10 @@ class Searcher:
             current = self._prune(self._polished(current), least=0)
             screened = self._screened(current)
         nominal = self.trial(structure, steps=40)
-        rivals = tuple(self._rivals(current, k) for k in range(len(current.fit.structure.causes)))
-        return Search(nominal, current, rivals, tuple(rounds), screened)
+        each = range(len(current.fit.structure.causes))
+        bare = tuple(self.trial(_cooled(current.fit).without(k)) for k in each)
+        rivals = tuple(self._rivals(current, k) for k in each)
+        return Search(nominal, current, bare, rivals, tuple(rounds), screened)
 
     def _polished(self, trial: Trial) -> Trial:
         """The same fit driven to its end; trials stop early."""

@@ -165,7 +165,6 @@ def _rivals(diagnosis: Diagnosis) -> str:
 def next_steps(diagnosis: Diagnosis) -> list[str]:
     """What a reader does now, in order."""
     verdict = diagnosis.verdict
-    experiment = "Run the next experiment below" if diagnosis.next_experiment else "Record more"
     use = "Use device.next.toml instead of the device file: solve and generate the C with it, and record once more."
     known = all(e.noise_floor is not None for e in diagnosis.held_out.values())
     rest = "" if known else " Record a rest (drive off) or repeat poses, so that the noise is known."
@@ -175,7 +174,9 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     if verdict == EXPLAINED:
         return [use]
     if verdict == AMBIGUOUS:
-        first = f"{experiment} to settle which of the alternatives it is; name no cause until then."
+        first = "No drive I tried would settle which of the alternatives it is: measure one of them apart, with another sensor or gauge."
+        if (diagnosis.next_experiment or {}).get("settles"):
+            first = "Run the next experiment below to settle which of the alternatives it is; name no cause until then."
         return [
             first,
             "device.next.toml holds the best of them; it predicts records of this kind as well as any." + rest,
