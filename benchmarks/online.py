@@ -15,8 +15,8 @@ from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from benchmarks.timed_c import Program, build, generated
 from ctrlgen.controller import Status
-from ctrlgen.cprint import Real
-from ctrlgen.firmware import generate
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.folder import generate
 from ctrlgen.solution import solve
 
 PASSES = 200  # over all targets of a set, in each round; the median counts

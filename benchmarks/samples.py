@@ -14,13 +14,13 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.comparison import EXCESS
 from ctrlgen.controller import Controller
-from ctrlgen.cprint import Real
+from ctrlgen.firmware.cprint import Real
 from ctrlgen.model import Model, build_model
 from ctrlgen.scenario import Scenario, load_scenario
 from ctrlgen.simulation import simulate
 from ctrlgen.solution import Solution, solve
+from ctrlgen.verification.comparison import EXCESS
 
 SCENARIO = Path(__file__).resolve().parent.parent / "scenarios" / "circle20"
 NEAR = 1e-11  # m: 0.01 nm, what two answers may differ by

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 from ctrlgen._version import __version__
 
 if TYPE_CHECKING:
-    from ctrlgen.comparison import Comparison, compare
     from ctrlgen.controller import Controller, Status
     from ctrlgen.devices import load_device
     from ctrlgen.devices.user import user_device
     from ctrlgen.diagnosis.diagnosis import Diagnosis
     from ctrlgen.diagnosis.job import diagnose
     from ctrlgen.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
-    from ctrlgen.firmware import generate
+    from ctrlgen.firmware.folder import generate
     from ctrlgen.job import Outcome, run
     from ctrlgen.model import Model, build_model
     from ctrlgen.readings import Record, record_readings
@@ -25,12 +24,13 @@ if TYPE_CHECKING:
     from ctrlgen.scenario import load_scenario
     from ctrlgen.simulation import Trace, simulate
     from ctrlgen.solution import Solution, solve
+    from ctrlgen.verification.comparison import Comparison, compare
 
 _HOME = {
-    "comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
+    "verification.comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
     "devices.user": ("user_device",),
     "diagnosis.diagnosis": ("Diagnosis",), "diagnosis.job": ("diagnose",), "recording": ("load_recordings",),
-    "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware": ("generate",),
+    "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware.folder": ("generate",),
     "job": ("Outcome", "run"), "model": ("Model", "build_model"), "readings": ("Record", "record_readings"), "scenario": ("load_scenario",),
     "simulation": ("Trace", "simulate"), "solution": ("Solution", "solve"),
 }  # fmt: skip

@@ -12,17 +12,18 @@ from typing import Any
 import numpy as np
 
 from ctrlgen import figures, report
-from ctrlgen.comparison import Comparison, compare, find_compilers
 from ctrlgen.devices import Device
 from ctrlgen.errors import Fault, InputError, SolverError
 from ctrlgen.files import whole_folder, write_text
-from ctrlgen.firmware import CFolder, generate
+from ctrlgen.firmware.folder import CFolder, generate
 from ctrlgen.measures import Expected, expectations
 from ctrlgen.model import build_model
 from ctrlgen.paths import Frame
 from ctrlgen.scenario import Scenario, load_scenario
 from ctrlgen.solution import Solution, solve
 from ctrlgen.units import from_si
+from ctrlgen.verification.comparison import Comparison, compare
+from ctrlgen.verification.toolchains import find_compilers
 from ctrlgen.workspace import Ball, Workspace
 
 Progress = Callable[[str], None]

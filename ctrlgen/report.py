@@ -13,13 +13,14 @@ import jinja2
 import numpy as np
 
 from ctrlgen._version import __version__
-from ctrlgen.comparison import Comparison
 from ctrlgen.figures import draw_all
 from ctrlgen.files import write_text
-from ctrlgen.firmware import CFolder, codegen_folder
+from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.templates import codegen_folder
 from ctrlgen.measures import Expected, in_unit
 from ctrlgen.solution import Margin, Solution
 from ctrlgen.units import from_si
+from ctrlgen.verification.comparison import Comparison
 
 CSV_SIGNALS = ("pose", "displacement", "force", "state", "power")
 

@@ -14,9 +14,9 @@ import pytest
 from conftest import ROOT, SCENARIOS
 
 from ctrlgen import Controller, CtrlgenError, build_model, load_scenario
-from ctrlgen.comparison import FLAGS
-from ctrlgen.cprint import Real, print_function
-from ctrlgen.firmware import generate
+from ctrlgen.firmware.cprint import Real, print_function
+from ctrlgen.firmware.folder import generate
+from ctrlgen.verification.toolchains import FLAGS
 
 GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"
 NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")

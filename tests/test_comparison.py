@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-import ctrlgen.comparison as compare_module
 from ctrlgen import ToolError
-from ctrlgen.comparison import compare
-from ctrlgen.cprint import Real
-from ctrlgen.firmware import generate
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.folder import generate
+from ctrlgen.verification import toolchains
+from ctrlgen.verification.comparison import compare
 
 
 @pytest.fixture
@@ -72,7 +72,7 @@ def test_c_that_hangs_up_is_reported(folder, circle):
 
 
 def test_without_a_compiler_the_message_says_what_to_install(folder, circle, monkeypatch):
-    monkeypatch.setattr(compare_module.shutil, "which", lambda _: None)
+    monkeypatch.setattr(toolchains.shutil, "which", lambda _: None)
     with pytest.raises(ToolError, match="apt-get install gcc"):
         compare(folder, circle)
 
@@ -82,7 +82,7 @@ def test_a_compiler_that_is_not_there_is_named_as_not_run(folder, circle, monkey
 
     real_which = shutil.which
     present = "gcc" if real_which("gcc") else "clang"
-    monkeypatch.setattr(compare_module.shutil, "which", lambda name: real_which(name) if name == present else None)
+    monkeypatch.setattr(toolchains.shutil, "which", lambda name: real_which(name) if name == present else None)
     comparison = compare(folder, circle)
     assert (
         comparison.passed

@@ -20,12 +20,12 @@ from conftest import DEVICE, SCENARIOS
 import ctrlgen.effects
 from ctrlgen import Controller, build_model, simulate
 from ctrlgen.chain import available, channels
-from ctrlgen.comparison import FLAGS
-from ctrlgen.cprint import Real, print_function
 from ctrlgen.devices import Device
 from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.files import validate
+from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.units import from_si, same_dimension
+from ctrlgen.verification.toolchains import FLAGS
 
 TESTED = {
     "kind": "tested_axis", "name": "tested", "title": "an axis under test", "source": "round numbers",

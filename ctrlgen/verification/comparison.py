@@ -7,8 +7,6 @@ drives that the C computed.
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
@@ -20,17 +18,15 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller import Status
-from ctrlgen.cprint import Real
 from ctrlgen.errors import ToolError
-from ctrlgen.firmware import CFolder, write_harness
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.model import Model
-from ctrlgen.reference import Reference
 from ctrlgen.simulation import simulate, trace
 from ctrlgen.solution import Solution
 from ctrlgen.units import from_si, same_dimension
-
-FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O2")
-COMPILERS = ("gcc", "clang")
+from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.toolchains import COMPILERS, compile_c, find_compilers
 
 # What a difference may be, and why.
 LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometre; a tenth, below any sensor here
@@ -77,24 +73,6 @@ class Comparison:
         return bool(self.rows) and all(row.passed for row in self.rows)
 
 
-def find_compilers() -> dict[str, str]:
-    """Present C compilers with their version line: gcc and clang, or else $CC or cc. Raises ToolError when there is none."""
-    present = [name for name in COMPILERS if shutil.which(name)]
-    others = [name for name in (os.environ.get("CC", ""), "cc") if name and shutil.which(name)]
-    found = {}
-    for name in present or others[:1]:
-        done = subprocess.run([name, "--version"], capture_output=True, text=True, check=False, start_new_session=True)
-        if done.returncode != 0:
-            raise ToolError(f"{name} --version ends with status {done.returncode}; repair or remove that compiler")
-        found[name] = (done.stdout.splitlines() or [name])[0]
-    if not found:
-        raise ToolError(
-            f"no C compiler found (looked for {', '.join(COMPILERS)}, $CC, cc); install one, on Debian: apt-get install gcc. "
-            "`ctrlgen generate` writes the C without it"
-        )
-    return found
-
-
 def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None] = lambda _: None) -> Comparison:
     """Builds and runs `folder` with every compiler present. Raises ToolError when a build or a run fails."""
     compilers = find_compilers()
@@ -117,22 +95,11 @@ def _build(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
     names = [pieces[real] for pieces in (folder.online, folder.player) if pieces]
     objects = [scratch / f"{compiler}_{name}.o" for name in names]
     for name, target in zip(names, objects, strict=True):
-        _compile(compiler, real, folder, ["-c", str(folder.path / f"{name}.c"), "-o", str(target)])
+        compile_c(compiler, folder.path, ["-c", str(folder.path / f"{name}.c"), "-o", str(target)])
     linked = [*map(str, objects), "-lm", "-o"]
-    _compile(compiler, real, folder, [str(scratch / f"harness_{real.suffix}.c"), *linked, str(program)])
-    _compile(compiler, real, folder, [str(folder.path / f"{folder.test[real]}.c"), *linked, f"{program}_test"])
+    compile_c(compiler, folder.path, [str(scratch / f"harness_{real.suffix}.c"), *linked, str(program)])
+    compile_c(compiler, folder.path, [str(folder.path / f"{folder.test[real]}.c"), *linked, f"{program}_test"])
     return program
-
-
-def _compile(compiler: str, real: Real, folder: CFolder, words: list[str]) -> None:
-    """Raises ToolError with the compiler's words, KeyboardInterrupt when it was killed."""
-    command = [compiler, *FLAGS, "-I", str(folder.path), *words]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, start_new_session=True)
-    if done.returncode < 0:
-        raise KeyboardInterrupt
-    if done.returncode != 0:
-        said = done.stderr.strip()[:2000] or f"(it said nothing; status {done.returncode} for: {' '.join(command)})"
-        raise ToolError(f"{compiler} refuses the {real.value} C:\n{said}")
 
 
 def _run(program: Path, mode: str, records: np.ndarray, width: int, start: tuple[np.ndarray, ...] = ()) -> np.ndarray:

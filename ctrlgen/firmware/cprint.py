@@ -150,5 +150,5 @@ def _expression(op: int, a: list[str], real: Real) -> str:
         ca.OP_OR: f"(({{0}} != {zero}) || ({{1}} != {zero})) ? {one} : {zero}",
     }  # fmt: skip
     if op not in forms:
-        raise CtrlgenError(f"CasADi operation {op} has no C99 form here; add it to ctrlgen/cprint.py")
+        raise CtrlgenError(f"CasADi operation {op} has no C99 form here; add it to ctrlgen/firmware/cprint.py")
     return forms[op].format(*a)

@@ -1,0 +1,30 @@
+"""The templates of `codegen/`, filled in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from ctrlgen.files import write_text
+
+
+def codegen_folder() -> Path:
+    """Templates and harness: `codegen/` of the repository, or its copy in an installed package."""
+    beside = Path(__file__).resolve().parents[2] / "codegen"
+    return beside if beside.is_dir() else Path(__file__).resolve().parents[1] / "_codegen"
+
+
+def write(template: str, context: dict[str, Any], path: Path) -> None:
+    """`template` of `codegen/templates/` with `context`, at `path`; a name that the template asks for and does not get is an error."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    write_text(path, environment.get_template(f"{template}.j2").render(context))
+
+
+def comment(text: str) -> str:
+    """`text` as it may stand inside a C comment, on one line."""
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")

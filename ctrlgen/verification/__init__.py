@@ -1,0 +1,1 @@
+"""Whether the generated C does what its references do."""
