@@ -5,6 +5,7 @@ This is the reference of the generated C: the C template does the same steps in 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntFlag
 from functools import cached_property
@@ -13,12 +14,17 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from ctrlgen.intervals import bounds
 from ctrlgen.inverse import Inverse, invert
 from ctrlgen.model import Limit, Model, build_model
 
 SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for
 MEMORY_SHRINKS = 8  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
-BISECTIONS = 12  # of the way to a target that the drives cannot reach in one sample: 1/4096 of it
+TRIALS = 3  # of the way to a target that the drives cannot reach in one sample
+INSET = (
+    1 - 2**-8
+)  # of the way to where straight drives would meet their limit: curved ones meet it a little earlier or later
+NEGLIGIBLE = 1e-6  # of a limit: directions in which nothing comes near it
 
 
 class Status(IntFlag):
@@ -94,15 +100,48 @@ class Controller:
         return MEMORY_SHRINKS if bent or m.x.numel() > m.n_states else 1
 
     @cached_property
-    def safe_displacement(self) -> float:
-        """The edge [m] of a box [0, edge]^n in which no guarded limit can be broken; below all where memories matter.
+    def gauge(self) -> ca.Function | None:
+        """wanted -> a cheap bound of the guarded limits' share; None where there is none.
 
-        The limits are convex and zero at home, so the box shrunk by the worst corner's share is safe.
+        The followed signal's own directions v_k (to first order at home) are a basis, z = sum_k lambda_k v_k, and for a
+        convex f with f(s z) = |s| f(z), as stresses of a linear structure are, f(z) <= sum_k |lambda_k| f(v_k).
         """
-        low, high = self.nominal.z_bounds
-        if self.nominal.x.numel() > self.nominal.n_states or not self.guarded_limits:
-            return float(np.min(low)) - 1.0
-        return float(np.max(high)) / max(1.0, *(self._worst_in_range(limit) for limit in self.guarded_limits))
+        m = self.nominal
+        if not self.guarded_limits or m.x.numel() > m.n_states:
+            return None
+        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(m.signals[self.follow].expr, m.z)])(m.rest, 0 * m.z_scale)
+        W = slope.full()
+        if W.shape[0] != W.shape[1] or np.linalg.matrix_rank(W) < len(W):
+            W = np.eye(m.z.numel())
+        reach = np.abs(W) @ m.z_bounds[1]  # of lambda_k over the range
+        V = np.linalg.inv(W) * reach  # columns v_k, scaled to where lambda_k = reach_k
+        shares = np.max([self._shares(side * V) for side in (-1.0, 1.0)], axis=0)
+        if not all(np.allclose(self._shares(s * V), abs(s) * shares, rtol=1e-6, atol=1e-6) for s in (-0.5, 0.1)):
+            return None
+        few = shares > NEGLIGIBLE
+        wanted = ca.SX.sym("wanted", m.z.numel())
+        bound = ca.sum1(ca.fabs(ca.mtimes(ca.DM(shares[few, None] / reach[few, None] * W[few]), wanted)))
+        return ca.Function(
+            "gauge", [wanted], [bound + shares[~few].sum() + NEGLIGIBLE], ["wanted"], ["bound"], {"cse": True}
+        )
+
+    def _shares(self, displacements: np.ndarray) -> np.ndarray:
+        """The guarded limits' share at each column of `displacements`, nothing remembered."""
+        m, count = self.nominal, displacements.shape[1]
+        cold = np.tile(m.rest[:, None], (1, count))
+        return self.composite_ratio.map(count)(cold, 0 * displacements, displacements).full().ravel()
+
+    @cached_property
+    def state_can_be_limited(self) -> bool:
+        """Whether a displacement in its range can want an actuator state beyond its limits, by interval arithmetic."""
+        m, n = self.nominal, self.nominal.n_states
+        ranges = {"wanted": m.z_bounds, "z": m.z_bounds, "x": m.x_bounds}
+        for k in (self.static, self.moving or self.static) if n else ():
+            low, high = bounds(k.state, ranges)
+            slack = self.slacks[1]
+            if np.any(low < m.x_bounds[0][:n] - slack) or np.any(high > m.x_bounds[1][:n] + slack):
+                return True
+        return False
 
     @cached_property
     def input_limits(self) -> np.ndarray:
@@ -140,24 +179,27 @@ class Controller:
         z_slack, s_slack, u_slack = self.slacks
         n = m.n_states
         x, z = state
-        if not np.all(np.abs(target) <= self.input_limits):  # false for NaN too
-            x_next = _row(k.advance(x, z, self.safe_drive))
-            return Step(Status.INPUT, z, x[:n], self.safe_drive, (x_next, _row(k.settle(x_next, z, self.safe_drive))))
 
         def acting(wanted: np.ndarray) -> tuple[np.ndarray, bool]:
             return _clamp(_row(k.state(x, z, wanted)), x_low[:n], x_high[:n], s_slack)
 
-        def drive(wanted: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, bool]:
-            return _clamp(_row(k.drive(x, z, wanted, held)), u_low, u_high, u_slack)
+        def drive(wanted: np.ndarray, held: np.ndarray) -> np.ndarray:
+            return _row(k.drive(x, z, wanted, held))
 
-        status = Status(0)
-        wanted, hit = _clamp(_row(k.displacement(x, z, target)), z_low, z_high, z_slack)
-        status |= Status.DISPLACEMENT if hit else Status(0)
+        wanted, status = _row(k.displacement(x, z, target)), Status(0)
+        if not np.all((wanted >= z_low) & (wanted <= z_high)):  # not for NaN either
+            if not np.all(np.abs(target) <= self.input_limits):
+                x_next = _row(k.advance(x, z, self.safe_drive))
+                return Step(
+                    Status.INPUT, z, x[:n], self.safe_drive, (x_next, _row(k.settle(x_next, z, self.safe_drive)))
+                )
+            wanted, hit = _clamp(wanted, z_low, z_high, z_slack)
+            status |= Status.DISPLACEMENT if hit else Status(0)
         held, hit = acting(wanted)
         if hit:
             status |= Status.STATE
             wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, self.safe_drive))
-        if self.guarded_limits and np.max(wanted) > self.safe_displacement:
+        if self.guarded_limits and (self.gauge is None or float(self.gauge(wanted)) > 1):
             first = ratio = float(self.composite_ratio(x, z, wanted))
             for _ in range(self.shrinks):
                 wanted = wanted / max(ratio, 1.0)
@@ -165,22 +207,39 @@ class Controller:
             if first > 1:
                 held, _ = acting(wanted)
             status |= Status.COMPOSITE if first > 1 + self.slack else Status(0)
-        u, beyond = drive(wanted, held)
+        u, beyond = _clamp(drive(wanted, held), u_low, u_high, u_slack)
         if beyond:
             status |= Status.DRIVE
             origin = np.zeros_like(z) if settle or self.moving is None else z
-            share, step = 0.0, 1.0
-            for _ in range(BISECTIONS):
-                step /= 2
-                part = origin + (share + step) * (wanted - origin)
-                if not drive(part, acting(part)[0])[1]:
-                    share += step
-            wanted = origin + share * (wanted - origin)
+            way = wanted - origin
+            wanted = origin + self._share_of(lambda s: drive(origin + s * way, acting(origin + s * way)[0])) * way
             held, _ = acting(wanted)
-            u, beyond = drive(wanted, held)
+            u, beyond = _clamp(drive(wanted, held), u_low, u_high, u_slack)
+        if not beyond and len(x) == n:  # nothing but the actuators remembers: they are where the drive was computed for
+            return Step(status, wanted, held, u, (held, wanted))
         x_next = _row(k.advance(x, wanted if settle or self.moving is None else z, u))
         z_next = _row(k.settle(x_next, wanted, u)) if beyond else wanted
         return Step(status, z_next, held, u, (x_next, z_next))
+
+    def _share_of(self, drive: Callable[[float], np.ndarray]) -> float:
+        """The largest share of a way found whose drives are admissible, by `TRIALS` secants of the drive that is first at its
+        limit; 0 where the way begins beyond one."""
+        (low, high), slack = self.nominal.u_bounds, self.slacks[2]
+        share, end, here, there = 0.0, 1.0, drive(0.0), drive(1.0)
+        if _clamp(here, low, high, slack)[1]:
+            return share
+        for _ in range(TRIALS):
+            part = 1.0
+            for i in np.flatnonzero((there > high + slack) | (there < low - slack)):
+                limit = high[i] if there[i] > high[i] else low[i]
+                part = min(part, (limit - here[i]) / (there[i] - here[i]))
+            trial = share + INSET * max(part, 0.0) * (end - share)
+            drives = drive(trial)
+            if _clamp(drives, low, high, slack)[1]:
+                end, there = trial, drives
+            else:
+                share, here = trial, drives
+        return share
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ import numpy as np
 from ctrlgen.model import Model
 
 CORNERS = frozenset((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_IF_ELSE_ZERO))
+NOISE = 1e-13  # of the largest entry of an equilibrated inverse: what rounding leaves of a zero
 NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves rounding only
 
 
@@ -148,13 +149,22 @@ def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
     base = known.base_of(v)
     slope = ca.jacobian(r, v)
     if not ca.symvar(slope):  # numbers only: invert them here, once
-        return base - ca.mtimes(ca.inv(ca.evalf(slope)), ca.substitute(r, v, base))
+        return base - ca.mtimes(_inverse(ca.evalf(slope).full()), ca.substitute(r, v, base))
     if not ca.depends_on(slope, v):
         return base - ca.solve(slope, ca.substitute(r, v, base))
     curvature = ca.jacobian(slope, v)
     if v.numel() == 1 and not ca.depends_on(curvature, v) and not _has_corners(slope):
         return base + _rising_root(known, r, v, base, slope, curvature)
     return _newton(r, v, ca.SX(known.inside(v)))
+
+
+def _inverse(slope: np.ndarray) -> ca.DM:
+    """The inverse of a matrix of numbers, scaled to rows and columns of order one; entries that are rounding are zero."""
+    rows = 1 / np.abs(slope).max(axis=1)
+    columns = 1 / np.abs(rows[:, None] * slope).max(axis=0)
+    scaled = np.linalg.inv(rows[:, None] * slope * columns)
+    scaled[np.abs(scaled) < NOISE * np.abs(scaled).max()] = 0.0
+    return ca.sparsify(ca.DM(columns[:, None] * scaled * rows))
 
 
 def _has_corners(slope: ca.SX) -> bool:

@@ -14,7 +14,7 @@ import pytest
 from conftest import ROOT, SCENARIOS
 
 from ctrlgen import Controller, CtrlgenError, build_model, load_scenario
-from ctrlgen.firmware.cprint import Real, print_function
+from ctrlgen.firmware.cprint import Real, print_function, root_text
 from ctrlgen.firmware.folder import generate
 from ctrlgen.verification.toolchains import FLAGS
 
@@ -66,14 +66,14 @@ def test_float_c_knows_no_double(folder):
             assert not bare, (path.name, bare[:3])
 
 
-def test_float_objects_call_no_double_function(folder, compiler, tmp_path):
+def test_float_objects_call_no_library(folder, compiler, tmp_path):
     if not shutil.which("nm"):
         pytest.skip("nm (binutils) is missing: the symbols of the float objects were not read")
     for name in (folder.online[Real.FLOAT], folder.player[Real.FLOAT]):
         build(compiler, [folder.path / f"{name}.c"], tmp_path / "o.o", "-c")
         symbols = subprocess.run(["nm", "-u", str(tmp_path / "o.o")], capture_output=True, text=True, check=True).stdout
         wanted = set(symbols.split()) - {"U", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
-        assert wanted <= {"sqrtf"}, wanted
+        assert not wanted, wanted
 
 
 def test_no_heap_no_globals_no_recursion_no_unbounded_loops(folder, compiler, tmp_path):
@@ -102,7 +102,7 @@ def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compi
     broken = tmp_path / f"{folder.online[real]}.c"
     text = sources[1].read_text()
     factor = real.literal(1.00001 if real is Real.DOUBLE else 1.0003)  # float: above four roundings of the temperature
-    wrong, count = re.subn(r"(= )(\(?[-\d.e]+f?\)? \* target\[5\];)", rf"\g<1>{factor} * \g<2>", text, count=1)
+    wrong, count = re.subn(r"(\([-\d.e]+f? \* target\[5\]\))", rf"({factor} * \g<1>)", text, count=1)
     assert count == 1
     broken.write_text(wrong)
     build(compiler, [sources[0], broken], tmp_path / "bad", f"-I{folder.path}")
@@ -110,7 +110,7 @@ def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compi
 
 
 def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):
-    """CasADi's generator and ours from the same graph: equal bit for bit in double."""
+    """CasADi's generator and ours from the same graph, in double: roots are ours, and numbers that multiply are gathered."""
     controller = Controller(circle.model, "pose", 1e-3)
     generator = ca.CodeGenerator("reference.c")
     kernels = [getattr(controller.moving, part) for part in ("displacement", "state", "drive", "advance")] + [
@@ -139,7 +139,7 @@ def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):
             rng.uniform(0.2, 0.9, kernel.size1_in(i)) * (300 if kernel.name_in(i) in ("x", "state") else 4e-5)
             for i in range(kernel.n_in())
         ]
-        main = "#include <stdio.h>\n#include <math.h>\n" + ours.text + "int main(void) {\n"
+        main = "#include <stdio.h>\n#include <stdint.h>\n" + root_text(Real.DOUBLE) + ours.text + "int main(void) {\n"
         for i in range(kernel.n_in()):
             if kernel.name_in(i) in ours.arguments:
                 main += (
@@ -156,7 +156,7 @@ def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):
             subprocess.run([tmp_path / "ours"], capture_output=True, text=True, check=True).stdout.split(), dtype=float
         )
         theirs = ca.external(kernel.name(), str(tmp_path / "reference.so"))(*inputs).full().ravel()
-        assert printed == pytest.approx(theirs, rel=1e-14), kernel.name()  # both compilers may fold a constant once
+        assert printed == pytest.approx(theirs, rel=1e-13), kernel.name()  # some 100 roundings in a row
 
 
 @pytest.mark.parametrize("real", list(Real))
@@ -173,7 +173,8 @@ def test_every_operation_prints_what_casadi_computes(real, compiler, tmp_path):
     f = ca.Function("f", [a, b], [expressions], ["a", "b"], ["r"])
     kernel = print_function(f, "f", real)
     n = f.size1_out(0)
-    text = f"#include <stdio.h>\n#include <math.h>\n{kernel.text}int main(void) {{ const {real.value} a[1] = {{{real.literal(1.3)}}}; "
+    text = f"#include <stdio.h>\n#include <math.h>\n#include <stdint.h>\n{root_text(real)}{kernel.text}"
+    text += f"int main(void) {{ const {real.value} a[1] = {{{real.literal(1.3)}}}; "
     text += f"const {real.value} b[1] = {{{real.literal(0.7)}}}; {real.value} r[{n}]; int i; {kernel.call('r', a='a', b='b')}; "
     text += f'for (i = 0; i < {n}; i++) {{ (void)printf("%.17g\\n", (double)r[i]); }} return 0; }}\n'
     (tmp_path / "f.c").write_text(text)
@@ -186,12 +187,15 @@ def test_every_operation_prints_what_casadi_computes(real, compiler, tmp_path):
 
 
 def test_an_output_may_be_an_input(compiler, tmp_path):
-    """All outputs are stored last, so state = f(state) is not read half new."""
-    x = ca.SX.sym("x", 2)
-    kernel = print_function(
-        ca.Function("swap", [x], [ca.vertcat(x[1], x[0] + x[1])], ["x"], ["r"]), "swap", Real.DOUBLE
-    )
-    assert re.search(r"result\[0\] = x\[1\];\n    result\[1\] = t\d+;", kernel.text)
+    """All outputs are stored last, so state = f(state) is not read half new: a shift register, turned by one."""
+    x = ca.SX.sym("x", 4)
+    shifted = ca.vertcat(x[3], x[0], x[1], x[2] + x[0])
+    kernel = print_function(ca.Function("shift", [x], [shifted], ["x"], ["r"]), "shift", Real.DOUBLE)
+    main = "int main(void) { double x[4] = { 1.0, 2.0, 3.0, 4.0 }; shift(x, x); "
+    main += "return ((x[0] == 4.0) && (x[1] == 1.0) && (x[2] == 2.0) && (x[3] == 4.0)) ? 0 : 1; }"
+    (tmp_path / "main.c").write_text(f"{kernel.text}{main}\n")
+    build(compiler, [tmp_path / "main.c"], tmp_path / "main", "-Wno-restrict")
+    assert subprocess.run([tmp_path / "main"]).returncode == 0
 
 
 def test_a_constant_beyond_float_is_refused():

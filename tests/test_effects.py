@@ -23,7 +23,7 @@ from ctrlgen.chain import available, channels
 from ctrlgen.devices import Device
 from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.files import validate
-from ctrlgen.firmware.cprint import Real, print_function
+from ctrlgen.firmware.cprint import Real, print_function, root_text
 from ctrlgen.units import from_si, same_dimension
 from ctrlgen.verification.toolchains import FLAGS
 
@@ -325,7 +325,11 @@ def compiled(compiler, tmp_path_factory):
                 functions[f"{effect.kind}_{mode}_{part}"] = getattr(inverse, part)
     folder = tmp_path_factory.mktemp("laws")
     kernels = {name: print_function(function, name, Real.DOUBLE) for name, function in functions.items()}
-    text = "#include <math.h>\n" + "".join(k.text.removeprefix("static ") for k in kernels.values())
+    text = (
+        "#include <math.h>\n#include <stdint.h>\n"
+        + root_text(Real.DOUBLE)
+        + "".join(k.text.removeprefix("static ") for k in kernels.values())
+    )
     (folder / "laws.c").write_text(text)
     flags = [flag for flag in FLAGS if flag != "-Wmissing-prototypes" and not flag.startswith("-O")]
     command = [
@@ -367,7 +371,9 @@ def test_c_equals_python(effect, compiled, rng):
             "m": rng.uniform(-1, 1, len(effect.states)), "s": rng.uniform(-1, 1, function.size1_in(1)),
             "p": np.array(law.numbers(shape[rng.integers(len(shape))], size(effect, law.where, rng))),
         }  # fmt: skip
-        assert worst_difference(function, kernel, c, given) < 1e-13
+        assert (
+            worst_difference(function, kernel, c, given) < 1e-12
+        )  # a root is off by a rounding; laws subtract near numbers
     if effect not in CONTROLLED:
         return
     m = controller_with(effect).nominal

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ctrlgen._version import __version__
-from ctrlgen.controller import BISECTIONS, SLACK, Controller
-from ctrlgen.firmware.cprint import Kernel, Real, print_function
+from ctrlgen.controller import INSET, SLACK, TRIALS, Controller
+from ctrlgen.firmware.cprint import Kernel, Real, print_function, root_text
 from ctrlgen.firmware.templates import comment
 from ctrlgen.scenario import Scenario
 from ctrlgen.units import base_unit, show
@@ -21,13 +23,19 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     n = len(model.axes)
     kernels: dict[str, Kernel] = {}  # by body: what settling and stepping share is printed once
 
+    (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
+    s_low, s_high = x_low[: model.n_states], x_high[: model.n_states]
+    ranges = {  # of what kernels are called with; a target can be anything
+        "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
+    }  # fmt: skip
+
     def printed(function: Any, *names: str) -> Kernel:
         """Under the first of `names` that no other body has."""
         taken = {kernel.name for kernel in kernels.values()}
-        kernel = print_function(function, names[0], real)
+        kernel = print_function(function, names[0], real, ranges)
         body = kernel.text.partition("(")[2]
         if body not in kernels and kernel.name in taken:
-            kernel = print_function(function, names[-1], real)
+            kernel = print_function(function, names[-1], real, ranges)
         return kernels.setdefault(body, kernel)
 
     modes = []
@@ -44,21 +52,26 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive") if part in parts)
             modes.append({"name": name, "z": z, "uses_state": uses_state, **parts})
     balance = printed(controller.static.settle, "balance_displacement")
-    ratio = None
-    if controller.guarded_limits:
-        ratio = printed(controller.composite_ratio, "composite_ratio")
-    (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
+    ratio = printed(controller.composite_ratio, "composite_ratio") if controller.guarded_limits else None
+    gauge = printed(controller.gauge, "composite_bound") if controller.gauge else None
     slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     z_slack, s_slack, u_slack = slack.slacks
     drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
     last = modes[-1]
-    step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", "advance") if part in last)
+    advance = [] if model.x.numel() == model.n_states else ["advance"]
+    step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", *advance) if part in last)
+    step_cost += gauge.operations if gauge else 0
     once_more = sum(last[part].operations for part in ("state", "drive") if part in last)
     worst_cost = (
         step_cost
-        + 2 * balance.operations
+        + (2 if controller.state_can_be_limited else 1) * balance.operations
         + (controller.shrinks * ratio.operations if ratio else 0)
-        + once_more * (BISECTIONS + 2)
+        + (last["advance"].operations if "advance" in last and not advance else 0)
+        + once_more * (TRIALS + 3)
+    )
+    called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
+    (z_centre, z_half), (s_centre, s_half), (u_centre, u_half) = (
+        _middles(low, high, real) for low, high in ((z_low, z_high), (s_low, s_high), (u_low, u_high))
     )
     return {
         "prefix": prefix, "real": real, "version": __version__, "title": comment(model.device.title),
@@ -68,19 +81,24 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
-        
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
-        
+        "root": root_text(real) if "root" in called else None, "library": sorted(called - {"root"}), "gauge": gauge,
         "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
-        "balance": balance, "bisections": BISECTIONS, "shrinks": controller.shrinks,
-        "ratio_uses_state": bool(ratio) and bool({"x", "z"} & set(ratio.arguments)), "safe": controller.safe_displacement if ratio else 0.0,
+        "balance": balance, "trials": TRIALS, "inset": INSET, "shrinks": controller.shrinks,
+        "ratio_uses_state": bool(ratio) and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else SLACK, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,
-        "z_low": z_low, "z_high": z_high, "z_slack": z_slack, 
-        "s_low": x_low[: model.n_states], "s_high": x_high[: model.n_states], "s_slack": s_slack,
-        "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
+        "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "z_centre": z_centre, "z_half": z_half,
+        "s_low": s_low, "s_high": s_high, "s_slack": s_slack, "s_centre": s_centre, "s_half": s_half,
+        "u_low": u_low, "u_high": u_high, "u_slack": u_slack, "u_centre": u_centre, "u_half": u_half,
         "u_safe": controller.safe_drive,
     }  # fmt: skip
+
+
+def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and half width of ranges, the width smaller by some roundings: what is inside by it is inside."""
+    centre, half = (low + high) / 2, (high - low) / 2
+    return centre, np.maximum(half - 4 * real.epsilon * (np.abs(centre) + half), 0.0)
 
 
 def _number(value: float) -> float | int:

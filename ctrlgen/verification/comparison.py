@@ -128,7 +128,14 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
         unit = {"um": "nm", "degC": "K", "urad": "rad"}.get(unit, unit)
         rows.append(_row(build, what, signal.label, unit, np.asarray(difference)[:, channels], limit))
 
-    def against_casadi(what: str, answer: np.ndarray, reference: np.ndarray, wider: float = 1.0) -> None:
+    slacks = dict(
+        zip(("displacement", "state", "drive"), (np.max(v, initial=0.0) for v in ref.controller.slacks), strict=True)
+    )
+
+    def against_casadi(
+        what: str, answer: np.ndarray, reference: np.ndarray, wider: float = 1.0, ties: bool = False
+    ) -> None:
+        """`ties`: a drive within the slack of its limit may be taken for admissible or not; what follows differs by the slack."""
         rows.append(_row(build, what, "status", "1", answer[:, :1] - reference[:, :1], 0.0))
         if real is Real.FLOAT:  # where a limited drive is bisected, float may turn the other way, as good an answer
             plain = (reference[:, 0].astype(int) & Status.DRIVE) == 0
@@ -139,6 +146,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
             if role == "displacement" and real is Real.FLOAT:
                 limit = max(limit, LENGTH[real])
             limit *= wider if real is Real.FLOAT else 1.0
+            limit = max(limit, slacks[role]) if ties else limit
             add(what, role, answer[:, columns] - reference[:, columns], limit)
 
     moving = ref.scenario.sample_time is not None
@@ -170,7 +178,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
         cold = ref.controller.rest()
         chased = _run(program, "follow", ref.hostile, width, cold)
         if real is Real.DOUBLE:  # in float the bisections lead apart
-            against_casadi("hostile sequence, online C - CasADi", chased, ref.chased)
+            against_casadi("hostile sequence, online C - CasADi", chased, ref.chased, ties=True)
         what = "hostile sequence -> model: excess over a limit"
         allowed = EXCESS[real] if m.x.numel() == m.n_states else EXCESS_REMEMBERED
         excess = _excess(m, chased[:, 1 : 1 + n], ref.scenario.sample_time, cold[0])

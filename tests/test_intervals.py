@@ -1,0 +1,52 @@
+"""Bounds of every operation of a graph hold whatever its arguments are."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from ctrlgen.firmware.cprint import Real, _heron, print_function
+from ctrlgen.intervals import bounds
+
+a, b = ca.SX.sym("a"), ca.SX.sym("b")
+EXPRESSIONS = {
+    "sum": a + b, "difference": a - b, "product": a * b, "quotient": a / (b + 5), "negative": -a,
+    "square": a**2 * b, "twice": 2 * a,
+    "inverse": 1 / (b - 9), "root": ca.sqrt(a**2 + 1), "magnitude": ca.fabs(a) * b, "least": ca.fmin(a, b), "most": ca.fmax(a, 0.3),
+    "exponential": ca.exp(a), "saturated": ca.tanh(b), "wave": ca.sin(a) + ca.cos(b), "sign": ca.sign(a),
+    "choice": ca.if_else(a < b, a, 2 * b),
+    "logic": ca.logic_and(a < b, ca.logic_not(a)), "unknown": ca.atan2(a, b), "pole": a / b,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EXPRESSIONS)
+def test_every_value_is_between_its_bounds(name, rng):
+    f = ca.Function("f", [a, b], [EXPRESSIONS[name]], ["a", "b"], ["r"])
+    for _ in range(20):
+        (a_0, a_1), (b_0, b_1) = np.sort(rng.uniform(-3, 3, (2, 2)), axis=1)
+        low, high = bounds(f, {"a": (np.array([a_0]), np.array([a_1])), "b": (np.array([b_0]), np.array([b_1]))})
+        values = f.map(500)(rng.uniform(a_0, a_1, (1, 500)), rng.uniform(b_0, b_1, (1, 500))).full()
+        assert np.all(values >= low[0] - 1e-12) and np.all(values <= high[0] + 1e-12)
+        if name not in ("unknown", "pole"):
+            assert np.isfinite([low[0], high[0]]).all()
+
+
+@pytest.mark.parametrize("real", list(Real))
+@pytest.mark.parametrize("ratio", [1.0001, 1.2, 3.0, 10.0])
+def test_a_line_and_a_few_steps_of_heron_give_the_root_in_a_known_range(real, ratio):
+    (start, slope), steps = _heron((2.0, 2.0 * ratio), real)
+    number = np.float32 if real is Real.FLOAT else np.float64
+    x = np.linspace(2.0, 2.0 * ratio, 10001).astype(number)
+    y = number(start) + number(slope) * x
+    for _ in range(steps):
+        y = number(0.5) * (y + x / y)
+    assert np.max(np.abs(y.astype(float) / np.sqrt(x.astype(float)) - 1)) < 2 * real.epsilon
+    assert steps <= 4
+
+
+def test_a_range_that_is_wide_or_reaches_zero_needs_the_general_root():
+    assert _heron((0.0, 1.0), Real.FLOAT) is None and _heron((1e-9, 1e9), Real.DOUBLE) is None
+    f = ca.Function("f", [a], [ca.sqrt(a)], ["a"], ["r"])
+    assert print_function(f, "f", Real.FLOAT, {"a": (np.array([1.0]), np.array([2.0]))}).calls == frozenset()
+    assert print_function(f, "f", Real.FLOAT).calls == {"root"}
