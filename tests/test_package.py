@@ -73,13 +73,21 @@ def cmake() -> str:
 
 
 def everything(packages: dict[str, CFolder]) -> str:
-    """A main that includes every header of all packages and calls every selftest."""
+    """A main that includes every header of all packages, calls every piece and every selftest."""
     headers = [h.name for c in packages.values() for h in sorted(c.path.glob("*.h"))]
-    tests = [c.selftest[real] for c in packages.values() for real in Real]
-    calls = "".join(
-        f"    {{ {t}_result r; if (({t}(&r) != 0) || (r.compared != {t.upper()}_VECTORS)) {{ return {k + 1}; }} }}\n"
-        for k, t in enumerate(tests)
-    )
+    calls = ""
+    for k, (c, real) in enumerate((c, real) for c in packages.values() for real in Real):
+        test, online, player, vectors = (names[real] for names in (c.selftest, c.online, c.player, c.vectors))
+        calls += f"""    {{
+        {test}_result r;
+        {online}_state state;
+        {online}_output out;
+        {online}_init(&state);
+        if ({online}_settle(&state, {vectors}_target[0], &out) != {vectors}_status[0]) {{ return {4 * k + 1}; }}
+        if ({player}_sample({vectors}_played[0], out.drive) != 0) {{ return {4 * k + 2}; }}
+        if (({test}(&r) != 0) || (r.compared != {test.upper()}_VECTORS)) {{ return {4 * k + 3}; }}
+    }}
+"""
     return "".join(f'#include "{h}"\n' for h in headers) + f"int main(void)\n{{\n{calls}    return 0;\n}}\n"
 
 
