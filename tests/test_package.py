@@ -1,4 +1,4 @@
-"""The generated folder as a package: it drops into C, C++, CMake, Zephyr, PlatformIO and Arduino projects, and tests itself there."""
+"""The generated folder as a package: it links beside others from C and C++, tests itself, says what it is and was made from."""
 
 from __future__ import annotations
 
@@ -6,89 +6,22 @@ import json
 import re
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 from conftest import SCENARIOS
+from package_programs import STRICT, everything, run
 
-from ctrlgen import InputError, __version__, build_model, generate, load_scenario, solve
+from ctrlgen import InputError, build_model, generate, load_scenario
 from ctrlgen.figures import draw_all
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.package import verify_package
-
-STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
-SEMANTIC = re.compile(r"(0|[1-9]\d*)\.(0|[1-9]\d*)\.(0|[1-9]\d*)(-[0-9A-Za-z.-]+)?(\+[0-9A-Za-z.-]+)?")
-
-
-def run(*words: object, cwd: Path | None = None) -> str:
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, cwd=cwd)
-    assert done.returncode == 0, f"{words}: status {done.returncode}\n{done.stdout}{done.stderr}"
-    return done.stdout
-
-
-@pytest.fixture(scope="module")
-def packages(tmp_path_factory, circle) -> dict[str, CFolder]:
-    """Two different scenarios, solved."""
-    scenario = load_scenario(SCENARIOS / "raster")
-    raster = solve(scenario, build_model(scenario.device))
-    out = tmp_path_factory.mktemp("packages")
-    return {
-        s.scenario.name: generate(s.scenario, s.model, out / s.scenario.name, s, draw_all(s)) for s in (circle, raster)
-    }
 
 
 @pytest.fixture(scope="module")
 def unsolved(tmp_path_factory) -> CFolder:
     scenario = load_scenario(SCENARIOS / "spiral")
     return generate(scenario, build_model(scenario.device), tmp_path_factory.mktemp("spiral") / "spiral")
-
-
-@pytest.fixture(scope="module")
-def objects(packages, compiler, tmp_path_factory) -> dict[str, list[Path]]:
-    """Scenario -> the objects of all its C at the root, in both arithmetics."""
-    out = tmp_path_factory.mktemp("objects")
-    built = {}
-    for name, c in packages.items():
-        built[name] = [out / f"{source.stem}.o" for source in sorted(c.path.glob("*.c"))]
-        assert len(built[name]) == 8
-        for made in built[name]:
-            run(compiler, "-std=c99", *STRICT, "-O2", "-c", c.path / f"{made.stem}.c", "-o", made)
-    return built
-
-
-@pytest.fixture
-def cpp(compiler) -> str:
-    name = {"gcc": "g++", "clang": "clang++", "cc": "c++"}[compiler]
-    if not shutil.which(name):
-        pytest.skip(f"{name} is missing: nothing was built as C++; apt-get install g++")
-    return name
-
-
-@pytest.fixture
-def cmake() -> str:
-    if not shutil.which("cmake"):
-        pytest.skip("cmake is missing: the CMake files were not run; apt-get install cmake")
-    return "cmake"
-
-
-def everything(packages: dict[str, CFolder]) -> str:
-    """A main that includes every header of all packages, calls every piece and every selftest."""
-    headers = [h.name for c in packages.values() for h in sorted(c.path.glob("*.h"))]
-    calls = ""
-    for k, (c, real) in enumerate((c, real) for c in packages.values() for real in Real):
-        test, online, player, vectors = (names[real] for names in (c.selftest, c.online, c.player, c.vectors))
-        calls += f"""    {{
-        {test}_result r;
-        {online}_state state;
-        {online}_output out;
-        {online}_init(&state);
-        if ({online}_settle(&state, {vectors}_target[0], &out) != {vectors}_status[0]) {{ return {4 * k + 1}; }}
-        if ({player}_sample({vectors}_played[0], out.drive) != 0) {{ return {4 * k + 2}; }}
-        if (({test}(&r) != 0) || (r.compared != {test.upper()}_VECTORS)) {{ return {4 * k + 3}; }}
-    }}
-"""
-    return "".join(f'#include "{h}"\n' for h in headers) + f"int main(void)\n{{\n{calls}    return 0;\n}}\n"
 
 
 def test_all_controllers_of_two_scenarios_link_into_one_program_and_pass_their_tests(
@@ -140,141 +73,6 @@ def test_each_header_compiles_alone(packages, compiler, cpp, tmp_path, standard)
         main.write_text(f'#include "{header}"\n#include "{header}"\n')
         words = (cpp if "+" in standard else compiler, f"-std={standard}", *STRICT, "-fsyntax-only", main)
         run(*words)
-
-
-def test_cmake_builds_tests_and_installs(packages, cmake, cpp, tmp_path):
-    """At top level with its own tests; installed, another project finds it."""
-    c = packages["circle20"]
-    run(cmake, "-S", c.path, "-B", tmp_path / "b", f"-DCMAKE_INSTALL_PREFIX={tmp_path / 'usr'}")
-    run(cmake, "--build", tmp_path / "b")
-    assert "100% tests passed, 0 tests failed out of 2" in run("ctest", "--test-dir", tmp_path / "b")
-    run(cmake, "--install", tmp_path / "b")
-    (tmp_path / "p").mkdir()
-    (tmp_path / "p" / "main.c").write_text(everything({"circle20": c}))
-    (tmp_path / "p" / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.16)\nproject(p C)\nenable_testing()\nfind_package(circle20 REQUIRED)\n"
-        "add_executable(p main.c)\ntarget_link_libraries(p PRIVATE ctrlgen::circle20_f32 ctrlgen::circle20_f64)\n"
-        "add_test(NAME p COMMAND p)\n"
-    )
-    run(cmake, "-S", tmp_path / "p", "-B", tmp_path / "pb", f"-DCMAKE_PREFIX_PATH={tmp_path / 'usr'}")
-    run(cmake, "--build", tmp_path / "pb")
-    assert "100% tests passed" in run("ctest", "--test-dir", tmp_path / "pb")
-
-
-def test_two_packages_are_subdirectories_of_one_cpp_project(packages, cmake, cpp, tmp_path):
-    """Which gets the targets, and neither their tests nor their install rules."""
-    (tmp_path / "main.cpp").write_text(everything(packages))
-    adds = "".join(f"add_subdirectory({c.path} {name})\n" for name, c in packages.items())
-    links = " ".join(f"ctrlgen::{name}_{real.suffix}" for name in packages for real in Real)
-    (tmp_path / "CMakeLists.txt").write_text(
-        f"cmake_minimum_required(VERSION 3.16)\nproject(firmware CXX)\nenable_testing()\n{adds}"
-        f"add_executable(firmware main.cpp)\ntarget_link_libraries(firmware PRIVATE {links})\n"
-        "add_test(NAME selftests COMMAND firmware)\n"
-    )
-    run(cmake, "-S", tmp_path, "-B", tmp_path / "b")
-    run(cmake, "--build", tmp_path / "b")
-    assert "100% tests passed, 0 tests failed out of 1" in run("ctest", "--test-dir", tmp_path / "b")
-
-
-ZEPHYR = """cmake_minimum_required(VERSION 3.16)
-project(app C)
-add_library(interface INTERFACE)
-function(zephyr_include_directories)
-  target_include_directories(interface INTERFACE ${ARGN})
-endfunction()
-function(zephyr_library_named name)
-  add_library(${name} STATIC)
-  target_link_libraries(${name} PUBLIC interface)
-  set(ZEPHYR_CURRENT_LIBRARY ${name} PARENT_SCOPE)
-endfunction()
-function(zephyr_library_sources)
-  target_sources(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
-endfunction()
-"""
-
-
-@pytest.mark.parametrize("real", list(Real))
-def test_the_zephyr_module_builds_with_stand_ins_for_zephyrs_functions(packages, cmake, tmp_path, real):
-    """Zephyr itself is not run here: its four CMake functions that the module calls are."""
-    text = ZEPHYR
-    for name, c in packages.items():
-        for option in ("", f"_{real.name}", "_SELFTEST"):
-            text += f"set(CONFIG_{name.upper()}_CONTROLLER{option} y)\n"
-        text += f"add_subdirectory({c.path}/zephyr {name})\n"
-    text += f"add_executable(app main.c)\ntarget_link_libraries(app PRIVATE {' '.join(packages)} m)\n"
-    (tmp_path / "CMakeLists.txt").write_text(text)
-    calls = " + ".join(f"{c.selftest[real]}(0)" for c in packages.values())
-    includes = "".join(f"#include <{c.selftest[real]}.h>\n" for c in packages.values())
-    (tmp_path / "main.c").write_text(f"{includes}int main(void) {{ return {calls}; }}\n")
-    run(cmake, "-S", tmp_path, "-B", tmp_path / "b")
-    run(cmake, "--build", tmp_path / "b")
-    run(tmp_path / "b" / "app")
-
-
-def test_the_zephyr_module_says_what_zephyr_reads(packages):
-    """Keys of scripts/zephyr_module.py: name, and the folder and the file that `build` names, which must be there."""
-    for name, c in packages.items():
-        lines = [line for line in (c.path / "zephyr" / "module.yml").read_text().splitlines() if line[:1] != "#"]
-        assert lines == [f"name: {name}", "build:", "  cmake: zephyr", "  kconfig: zephyr/Kconfig"]
-        assert (c.path / "zephyr" / "CMakeLists.txt").is_file()
-        options = re.findall(r"^(?:config|choice) (\w+)$", (c.path / "zephyr" / "Kconfig").read_text(), re.MULTILINE)
-        assert len(options) == 5 and all(option.startswith(f"{name.upper()}_CONTROLLER") for option in options)
-        used = set(re.findall(r"CONFIG_(\w+)", (c.path / "zephyr" / "CMakeLists.txt").read_text()))
-        assert used <= set(options)
-
-
-def test_the_platformio_manifest_is_valid_and_builds_the_c_at_the_root(packages):
-    for name, c in packages.items():
-        manifest = json.loads((c.path / "library.json").read_text())
-        assert {"name", "version", "description", "keywords", "authors"} <= set(manifest)
-        assert (
-            manifest["name"] == name and SEMANTIC.fullmatch(manifest["version"]) and len(manifest["description"]) < 1000
-        )
-        assert all((c.path / header).is_file() for header in manifest["headers"])
-        (chosen,) = manifest["build"]["srcFilter"]
-        built = {path.name for path in (c.path / manifest["build"]["srcDir"]).glob(chosen[2:-1])}
-        assert built == {source.name for real in Real for source in c.sources(real)}
-
-
-def test_the_arduino_manifest_has_every_required_field(packages):
-    for name, c in packages.items():
-        lines = (c.path / "library.properties").read_text().splitlines()
-        fields = dict(line.split("=", 1) for line in lines if line)
-        required = (
-            "name",
-            "version",
-            "author",
-            "maintainer",
-            "sentence",
-            "paragraph",
-            "category",
-            "url",
-            "architectures",
-        )
-        assert all(fields.get(field) for field in required)
-        assert fields["name"] == name and re.fullmatch(r"[A-Za-z0-9][\w .-]{0,62}", name)
-        assert SEMANTIC.fullmatch(fields["version"]) and fields["version"] == __version__
-        assert fields["category"] == "Device Control" and fields["url"].startswith("https://")
-        assert all((c.path / header).is_file() for header in fields["includes"].split(","))
-
-
-def test_the_arduino_sketch_builds_and_passes_with_a_stand_in_for_the_board(packages, objects, cpp, tmp_path):
-    """A library without src/ is built from the C at its root, not from its subfolders."""
-    c = packages["circle20"]
-    assert not (c.path / "src").exists() and not (c.path / "utility").exists()
-    (tmp_path / "Arduino.h").write_text(
-        '#include <cstdio>\nstruct { void begin(long) {} void print(int v) { std::printf("%d", v); }\n'
-        'void print(const char *t) { std::printf("%s", t); } void println(const char *t) { std::puts(t); } } Serial;\n'
-    )
-    (sketch,) = c.path.glob("examples/*/*.ino")
-    assert sketch.stem == sketch.parent.name
-    (tmp_path / "sketch.cpp").write_text(
-        f'#include "Arduino.h"\n{sketch.read_text()}\nint main() {{ setup(); loop(); return 0; }}\n'
-    )
-    include = [f"-I{tmp_path}", f"-I{c.path}"]
-    words = (cpp, "-std=c++11", *STRICT, *include, tmp_path / "sketch.cpp", *objects["circle20"], "-lm")
-    run(*words, "-o", tmp_path / "sketch")
-    assert run(tmp_path / "sketch") == "82 of 82 vectors agree\n"
 
 
 def test_the_readmes_example_compiles_and_runs(packages, unsolved, compiler, tmp_path):
