@@ -17,6 +17,7 @@ from ctrlgen.devices import load_device
 from ctrlgen.devices.sensor import describe
 from ctrlgen.errors import CtrlgenError, Fault, InputError, Unreachable
 from ctrlgen.files import read_toml
+from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model import build_model
 from ctrlgen.paths import Frame
 from ctrlgen.recording import load_recordings
@@ -107,6 +108,8 @@ def solve(scenario: ScenarioPath, out_folder: OutFolder) -> None:
 def generate(scenario: ScenarioPath, out_folder: OutFolder) -> None:
     """Write the C of a scenario: online controller and player, double and float; needs no compiler.
 
+    Leaves in --out a folder that drops into a firmware project as it is; its README.md says how.
+
     Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
     """
     with progress(2) as advance:
@@ -133,7 +136,8 @@ def check(
     file: Annotated[
         Path,
         typer.Argument(
-            help="A device file, a scenario, or with --device a recording; or its folder.", show_default=False
+            help="A device file, a scenario, generated C, or with --device a recording; or its folder.",
+            show_default=False,
         ),
     ],
     device_path: Annotated[
@@ -142,6 +146,8 @@ def check(
 ) -> None:
     """Read a device, scenario or recording and list every fault, or say what it describes. Nothing is computed.
 
+    Of a generated folder it says which files were changed.
+
     Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
     """
     if device_path is not None:
@@ -149,6 +155,11 @@ def check(
         return
     if (file / RECORDING).is_file() or (file.name == RECORDING and file.is_file()):
         raise InputError(file, [Fault("--device", "is missing; name the device file that this recording was made on")])
+    if (file / MANIFEST).is_file():
+        if faults := verify_package(file):
+            raise InputError(file, faults)
+        out.print(f"{file}: every file is as it was generated", markup=False)
+        return
     if file.is_dir() or "kind" not in read_toml(file):
         scenario = load_scenario(file)
         count = len(scenario.command(build_model(scenario.device)))

@@ -71,10 +71,11 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("C sources")
-        c = generate(solution.scenario, solution.model, draft / "c", solution)
+        drawn = figures.draw_all(solution)
+        c = generate(solution.scenario, solution.model, draft / "c", solution, drawn)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
         progress("report")
-        report.write_report(draft, solution, comparison, expected, c)
+        report.write_report(draft, solution, comparison, expected, c, drawn)
         return Outcome(solution, c, comparison, expected)
 
 
@@ -83,7 +84,7 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
-        report.write_report(draft, solution, None, expected, None)
+        report.write_report(draft, solution, None, expected, None, figures.draw_all(solution))
         return Outcome(solution, None, None, expected)
 
 
@@ -91,7 +92,7 @@ def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Pr
     """Solve and write only the C folder, which needs no compiler."""
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
-        c = generate(solution.scenario, solution.model, draft, solution)
+        c = generate(solution.scenario, solution.model, draft, solution, figures.draw_all(solution))
     return replace(c, path=Path(out))
 
 

@@ -13,7 +13,6 @@ import jinja2
 import numpy as np
 
 from ctrlgen._version import __version__
-from ctrlgen.figures import draw_all
 from ctrlgen.files import write_text
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import codegen_folder
@@ -122,13 +121,20 @@ def worst_rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 
 def write_report(
-    out: Path, solution: Solution, comparison: Comparison | None, expected: tuple[Expected, ...], c: CFolder | None
+    out: Path,
+    solution: Solution,
+    comparison: Comparison | None,
+    expected: tuple[Expected, ...],
+    c: CFolder | None,
+    figures: dict[str, str],
 ) -> None:
-    """Everything a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html."""
+    """Everything a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html.
+
+    `figures`: name -> SVG text, as `ctrlgen.figures.draw_all` gives.
+    """
     result = summary(solution, comparison, expected, c)
     write_text(out / "summary.json", json.dumps(result, indent=1) + "\n")
     write_trajectory(solution, out / "trajectory.csv")
-    figures = draw_all(solution)
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
     page = render(

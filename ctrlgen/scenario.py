@@ -63,14 +63,35 @@ class ScenarioFile(Section):
 
 
 @dataclass(frozen=True)
+class Input:
+    """One text that a scenario was made from: `path` where it was read, absolute or beside the scenario."""
+
+    path: Path
+    text: str
+
+    @property
+    def sha256(self) -> str:
+        """Of the text as UTF-8."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
 class Scenario:
-    """A scenario ready to solve. `file` is what was written; `name` the folder's name as a C identifier; `digest` of file and device."""
+    """A scenario ready to solve. `file` is what was written; `name` the folder's name as a C identifier.
+
+    `inputs`: the "scenario" itself, its "device" and, where a path is read from a file, its "poses".
+    """
 
     name: str
     path: Path
     file: ScenarioFile
     device: Device
-    digest: dict[str, str]
+    inputs: dict[str, Input]
+
+    @property
+    def digest(self) -> dict[str, str]:
+        """The sha256 of each input."""
+        return {name: read.sha256 for name, read in self.inputs.items()}
 
     @property
     def sample_time(self) -> float | None:
@@ -121,17 +142,18 @@ def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:
     file = validate(ScenarioFile, table, file_path)
     if device is None:
         device_path = file_path.parent / file.device
-        device, described = load_device(device_path), read_text(device_path)
+        device, described = load_device(device_path), Input(device_path, read_text(device_path))
     elif file.device != device.name:
         raise InputError(file_path, [Fault("device", f"{file.device!r} is not {device.name!r}, the device given")])
     else:
-        described = "\n".join(f"{path} = {number.text}" for path, number in device.quantities())
-    texts = {"scenario": read_text(file_path), "device": described}
+        numbers = "\n".join(f"{path} = {number.text}" for path, number in device.quantities())
+        described = Input(file_path.parent / f"{_identifier(device.name)}.txt", numbers)
+    inputs = {"scenario": Input(file_path, read_text(file_path)), "device": described}
     if isinstance(file.path, Poses) and file.path.file:
-        texts["poses"] = read_text(file_path.parent / file.path.file)
-    digest = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
+        poses = file_path.parent / file.path.file
+        inputs["poses"] = Input(poses, read_text(poses))
     name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
-    return Scenario(_identifier(name), file_path, file, device, digest)
+    return Scenario(_identifier(name), file_path, file, device, inputs)
 
 
 def _identifier(name: str) -> str:

@@ -5,8 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from package_programs import STRICT, run
 
-from ctrlgen import build_model, load_device, load_scenario, solve
+from ctrlgen import build_model, generate, load_device, load_scenario, solve
+from ctrlgen.figures import draw_all
+from ctrlgen.firmware.folder import CFolder
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
@@ -58,3 +61,42 @@ def effect_device(*effects: dict):
     table = tomllib.loads(DEVICE.read_text())
     table["effect"] = list(effects)
     return validate(Device.library[table["kind"]], table, "device with effects")
+
+
+@pytest.fixture(scope="session")
+def packages(tmp_path_factory, circle) -> dict[str, CFolder]:
+    """Two different scenarios, solved."""
+    scenario = load_scenario(SCENARIOS / "raster")
+    raster = solve(scenario, build_model(scenario.device))
+    out = tmp_path_factory.mktemp("packages")
+    return {
+        s.scenario.name: generate(s.scenario, s.model, out / s.scenario.name, s, draw_all(s)) for s in (circle, raster)
+    }
+
+
+@pytest.fixture(scope="session")
+def objects(packages, compiler, tmp_path_factory) -> dict[str, list[Path]]:
+    """Scenario -> the objects of all its C at the root, in both arithmetics."""
+    out = tmp_path_factory.mktemp("objects")
+    built = {}
+    for name, c in packages.items():
+        built[name] = [out / f"{source.stem}.o" for source in sorted(c.path.glob("*.c"))]
+        assert len(built[name]) == 8
+        for made in built[name]:
+            run(compiler, "-std=c99", *STRICT, "-O2", "-c", c.path / f"{made.stem}.c", "-o", made)
+    return built
+
+
+@pytest.fixture
+def cpp(compiler) -> str:
+    name = {"gcc": "g++", "clang": "clang++", "cc": "c++"}[compiler]
+    if not shutil.which(name):
+        pytest.skip(f"{name} is missing: nothing was built as C++; apt-get install g++")
+    return name
+
+
+@pytest.fixture
+def cmake() -> str:
+    if not shutil.which("cmake"):
+        pytest.skip("cmake is missing: the CMake files were not run; apt-get install cmake")
+    return "cmake"

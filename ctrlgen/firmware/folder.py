@@ -1,23 +1,31 @@
 """Model and solution -> a folder of C99: the only writer of C.
 
 `online` controllers (any reachable target -> drives) and `player`s (the solved trajectory as a table), each in
-double and in float, with a CMake file and a test of reference vectors. Same input, same bytes.
+double and in float, with a test of reference `vectors` that runs on the target; around them the package of
+`ctrlgen.firmware.package`. Same input, same bytes.
+
+The C stands at the root: that is where Arduino looks in a library without src/, and PlatformIO, CMake and Zephyr are
+told. What is for a computer only stands in test/.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from ctrlgen.controller import Controller
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.online import online_context
+from ctrlgen.firmware.package import write_package
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.templates import write
-from ctrlgen.firmware.vectors import vectors
+from ctrlgen.firmware.vectors import played_vectors, vectors
 from ctrlgen.model import Model
 from ctrlgen.scenario import Scenario
 from ctrlgen.solution import Solution
+
+PIECES = ("online", "player", "selftest", "vectors")
 
 
 @dataclass(frozen=True)
@@ -25,40 +33,57 @@ class CFolder:
     """What was generated: `path`, and the names of the pieces in each arithmetic."""
 
     path: Path
+    name: str
     online: dict[Real, str]
     player: dict[Real, str]
-    test: dict[Real, str]
+    selftest: dict[Real, str]
+    vectors: dict[Real, str]
     operations: int
     worst_operations: int
 
+    def sources(self, real: Real) -> list[Path]:
+        """The C of the library in one arithmetic."""
+        pieces = (self.online, self.player, self.selftest, self.vectors)
+        return [self.path / f"{names[real]}.c" for names in pieces if names]
 
-def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | None = None) -> CFolder:
-    """Writes the C of `scenario` to `out`; with a `solution` also its player. Raises CtrlgenError."""
+    def runner(self, real: Real) -> Path:
+        """The program that prints what the test of reference vectors finds; for a computer."""
+        return self.path / "test" / f"test_{self.name}_{real.suffix}.c"
+
+
+def generate(
+    scenario: Scenario,
+    model: Model,
+    out: Path,
+    solution: Solution | None = None,
+    figures: Mapping[str, str] | None = None,
+) -> CFolder:
+    """Writes the package of `scenario` to `out`; with a `solution` also its player. Raises CtrlgenError.
+
+    `figures` (name -> SVG text, as `ctrlgen.figures.draw_all` gives) are put beside the README.
+    """
     controller = Controller(model, scenario.file.follow, scenario.sample_time)
-    online = {real: f"{scenario.name}_online_{real.suffix}" for real in Real}
-    player = (
-        {real: f"{scenario.name}_player_{real.suffix}" for real in Real} if solution and scenario.sample_time else {}
-    )
-    cost = (0, 0)
+    played = solution if scenario.sample_time else None
+    command = scenario.command(model) if solution is None else solution.command
+    names = {piece: {real: f"{scenario.name}_{piece}_{real.suffix}" for real in Real} for piece in PIECES}
+    contexts, written = {}, []
     for real in Real:
-        context = online_context(scenario, controller, real, online[real])
-        cost = (context["cost"]["step"], context["cost"]["worst"])
-        write("online.h", context, out / f"{online[real]}.h")
-        write("online.c", context, out / f"{online[real]}.c")
-        command = scenario.command(model) if solution is None else solution.command
-        write(
-            "test.c",
-            context | {"online": online[real]} | vectors(controller, command, real),
-            out / f"test_{scenario.name}_{real.suffix}.c",
-        )
-        if solution and player:
-            write("player.h", context | player_context(solution, player[real]), out / f"{player[real]}.h")
-            write("player.c", context | player_context(solution, player[real]), out / f"{player[real]}.c")
-    sources = " ".join(
-        f"{scenario.name}_{piece}_${{real}}.c" for piece in ("online", "player") if piece == "online" or player
-    )
-    write("CMakeLists.txt", {"name": scenario.name, "sources": sources}, out / "CMakeLists.txt")
-    return CFolder(out, online, player, {real: f"test_{scenario.name}_{real.suffix}" for real in Real}, *cost)
+        of = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
+        online = online_context(scenario, controller, real, of["online"])
+        samples = {} if played is None else player_context(played, of["player"])
+        reference = vectors(controller, command, real) | played_vectors(played and played.drive, real)
+        contexts[real] = samples | online | of | reference | {"solved": solution is not None}
+        by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
+        if played:
+            by_template["player"] = online | samples
+        for template, context in by_template.items():
+            for kind in ("h", "c"):
+                written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
+        written.append(write("test.c", contexts[real], out / "test" / f"test_{scenario.name}_{real.suffix}.c"))
+    write_package(out, scenario, contexts, figures or {}, written)
+    cost = contexts[Real.FLOAT]["cost"]
+    pieces = names if played else names | {"player": {}}
+    return CFolder(out, scenario.name, *(pieces[piece] for piece in PIECES), cost["step"], cost["worst"])
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:

@@ -12,6 +12,7 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.online import FLOAT_SLACK
 
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
+PLAYED = 17  # samples of the player
 
 
 def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
@@ -25,7 +26,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     beyond = rng.normal(size=(16, command.shape[1])) * 40 * scale
     targets = [*command[:VECTORS], *beyond, np.full(command.shape[1], 1e9)]
     rows, tolerance, state = [], 0.0, controller.rest()
-    rounding = 4 * (np.finfo(np.float32).eps if real is Real.FLOAT else np.finfo(np.float64).eps)
+    rounding = 4 * _epsilon(real)
     for k, target in enumerate(targets):
         target = np.array(target, dtype=np.float32).astype(float) if real is Real.FLOAT else target
         settle = k == 0 or k >= len(targets) - len(beyond) - 1 or controller.moving is None
@@ -43,4 +44,19 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
             off = kernel(*before, *(value * (1 + rounding) for value in reached)) - kernel(*before, *reached)
             tolerance = max(tolerance, float(np.max(np.abs(off.full()))))
     tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
-    return {"vectors": rows, "tolerance": tolerance}
+    return {"rows": rows, "tolerance": tolerance}
+
+
+def played_vectors(drives: np.ndarray | None, real: Real) -> dict[str, Any]:
+    """Samples of the solved `drives` (samples, axes), the first and the last among them, and four roundings of the largest."""
+    if drives is None:
+        return {"played": [], "played_tolerance": 0.0}
+    indices = np.unique(np.linspace(0, len(drives) - 1, PLAYED).round().astype(int))
+    return {
+        "played": [{"index": int(k), "drive": drives[k]} for k in indices],
+        "played_tolerance": max(4 * _epsilon(real) * float(np.max(np.abs(drives))), float(np.finfo(np.float32).tiny)),
+    }
+
+
+def _epsilon(real: Real) -> float:
+    return float(np.finfo(np.float32 if real is Real.FLOAT else np.float64).eps)

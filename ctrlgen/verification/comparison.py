@@ -92,13 +92,13 @@ def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None]
 def _build(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
     """The harness and the shipped test, linked with the same objects; returns the harness, the test beside it."""
     program = scratch / f"{compiler}_{real.suffix}"
-    names = [pieces[real] for pieces in (folder.online, folder.player) if pieces]
-    objects = [scratch / f"{compiler}_{name}.o" for name in names]
-    for name, target in zip(names, objects, strict=True):
-        compile_c(compiler, folder.path, ["-c", str(folder.path / f"{name}.c"), "-o", str(target)])
+    sources = folder.sources(real)
+    objects = [scratch / f"{compiler}_{source.stem}.o" for source in sources]
+    for source, target in zip(sources, objects, strict=True):
+        compile_c(compiler, folder.path, ["-c", str(source), "-o", str(target)])
     linked = [*map(str, objects), "-lm", "-o"]
     compile_c(compiler, folder.path, [str(scratch / f"harness_{real.suffix}.c"), *linked, str(program)])
-    compile_c(compiler, folder.path, [str(folder.path / f"{folder.test[real]}.c"), *linked, f"{program}_test"])
+    compile_c(compiler, folder.path, [str(folder.runner(real)), *linked, f"{program}_test"])
     return program
 
 

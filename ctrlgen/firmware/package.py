@@ -1,0 +1,171 @@
+"""What makes generated C a package: README, manifests of build systems, inputs, hashes; and whether a package is unspoiled."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ctrlgen._version import __version__
+from ctrlgen.devices.base import Signal
+from ctrlgen.errors import Fault, InputError
+from ctrlgen.files import read_text, write_text
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.templates import comment, write
+from ctrlgen.scenario import Scenario
+from ctrlgen.units import base_unit
+
+MANIFEST = "manifest.json"
+LICENCE = "The generated code belongs to the user of ctrlgen who generated it; no warranty."
+TEMPLATES = {
+    "package/README.md": "README.md", "CMakeLists.txt": "CMakeLists.txt", "package/library.properties": "library.properties",
+    "package/module.yml": "zephyr/module.yml", "package/zephyr.cmake": "zephyr/CMakeLists.txt", "package/Kconfig": "zephyr/Kconfig",
+}  # fmt: skip
+
+
+def write_package(
+    out: Path,
+    scenario: Scenario,
+    contexts: Mapping[Real, dict[str, Any]],
+    figures: Mapping[str, str],
+    c: Iterable[Path],
+) -> None:
+    """Everything in `out` beside the files `c`: `contexts` are what their templates were filled with, `figures` name -> SVG text.
+
+    The manifest comes last, with the hashes of all files written.
+    """
+    inputs = input_files(scenario)
+    context = _context(scenario, contexts, figures, inputs)
+    sketch = f"{scenario.name}_selftest"
+    written = [*c, *(write(template, context, out / name) for template, name in TEMPLATES.items())]
+    written.append(write("package/selftest.ino", context, out / "examples" / sketch / f"{sketch}.ino"))
+    texts = {f"device/{path}": text for path, text in inputs.items()}
+    texts |= {f"figures/{name}.svg": svg for name, svg in figures.items()}
+    texts["library.json"] = json.dumps(_platformio(context), indent=2) + "\n"
+    for name, text in texts.items():
+        write_text(out / name, text)
+        written.append(out / name)
+    manifest = {
+        "name": scenario.name, "title": context["title"], "ctrlgen": __version__, "licence": LICENCE,
+        "inputs": scenario.digest,
+        "files": {name: _sha256(out / name) for name in sorted(path.relative_to(out).as_posix() for path in written)},
+    }  # fmt: skip
+    write_text(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+
+
+def input_files(scenario: Scenario) -> dict[str, str]:
+    """Relative path -> text of each input, placed so that the relative paths that the scenario states still lead there.
+
+    `ctrlgen generate` on the copied scenario makes the same C again, unless the scenario names an absolute path or a
+    device that is no file.
+    """
+    home = _absolute(scenario.path).parent.parent
+    stated = {"device": scenario.file.device, "poses": getattr(scenario.file.path, "file", None) or ""}
+    placed = {
+        name: _absolute(read.path) for name, read in scenario.inputs.items() if not os.path.isabs(stated.get(name, ""))
+    }
+    base = Path(os.path.commonpath([home, *placed.values()]))
+    return {
+        (placed[name].relative_to(base) if name in placed else Path(read.path.name)).as_posix(): read.text
+        for name, read in scenario.inputs.items()
+    }
+
+
+def verify_package(folder: Path | str) -> tuple[Fault, ...]:
+    """What differs in a generated folder from its manifest; empty when nothing does.
+
+    Files changed or missing, and C added at the root, which Arduino and PlatformIO would build; other files may be
+    added, such as those of a build. Raises InputError when there is no manifest that can be read.
+    """
+    folder = Path(folder)
+    try:
+        expected = dict(json.loads(read_text(folder / MANIFEST))["files"])
+    except (ValueError, KeyError, TypeError):
+        raise InputError(
+            folder / MANIFEST, [Fault("file", "is no manifest of ctrlgen; generate the folder anew")]
+        ) from None
+    faults = []
+    for name, digest in expected.items():
+        if not (folder / name).is_file():
+            faults.append(Fault(name, "is missing; generate the folder anew"))
+        elif _sha256(folder / name) != digest:
+            faults.append(Fault(name, "was changed since it was generated; generate the folder anew"))
+    added = sorted(path.name for path in folder.glob("*.[ch]") if path.name not in expected)
+    return (*faults, *(Fault(name, "was added; keep files of your own elsewhere") for name in added))
+
+
+def _absolute(path: Path) -> Path:
+    return Path(os.path.abspath(path))  # not resolve(): a link's target may lie where its stated path does not lead
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _context(
+    scenario: Scenario, contexts: Mapping[Real, dict[str, Any]], figures: Mapping[str, str], inputs: Mapping[str, str]
+) -> dict[str, Any]:
+    """What the templates of the package need: those of the float C, and what concerns both arithmetics."""
+    c = contexts[Real.FLOAT]
+    arrays: list[tuple[str, Signal]] = [("target", c["follow"]), ("out.drive", c["drive"])]
+    if c["n_s"]:
+        arrays.append(("out.state", c["state"]))
+    return {
+        **c,
+        "name": scenario.name,
+        "title": comment(scenario.file.title),
+        "device": scenario.device.name,
+        "pieces": ["online", *(["player"] if c["player"] else []), "selftest", "vectors"],
+        "arrays": arrays,
+        "elements": lambda signal: [
+            f"{a} [{base_unit(u)}]" for a, u in zip(signal.channels, signal.units, strict=True)
+        ],
+        "target": c["rows"][0]["target"],
+        "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
+        "memory": _memory(c),
+        "vectors": len(c["rows"]) + len(c["played"]),
+        "tolerance": {real.suffix: contexts[real]["tolerance"] for real in Real},
+        "figures": list(figures),
+        "inputs": list(zip(inputs, scenario.digest.values(), strict=True)),
+    }
+
+
+def _memory(c: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the README's table: `count` numbers of the arithmetic and `extra` bytes."""
+    x, n, n_s, m, rows = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
+    state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers, RAM, one a device"
+    output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
+    vectors = f"{rows} x ({m} + {n}) numbers and 3 x {rows} `int` of 4 B, constants; only if the test is called"
+    played = len(c["played"])
+    if played:
+        vectors = vectors.replace(
+            ", constants", f", {played} x {n} numbers and {played} `unsigned long` of 4 B, constants"
+        )
+    table = []
+    if played:
+        formula = f"{c['samples']} x {n} numbers, constants; only if the player is called"
+        table = [{"what": "player's table", "count": c["samples"] * n, "extra": 0, "formula": formula}]
+    return [
+        {"what": "state", "count": x + n, "extra": 0, "formula": state},
+        {"what": "output", "count": 2 * n + n_s, "extra": 0, "formula": output},
+        *table,
+        {"what": "vectors", "count": rows * (m + n) + played * n, "extra": 12 * rows + 4 * played, "formula": vectors},
+    ]
+
+
+def _platformio(context: dict[str, Any]) -> dict[str, Any]:
+    """library.json; only the C at the root is built, headers stand beside it."""
+    return {
+        "name": context["name"],
+        "version": context["version"],
+        "description": context["title"],
+        "keywords": ["control", "feedforward", "inverse", "flexure", "positioning"],
+        "authors": [{"name": "ctrlgen"}],
+        "headers": [f"{context['name']}_{piece}_f32.h" for piece in context["pieces"] if piece in ("online", "player")],
+        "frameworks": "*",
+        "platforms": "*",
+        "build": {"srcDir": ".", "includeDir": ".", "srcFilter": ["+<*.c>"]},
+    }

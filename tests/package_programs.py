@@ -1,0 +1,36 @@
+"""Two generated packages for the tests of them, and how those build."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.folder import CFolder
+
+STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
+
+
+def run(*words: object, cwd: Path | None = None) -> str:
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, cwd=cwd)
+    assert done.returncode == 0, f"{words}: status {done.returncode}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def everything(packages: dict[str, CFolder]) -> str:
+    """A main that includes every header of all packages, calls every piece and every selftest."""
+    headers = [h.name for c in packages.values() for h in sorted(c.path.glob("*.h"))]
+    calls = ""
+    for k, (c, real) in enumerate((c, real) for c in packages.values() for real in Real):
+        test, online, player, vectors = (names[real] for names in (c.selftest, c.online, c.player, c.vectors))
+        calls += f"""    {{
+        {test}_result r;
+        {online}_state state;
+        {online}_output out;
+        {online}_init(&state);
+        if ({online}_settle(&state, {vectors}_target[0], &out) != {vectors}_status[0]) {{ return {4 * k + 1}; }}
+        if ({player}_sample({vectors}_played[0], out.drive) != 0) {{ return {4 * k + 2}; }}
+        if (({test}(&r) != 0) || (r.compared != {test.upper()}_VECTORS)) {{ return {4 * k + 3}; }}
+    }}
+"""
+    return "".join(f'#include "{h}"\n' for h in headers) + f"int main(void)\n{{\n{calls}    return 0;\n}}\n"
