@@ -60,8 +60,8 @@ class Unit:
     def status(self) -> int:
         return (self.fmu.getInt32 if self.three else self.fmu.getInteger)(self.references("status"))[0]
 
-    def begin(self, what: str, values: np.ndarray, at: float = 0.0) -> None:
-        """Initialized with these inputs."""
+    def begin(self, what: str, values: np.ndarray, seen: str = "", at: float = 0.0) -> np.ndarray | None:
+        """Initialized with these inputs; the output `seen` as it is before initialization ends."""
         if self.start_settled:
             self.fmu.setBoolean(self.references("start_settled"), [True])
         if self.three:
@@ -70,8 +70,10 @@ class Unit:
             self.fmu.setupExperiment(startTime=at)
             self.fmu.enterInitializationMode()
         self.set(what, values)
+        early = self.get(seen) if seen else None
         self.fmu.exitInitializationMode()
         self.time = at
+        return early
 
     def step(self, samples: float = 1) -> None:
         size = samples * self.sample_time
@@ -207,7 +209,7 @@ def test_a_communication_step_may_be_several_samples_and_nothing_else(units, cir
             other.step()
         assert np.array_equal(one.get("pose"), other.get("pose"))
         before = one.get("pose")
-        for samples in (0.5, 1.5, 0.0, -1.0, np.nan):
+        for samples in (0.5, 1.3, 1.5, 0.0, -1.0, np.nan):
             with pytest.raises(FMICallException):
                 one.fmu.doStep(currentCommunicationPoint=one.time, communicationStepSize=samples * 1e-3)
         with pytest.raises(FMICallException):
@@ -423,8 +425,9 @@ def test_a_plant_with_inertia_moves_as_the_model_and_has_no_controller(more, com
 def test_settling_finds_the_equilibrium(units, circle, tmp_path):
     drives = circle.drive[250]
     with opened(units[1], tmp_path / "unit", start_settled=True) as unit:
-        unit.begin("drive", drives)
+        early = unit.begin("drive", drives, seen="pose")
         pose = unit.get("pose")
+        assert np.array_equal(early, pose)
         unit.step(10)
         assert np.max(np.abs(unit.get("pose") - pose)) < 1e-15
     long = simulate(circle.model, np.tile(drives, (3, 1)), 100.0).signals["pose"][-1]
