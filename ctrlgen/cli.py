@@ -6,9 +6,8 @@ import json
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
 from rich.markup import escape
 
@@ -36,11 +35,11 @@ from ctrlgen.terminal import (
     print_recording,
     print_reproduced,
     print_solution,
+    print_workspace,
     progress,
     show_warning,
-    table_of,
 )
-from ctrlgen.units import from_si, show
+from ctrlgen.units import show
 
 app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
@@ -129,6 +128,31 @@ def compare(scenario: ScenarioPath) -> None:
         outcome = job.compare_only(scenario, advance)
     print_comparison(outcome)
     _exit(outcome)
+
+
+@app.command()
+def fmu(
+    scenario: ScenarioPath,
+    out_folder: OutFolder,
+    fmi: Annotated[int, typer.Option(help="Version of the FMI standard, 3 or 2.")] = 3,
+) -> None:
+    """Write controller and plant as FMI co-simulation units, for Simulink, Dymola, OpenModelica, FMPy and others.
+
+    The controller takes targets and gives drives; the plant takes drives and gives every signal of the model. Both
+    wrap the C that runs elsewhere, step by whole samples, and hold their sources; binaries are for this computer and
+    need a C compiler. In a loop step the controller first, hand its drives on, then step the plant: a target is what
+    stands at the end of the step. With start_settled = true both start in the equilibrium at their first inputs.
+
+    Example:  ctrlgen fmu scenarios/circle20 --out out/fmu
+    """
+    from ctrlgen.firmware.fmu import write_fmus
+
+    made = write_fmus(load_scenario(scenario), out_folder, fmi)
+    for path in made.paths:
+        out.print(str(path), soft_wrap=True, markup=False)
+    out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)
+    if made.remark:
+        out.print(made.remark, markup=False, soft_wrap=True)
 
 
 @app.command()
@@ -222,29 +246,7 @@ def workspace(
 
     Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
     """
-    found = job.map_workspace(load_device(device), at or [], out_folder)
-    signal_ = found.workspace.model.signals["pose"]
-    named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
-
-    def place(pose: Any) -> str:
-        shown = (f"{c} {from_si(pose[i], u):.4g} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i])
-        return ", ".join(shown) or "home"
-
-    table = table_of(("from", "left"), *((place(base), "right") for base in found.bases), ("anywhere", "right"))
-    for i, (channel, unit) in named:
-        rounding = 1e-9 * signal_.scale[i]
-        ends = (np.where(np.abs(r[i]) > rounding, r[i], 0.0) for r in (*found.ranges, found.extent))
-        table.add_row(
-            escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
-        )
-    out.print(table)
-    for what, ball in (("translations", found.translations), ("all channels", found.everything)):
-        out.print(
-            f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",
-            soft_wrap=True,
-        )
-    sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
-    out.print(f"typical sizes: {sizes}")
+    print_workspace(job.map_workspace(load_device(device), at or [], out_folder))
     out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
 
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -17,7 +18,7 @@ from ctrlgen import job, report
 from ctrlgen.errors import CtrlgenError
 from ctrlgen.measures import in_unit
 from ctrlgen.recording import Recording
-from ctrlgen.units import show
+from ctrlgen.units import from_si, show
 
 if TYPE_CHECKING:
     from ctrlgen.batch import Row
@@ -239,3 +240,29 @@ def complain(error: CtrlgenError) -> None:
 def show_warning(message: Warning | str, *_: Any) -> None:
     """One line without the place in our code, which tells a user nothing."""
     err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
+
+
+def print_workspace(found: job.WorkspaceSummary) -> None:
+    """Ranges of every channel at some poses and anywhere, the largest balls, and the sizes that scale these."""
+    signal_ = found.workspace.model.signals["pose"]
+    named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
+
+    def place(pose: Any) -> str:
+        shown = (f"{c} {from_si(pose[i], u):.4g} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i])
+        return ", ".join(shown) or "home"
+
+    table = table_of(("from", "left"), *((place(base), "right") for base in found.bases), ("anywhere", "right"))
+    for i, (channel, unit) in named:
+        rounding = 1e-9 * signal_.scale[i]
+        ends = (np.where(np.abs(r[i]) > rounding, r[i], 0.0) for r in (*found.ranges, found.extent))
+        table.add_row(
+            escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
+        )
+    out.print(table)
+    for what, ball in (("translations", found.translations), ("all channels", found.everything)):
+        out.print(
+            f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",
+            soft_wrap=True,
+        )
+    sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
+    out.print(f"typical sizes: {sizes}")

@@ -69,6 +69,15 @@ def base_unit(unit: str) -> str:
     return f"{_registry().Quantity(1.0, _unit(unit)).to_base_units().units:~}"
 
 
+def exponents(unit: str) -> dict[str, int] | None:
+    """Powers of kg, m, s, A, K, mol, cd, rad in an SI unit, {"kg": 1, "m": 1, "s": -2} for 'N'; None where it is not a product of these."""
+    named = dict(kilogram="kg", meter="m", second="s", ampere="A", kelvin="K", mole="mol", candela="cd", radian="rad")
+    powers = _registry().Quantity(1.0, _unit(unit)).to_base_units()._units.items()
+    if any(name not in named or power != int(power) for name, power in powers):
+        return None
+    return {named[name]: int(power) for name, power in powers}
+
+
 def same_dimension(unit: str, other: str) -> bool:
     """Whether two unit texts measure the same kind of quantity."""
     return bool(_unit(unit).dimensionality == _unit(other).dimensionality)
