@@ -36,7 +36,7 @@ LAYERS = [
     "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",
     "diagnosis.writeback diagnosis.picture_maps diagnosis.picture_sure", "diagnosis.pictures", "diagnosis.page",
     "diagnosis.bootstrap", "diagnosis.job", "batch",
-    "job", "terminal", "cli", "", "__main__",
+    "job", "terminal", "commands commands.app", "commands.controllers commands.devices commands.recordings", "cli", "", "__main__",
 ]  # fmt: skip
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}
 MODULES = sorted(PACKAGE.rglob("*.py"))

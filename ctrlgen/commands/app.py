@@ -1,0 +1,39 @@
+"""The command line's application and the arguments that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
+    help="Describe a flexure nanopositioner once; solve its trajectories, generate its C, and prove that the C is right.\n\n"
+    "Start with:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
+)  # fmt: skip
+
+ScenarioPath = Annotated[
+    Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)
+]
+DevicePath = Annotated[Path, typer.Argument(help="A device file (device.toml).", show_default=False)]
+OutFolder = Annotated[
+    Path,
+    typer.Option(
+        "--out", help="Result folder; replaced whole when the work is done, never half written.", show_default=False
+    ),
+]
+
+BootstrapCount = Annotated[
+    int,
+    typer.Option(
+        min=0, metavar="B", help="Replicates for intervals that do not trust the noise's model; 200 is usual."
+    ),
+]
+SchedulerAddress = Annotated[
+    str | None,
+    typer.Option(help="A dask.distributed scheduler, tcp://HOST:8786; by default this computer.", show_default=False),
+]
+JobCount = Annotated[
+    int | None, typer.Option(min=0, help="Processes of this computer; 0: none but this one.", show_default="one a core")
+]
