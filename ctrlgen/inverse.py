@@ -19,7 +19,7 @@ import numpy as np
 from ctrlgen.model import Model
 
 CORNERS = frozenset((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_IF_ELSE_ZERO))
-NOISE = 1e-13  # of the largest entry of an equilibrated inverse: what rounding leaves of a zero
+NOISE = 1e-12  # of the largest entry of an equilibrated inverse: what rounding leaves of a zero
 NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves rounding only
 
 

@@ -272,7 +272,8 @@ class _Printer:
         """As it may stand beside an operator."""
         if value.number:
             return _signed(self._literal(value.factor))
-        return value.text if value.factor == 1.0 else f"({self._scaled(value)})"
+        text = self._scaled(value)
+        return value.text if text == value.text else f"({text})"
 
     def _scaled(self, value: _Value) -> str:
         if value.factor == -1.0:
