@@ -160,7 +160,7 @@ class Controller:
         if self.guarded_limits and np.max(wanted) > self.safe_displacement:
             first = ratio = float(self.composite_ratio(x, z, wanted))
             for _ in range(self.shrinks):
-                wanted = wanted / max(ratio, 1.0)
+                wanted = wanted / ratio if ratio > 1 else wanted  # also where the ratio is NaN
                 ratio = float(self.composite_ratio(x, z, wanted)) if self.shrinks > 1 else 1.0
             if first > 1:
                 held, _ = acting(wanted)
@@ -199,6 +199,8 @@ def _row(value: ca.DM) -> np.ndarray:
 
 
 def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:
-    """`wanted` limited to low ... high, and whether that moved it by more than the slack."""
-    limited = np.clip(wanted, low, high)
-    return limited, bool(np.any(np.abs(limited - wanted) > slack))
+    """`wanted` limited to low ... high, NaN to low, and whether that moved it by more than the slack (NaN always)."""
+    raised = np.where(wanted > low, wanted, low)
+    limited = np.where(raised < high, raised, high)
+    with np.errstate(invalid="ignore"):  # inf - inf, of a state that overflowed
+        return limited, not bool(np.all(np.abs(limited - wanted) <= slack))

@@ -4,19 +4,6 @@
 #include <math.h>
 #include <stddef.h>
 
-static const float TARGET_LIMIT[6] = { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }; /* SI */
-static const float Z_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
-static const float Z_HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
-static const float Z_SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
-static const float S_LOW[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
-static const float S_HIGH[6] = { 823.15f, 823.15f, 823.15f, 823.15f, 823.15f, 823.15f };
-static const float S_SLACK[6] = { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f };
-static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
-static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
-static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
-static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
-static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
-
 static void wanted_displacement(const float target[6], float result[6])
 {
     const float t2 = (-0.0026423377f) * target[0];
@@ -2414,9 +2401,47 @@ static int limit_all(float value[6], const float low[6], const float high[6], co
     return hit;
 }
 
+/* Limits a displacement to its range; 1 if that moved it. */
+static int limit_displacement(float value[6])
+{
+static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
+static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
+static const float SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
+    return limit_all(value, LOW, HIGH, SLACK);
+}
+
+/* Limits the actuator temperatures to their range; 1 if that moved one. */
+static int limit_state(float value[6])
+{
+static const float LOW[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
+static const float HIGH[6] = { 823.15f, 823.15f, 823.15f, 823.15f, 823.15f, 823.15f };
+static const float SLACK[6] = { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f };
+    return limit_all(value, LOW, HIGH, SLACK);
+}
+
+/* Limits the heater powers to their range; 1 if that moved one. */
+static int limit_drive(float value[6])
+{
+static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+static const float HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
+static const float SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
+    return limit_all(value, LOW, HIGH, SLACK);
+}
+
+/* Drives at zero, or nearest to it. */
+static void go_safe(float drive[6])
+{
+static const float SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+    int i;
+    for (i = 0; i < 6; i++) {
+        drive[i] = SAFE[i];
+    }
+}
+
 /* 1 if every component is a number of a size that can be a command. */
 static int is_usable(const float target[6])
 {
+static const float TARGET_LIMIT[6] = { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }; /* SI */
     int usable = 1;
     int i;
     for (i = 0; i < 6; i++) {
@@ -2444,7 +2469,13 @@ static int shrink(const circle20_online_f32_state *state, float wanted[6])
         for (round = 0; round < 1; round++) {
             composite_ratio(wanted, worst);
             if (worst[0] > 1.0f) {
-                hit = ((hit == 2) || (worst[0] > 1.000004f)) ? 2 : 1;
+                if (worst[0] > 1.000004f) {
+                    hit = 2;
+                } else if (hit == 0) {
+                    hit = 1;
+                } else {
+                    /* as it was */
+                }
                 for (i = 0; i < 6; i++) {
                     wanted[i] = wanted[i] / worst[0];
                 }
@@ -2458,10 +2489,10 @@ static int shrink(const circle20_online_f32_state *state, float wanted[6])
 static int settle_attempt(const circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
-    (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
+    (void)limit_state(out->state);
     wanted_drive(out->state, out->drive);
     (void)state;
-    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
+    return limit_drive(out->drive);
 }
 
 /* As far on the straight line from origin to out->displacement as the drives reach in one sample; 1 if not even origin. */
@@ -2493,9 +2524,9 @@ static int settle_approach(const circle20_online_f32_state *state, const float o
 static int step_attempt(const circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
-    (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
+    (void)limit_state(out->state);
     step_drive(state->x, out->state, out->drive);
-    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
+    return limit_drive(out->drive);
 }
 
 /* As far on the straight line from origin to out->displacement as the drives reach in one sample; 1 if not even origin. */
@@ -2525,45 +2556,48 @@ static int step_approach(const circle20_online_f32_state *state, const float ori
 }
 void circle20_online_f32_init(circle20_online_f32_state *state)
 {
-    int i;
     if (state != NULL) {
+    static const float REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
+        int i;
         for (i = 0; i < 6; i++) {
-            state->x[i] = X_REST[i];
+            state->x[i] = REST[i];
         }
         for (i = 0; i < 6; i++) {
             state->z[i] = 0.0f;
         }
     }
 }
-int circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+/* No usable target: the safe drives; the device is left to itself. */
+static void settle_without(circle20_online_f32_state *state, circle20_online_f32_output *out)
+{
+    int i;
+    go_safe(out->drive);
+    for (i = 0; i < 6; i++) {
+        out->displacement[i] = state->z[i];
+        out->state[i] = state->x[i];
+    }
+    wanted_advance(out->drive, state->x);
+    balance_displacement(state->x, out->displacement, state->z);
+}
+
+/* A usable target: the drives within all limits, the state they lead to, and the status. */
+static int settle_toward(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
 {
     int status = 0;
     int limited;
     int shrunk;
     int i;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
-        return CIRCLE20_ONLINE_F32_INPUT;
-    }
-    if (is_usable(target) == 0) {
-        for (i = 0; i < 6; i++) {
-            out->drive[i] = U_SAFE[i];
-            out->displacement[i] = state->z[i];
-            out->state[i] = state->x[i];
-        }
-        wanted_advance(out->drive, state->x);
-        balance_displacement(state->x, out->displacement, state->z);
-        return CIRCLE20_ONLINE_F32_INPUT;
-    }
     wanted_displacement(target, out->displacement);
-    if (limit_all(out->displacement, Z_LOW, Z_HIGH, Z_SLACK) != 0) {
+    if (limit_displacement(out->displacement) != 0) {
         status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
     }
     wanted_state(out->displacement, out->state);
-    if (limit_all(out->state, S_LOW, S_HIGH, S_SLACK) != 0) {
+    if (limit_state(out->state) != 0) {
         float held[6];
         for (i = 0; i < 6; i++) {
             held[i] = out->state[i];
         }
+        go_safe(out->drive);
         balance_displacement(held, out->displacement, out->displacement);
         status += CIRCLE20_ONLINE_F32_STATE;
     }
@@ -2573,12 +2607,12 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
     }
     if (shrunk > 0) {
         wanted_state(out->displacement, out->state);
-        (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
+        (void)limit_state(out->state);
     }
     wanted_drive(out->state, out->drive);
-    limited = limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
+    limited = limit_drive(out->drive);
     if (limited != 0) {
-        static const float home[6] = { 0.0f };
+        static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
         limited = settle_approach(state, home, out);
         status += CIRCLE20_ONLINE_F32_DRIVE;
     }
@@ -2591,35 +2625,50 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
     }
     return status;
 }
-int circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+
+int circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+{
+    int status = CIRCLE20_ONLINE_F32_INPUT;
+    if ((state != NULL) && (target != NULL) && (out != NULL)) {
+        if (is_usable(target) == 0) {
+            settle_without(state, out);
+        } else {
+            status = settle_toward(state, target, out);
+        }
+    }
+    return status;
+}
+/* No usable target: the safe drives; the device is left to itself. */
+static void step_without(circle20_online_f32_state *state, circle20_online_f32_output *out)
+{
+    int i;
+    go_safe(out->drive);
+    for (i = 0; i < 6; i++) {
+        out->displacement[i] = state->z[i];
+        out->state[i] = state->x[i];
+    }
+    step_advance(state->x, out->drive, state->x);
+    balance_displacement(state->x, out->displacement, state->z);
+}
+
+/* A usable target: the drives within all limits, the state they lead to, and the status. */
+static int step_toward(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
 {
     int status = 0;
     int limited;
     int shrunk;
     int i;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
-        return CIRCLE20_ONLINE_F32_INPUT;
-    }
-    if (is_usable(target) == 0) {
-        for (i = 0; i < 6; i++) {
-            out->drive[i] = U_SAFE[i];
-            out->displacement[i] = state->z[i];
-            out->state[i] = state->x[i];
-        }
-        step_advance(state->x, out->drive, state->x);
-        balance_displacement(state->x, out->displacement, state->z);
-        return CIRCLE20_ONLINE_F32_INPUT;
-    }
     wanted_displacement(target, out->displacement);
-    if (limit_all(out->displacement, Z_LOW, Z_HIGH, Z_SLACK) != 0) {
+    if (limit_displacement(out->displacement) != 0) {
         status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
     }
     wanted_state(out->displacement, out->state);
-    if (limit_all(out->state, S_LOW, S_HIGH, S_SLACK) != 0) {
+    if (limit_state(out->state) != 0) {
         float held[6];
         for (i = 0; i < 6; i++) {
             held[i] = out->state[i];
         }
+        go_safe(out->drive);
         balance_displacement(held, out->displacement, out->displacement);
         status += CIRCLE20_ONLINE_F32_STATE;
     }
@@ -2629,10 +2678,10 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
     }
     if (shrunk > 0) {
         wanted_state(out->displacement, out->state);
-        (void)limit_all(out->state, S_LOW, S_HIGH, S_SLACK);
+        (void)limit_state(out->state);
     }
     step_drive(state->x, out->state, out->drive);
-    limited = limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
+    limited = limit_drive(out->drive);
     if (limited != 0) {
         limited = step_approach(state, state->z, out);
         status += CIRCLE20_ONLINE_F32_DRIVE;
@@ -2643,6 +2692,19 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
     }
     for (i = 0; i < 6; i++) {
         state->z[i] = out->displacement[i];
+    }
+    return status;
+}
+
+int circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+{
+    int status = CIRCLE20_ONLINE_F32_INPUT;
+    if ((state != NULL) && (target != NULL) && (out != NULL)) {
+        if (is_usable(target) == 0) {
+            step_without(state, out);
+        } else {
+            status = step_toward(state, target, out);
+        }
     }
     return status;
 }
