@@ -157,7 +157,7 @@ class Controller:
         if hit:
             status |= Status.STATE
             wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, self.safe_drive))
-        if self.guarded_limits and np.max(wanted) > self.safe_displacement:
+        if self.guarded_limits and np.any(wanted > self.safe_displacement):
             first = ratio = float(self.composite_ratio(x, z, wanted))
             for _ in range(self.shrinks):
                 wanted = wanted / ratio if ratio > 1 else wanted  # also where the ratio is NaN

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from ctrlgen.controller import Controller
 from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.deviations import deviations_context
+from ctrlgen.firmware.misra import CPPCHECK
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.templates import write
@@ -30,6 +32,14 @@ class CFolder:
     test: dict[Real, str]
     operations: int
     worst_operations: int
+
+    def sources(self, real: Real) -> list[Path]:
+        """The C of the library in one arithmetic."""
+        return [self.path / f"{names[real]}.c" for names in (self.online, self.player) if names]
+
+    def runner(self, real: Real) -> Path:
+        """The program that prints what the test of reference vectors finds; for a computer."""
+        return self.path / f"{self.test[real]}.c"
 
 
 def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | None = None) -> CFolder:
@@ -58,7 +68,11 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
         f"{scenario.name}_{piece}_${{real}}.c" for piece in ("online", "player") if piece == "online" or player
     )
     write("CMakeLists.txt", {"name": scenario.name, "sources": sources}, out / "CMakeLists.txt")
-    return CFolder(out, online, player, {real: f"test_{scenario.name}_{real.suffix}" for real in Real}, *cost)
+    folder = CFolder(out, online, player, {real: f"test_{scenario.name}_{real.suffix}" for real in Real}, *cost)
+    written = [path for real in Real for path in (*folder.sources(real), folder.runner(real))]
+    names = [name for path in written for name in (path.name, path.with_suffix(".h").name)]
+    write("DEVIATIONS.md", {"cppcheck": CPPCHECK, **deviations_context(names)}, out / "DEVIATIONS.md")
+    return folder
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
