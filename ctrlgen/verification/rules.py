@@ -32,6 +32,7 @@ TIDY = {
         "-readability-function-cognitive-complexity",  # it counts each maximum in such a list as a branch
     ]),
 }  # fmt: skip
+GAVE_UP = "analyzer-too-complex"  # gcc then says nothing of what it has not looked at
 REMARK = re.compile(
     r"^(?P<file>[^\n:]+):(?P<line>\d+):\d+: (?P<severity>warning|error): (?P<text>.*?)(?: \[(?P<rule>[^\]]+)\])?$", re.M
 )
@@ -54,7 +55,12 @@ ANALYZERS = (
         ("--quiet", "--config={" + ", ".join(f"{k}: '{v}'" for k, v in TIDY.items()) + "}"), ("--", *STRICT),
         "apt-get install clang-tidy",
     ),
-    _Analyzer("gcc -fanalyzer", "gcc", ("-fanalyzer", *STRICT, "-O0", "-c", "-o", "/dev/null"), (), "apt-get install gcc"),
+    _Analyzer(
+        "gcc -fanalyzer", "gcc",  # -O0: an optimiser removes what it should find; the rest lets it come to the end of a controller
+        ("-fanalyzer", "-fanalyzer-call-summaries", "--param=analyzer-bb-explosion-factor=100",
+         "--param=analyzer-max-enodes-per-program-point=64", f"-W{GAVE_UP}", *STRICT, "-O0", "-c", "-o", "/dev/null"), (),
+        "apt-get install gcc",
+    ),
     _Analyzer(
         "clang --analyze", "clang", ("--analyze", "--analyzer-output", "text", "-Xclang", "-analyzer-werror", *STRICT), (),
         "apt-get install clang",
@@ -141,6 +147,14 @@ def _analyzed(analyzer: _Analyzer, folder: CFolder) -> Check:
 
     with ThreadPoolExecutor(max_workers=AT_ONCE) as pool:
         results = list(pool.map(run, files))
+    incomplete = sorted({f.file for found, _ in results for f in found if GAVE_UP in f.rule})
+    if incomplete:
+        return not_run(
+            analyzer.tool,
+            subjects,
+            f"{analyzer.program} gave up before the end of {', '.join(incomplete)}; use a newer one",
+            version,
+        )
     silent = [words for _, words in results if words]
     if silent:
         return not_run(analyzer.tool, subjects, f"{analyzer.program} stopped: {silent[0]}; {analyzer.install}", version)
