@@ -111,17 +111,16 @@ def test_the_list_of_deviations_is_exact_with_a_player(circle, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["creep", "hysteresis", "end_stop"])
+@pytest.mark.parametrize("kind", ["creep", "hysteresis"])
 def test_controllers_of_devices_with_effects_break_no_rule_and_survive_hostile_calls(kind, tmp_path):
     effects = {
         "creep": {"kind": "creep", "at": "1X", "tau": "0.03 s", "gain": 0.02},
         "hysteresis": {"kind": "hysteresis", "at": "1X", "stiffness": "0.0015 N/um", "reach": "0.3 um", "taper": 0.0},
-        "end_stop": {"kind": "end_stop", "at": "1X", "gap": "40 um", "stiffness": "0.0015 N/um"},
     }
     scenario = replace(load_scenario(SCENARIOS / "circle20"), device=effect_device(effects[kind]))
     model = build_model(scenario.device)
     folder = generate(scenario, model, tmp_path)
-    for check in (*check_rules(folder), *check_hostile(folder, scenario, model, runs=20_000)):
+    for check in (*check_rules(folder), *check_hostile(folder, scenario, model, runs=2000)):
         assert check.state != "failed", [str(f) for f in check.findings if not f.permitted]
 
 
