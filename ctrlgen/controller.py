@@ -199,10 +199,10 @@ class Controller:
         if hit:
             status |= Status.STATE
             wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, self.safe_drive))
-        if self.guarded_limits and (self.gauge is None or float(self.gauge(wanted)) > 1):
+        if self.guarded_limits and (self.gauge is None or not float(self.gauge(wanted)) <= 1):
             first = ratio = float(self.composite_ratio(x, z, wanted))
             for _ in range(self.shrinks):
-                wanted = wanted / max(ratio, 1.0)
+                wanted = wanted / ratio if ratio > 1 else wanted  # also where the ratio is NaN
                 ratio = float(self.composite_ratio(x, z, wanted)) if self.shrinks > 1 else 1.0
             if first > 1:
                 held, _ = acting(wanted)
@@ -258,6 +258,8 @@ def _row(value: ca.DM) -> np.ndarray:
 
 
 def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:
-    """`wanted` limited to low ... high, and whether that moved it by more than the slack."""
-    limited = np.clip(wanted, low, high)
-    return limited, bool(np.any(np.abs(limited - wanted) > slack))
+    """`wanted` limited to low ... high, NaN to low, and whether that moved it by more than the slack (NaN always)."""
+    raised = np.where(wanted > low, wanted, low)
+    limited = np.where(raised < high, raised, high)
+    with np.errstate(invalid="ignore"):  # inf - inf, of a state that overflowed
+        return limited, not bool(np.all(np.abs(limited - wanted) <= slack))

@@ -16,6 +16,8 @@ from pathlib import Path
 
 from ctrlgen.controller import Controller
 from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.deviations import deviations_context
+from ctrlgen.firmware.misra import CPPCHECK
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.package import write_package
 from ctrlgen.firmware.player import player_context
@@ -80,6 +82,8 @@ def generate(
             for kind in ("h", "c"):
                 written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
         written.append(write("test.c", contexts[real], out / "test" / f"test_{scenario.name}_{real.suffix}.c"))
+    of_c = [path.name for path in written]
+    written.append(write("DEVIATIONS.md", {"cppcheck": CPPCHECK, **deviations_context(of_c)}, out / "DEVIATIONS.md"))
     write_package(out, scenario, contexts, figures or {}, written)
     cost = contexts[Real.FLOAT]["cost"]
     pieces = names if played else names | {"player": {}}

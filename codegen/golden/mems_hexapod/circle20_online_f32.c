@@ -4,15 +4,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-static const float TARGET_LIMIT[6] = { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }; /* SI */
-static const float Z_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
-static const float Z_HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
-static const float Z_SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
 static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
-static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
 /* Square root by Newton steps; 0 for 0, for negative numbers and for what is not a number. */
 static float root(float a)
@@ -35,39 +30,38 @@ static void wanted_displacement(const float target[6], float result[6])
 {
     const float t6 = ((-0.0026423377f) * target[0]) - (0.0037076124f * target[1]);
     const float t10 = t6 + (0.0041873017f * target[2]);
-    const float t14 = t10 + (target[3]);
+    const float t14 = t10 + target[3];
     const float t18 = t14 + (0.64624566f * target[5]);
     const float t24 = (0.0006915413f * target[0]) + (0.0026864675f * target[1]);
     const float t27 = t24 - (0.002447848f * target[2]);
-    const float t30 = t27 - (1.4311398e-13f * target[3]);
-    const float t34 = t30 + (target[4]);
-    const float t37 = t34 + (1.1192472f * target[5]);
-    const float t43 = (0.0041421377f * target[1]) - (0.0018897178f * target[0]);
-    const float t46 = t43 + (0.0041873017f * target[2]);
-    const float t49 = t46 - (0.5f * target[3]);
-    const float t52 = t49 - (0.8660254f * target[4]);
-    const float t55 = t52 + (0.64624566f * target[5]);
-    const float t61 = (0.0019807783f * target[0]) - (0.0019421261f * target[1]);
-    const float t64 = t61 - (0.002447848f * target[2]);
-    const float t67 = t64 + (0.8660254f * target[3]);
-    const float t70 = t67 - (0.5f * target[4]);
-    const float t73 = t70 + (1.1192472f * target[5]);
-    const float t79 = (0.0045320555f * target[0]) - (0.00043452534f * target[1]);
-    const float t82 = t79 + (0.0041873017f * target[2]);
-    const float t85 = t82 - (0.5f * target[3]);
-    const float t88 = t85 + (0.8660254f * target[4]);
-    const float t91 = t88 + (0.64624566f * target[5]);
-    const float t97 = ((-0.0026723198f) * target[0]) - (0.00074434135f * target[1]);
-    const float t100 = t97 - (0.002447848f * target[2]);
-    const float t103 = t100 - (0.8660254f * target[3]);
-    const float t106 = t103 - (0.5f * target[4]);
-    const float t109 = t106 + (1.1192472f * target[5]);
+    const float t31 = t27 + target[4];
+    const float t34 = t31 + (1.1192472f * target[5]);
+    const float t40 = (0.0041421377f * target[1]) - (0.0018897178f * target[0]);
+    const float t43 = t40 + (0.0041873017f * target[2]);
+    const float t46 = t43 - (0.5f * target[3]);
+    const float t49 = t46 - (0.8660254f * target[4]);
+    const float t52 = t49 + (0.64624566f * target[5]);
+    const float t58 = (0.0019807783f * target[0]) - (0.0019421261f * target[1]);
+    const float t61 = t58 - (0.002447848f * target[2]);
+    const float t64 = t61 + (0.8660254f * target[3]);
+    const float t67 = t64 - (0.5f * target[4]);
+    const float t70 = t67 + (1.1192472f * target[5]);
+    const float t76 = (0.0045320555f * target[0]) - (0.00043452534f * target[1]);
+    const float t79 = t76 + (0.0041873017f * target[2]);
+    const float t82 = t79 - (0.5f * target[3]);
+    const float t85 = t82 + (0.8660254f * target[4]);
+    const float t88 = t85 + (0.64624566f * target[5]);
+    const float t94 = ((-0.0026723198f) * target[0]) - (0.00074434135f * target[1]);
+    const float t97 = t94 - (0.002447848f * target[2]);
+    const float t100 = t97 - (0.8660254f * target[3]);
+    const float t103 = t100 - (0.5f * target[4]);
+    const float t106 = t103 + (1.1192472f * target[5]);
     result[0] = t18;
-    result[1] = t37;
-    result[2] = t55;
-    result[3] = t73;
-    result[4] = t91;
-    result[5] = t109;
+    result[1] = t34;
+    result[2] = t52;
+    result[3] = t70;
+    result[4] = t88;
+    result[5] = t106;
 }
 
 static void wanted_state(const float wanted[6], float result[6])
@@ -1819,6 +1813,15 @@ static int limit_all(float value[6], const float low[6], const float high[6], co
     return hit;
 }
 
+/* Limits a displacement to its range; 1 if that moved it. */
+static int limit_displacement(float value[6])
+{
+    static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
+    static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
+    static const float SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
+    return limit_all(value, LOW, HIGH, SLACK);
+}
+
 /* 1 if no drive is beyond its limits by more than the slack. */
 static int drives_admissible(const float drive[6])
 {
@@ -1835,6 +1838,7 @@ static int drives_admissible(const float drive[6])
 /* 1 if every component is a number of a size that can be a command. */
 static int is_usable(const float target[6])
 {
+    static const float TARGET_LIMIT[6] = { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }; /* SI */
     int usable = 1;
     int i;
     for (i = 0; i < 6; i++) {
@@ -1848,7 +1852,6 @@ static int is_usable(const float target[6])
 static int shrink(const circle20_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
-    int i;
     float bound[1];
     composite_bound(wanted, bound);
     if (!(bound[0] <= 1.0f)) {
@@ -1856,7 +1859,14 @@ static int shrink(const circle20_online_f32_state *state, float wanted[6])
         {
             composite_ratio(wanted, worst);
             if (worst[0] > 1.0f) {
-                hit = ((hit == 2) || (worst[0] > 1.000004f)) ? 2 : 1;
+                int i;
+                if (worst[0] > 1.000004f) {
+                    hit = 2;
+                } else if (hit == 0) {
+                    hit = 1;
+                } else {
+                    /* shrunk before */
+                }
                 for (i = 0; i < 6; i++) {
                     wanted[i] = wanted[i] / worst[0];
                 }
@@ -1879,11 +1889,7 @@ static void settle_drives(const circle20_online_f32_state *state, circle20_onlin
 static int settle_approach(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
 {
     float way[6];
-    float here[6];
     float there[6];
-    float share = 0.0f;
-    float end = 1.0f;
-    int trial;
     int i;
     for (i = 0; i < 6; i++) {
         way[i] = out->displacement[i] - origin[i];
@@ -1891,44 +1897,47 @@ static int settle_approach(const circle20_online_f32_state *state, const float o
         out->displacement[i] = origin[i];
     }
     settle_drives(state, out);
-    for (i = 0; i < 6; i++) {
-        here[i] = out->drive[i];
-    }
-    if (limit_all(out->drive, U_LOW, U_HIGH, U_SLACK) != 0) {
-        return 1;
-    }
-    for (trial = 0; trial < 3; trial++) {
-        float part = 1.0f;
-        float next;
+    if (drives_admissible(out->drive) != 0) {
+        float here[6];
+        float share = 0.0f;
+        float end = 1.0f;
+        int trial;
         for (i = 0; i < 6; i++) {
-            if ((there[i] > (U_HIGH[i] + U_SLACK[i])) || (there[i] < (U_LOW[i] - U_SLACK[i]))) {
-                const float limit = (there[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
-                const float met = (limit - here[i]) / (there[i] - here[i]);
-                part = (met < part) ? met : part;
+            here[i] = out->drive[i];
+        }
+        for (trial = 0; trial < 3; trial++) {
+            float part = 1.0f;
+            float next;
+            for (i = 0; i < 6; i++) {
+                if ((there[i] > (U_HIGH[i] + U_SLACK[i])) || (there[i] < (U_LOW[i] - U_SLACK[i]))) {
+                    const float limit = (there[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                    const float met = (limit - here[i]) / (there[i] - here[i]);
+                    part = (met < part) ? met : part;
+                }
+            }
+            part = (part > 0.0f) ? part : 0.0f;
+            next = share + ((0.99609375f * part) * (end - share));
+            for (i = 0; i < 6; i++) {
+                out->displacement[i] = origin[i] + (next * way[i]);
+            }
+            settle_drives(state, out);
+            if (drives_admissible(out->drive) != 0) {
+                share = next;
+                for (i = 0; i < 6; i++) {
+                    here[i] = out->drive[i];
+                }
+            } else {
+                end = next;
+                for (i = 0; i < 6; i++) {
+                    there[i] = out->drive[i];
+                }
             }
         }
-        part = (part > 0.0f) ? part : 0.0f;
-        next = share + ((0.99609375f * part) * (end - share));
         for (i = 0; i < 6; i++) {
-            out->displacement[i] = origin[i] + (next * way[i]);
+            out->displacement[i] = origin[i] + (share * way[i]);
         }
         settle_drives(state, out);
-        if (drives_admissible(out->drive) != 0) {
-            share = next;
-            for (i = 0; i < 6; i++) {
-                here[i] = out->drive[i];
-            }
-        } else {
-            end = next;
-            for (i = 0; i < 6; i++) {
-                there[i] = out->drive[i];
-            }
-        }
     }
-    for (i = 0; i < 6; i++) {
-        out->displacement[i] = origin[i] + (share * way[i]);
-    }
-    settle_drives(state, out);
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
 /* Drives that put the device at out->displacement, not limited yet. */
@@ -1943,11 +1952,7 @@ static void step_drives(const circle20_online_f32_state *state, circle20_online_
 static int step_approach(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
 {
     float way[6];
-    float here[6];
     float there[6];
-    float share = 0.0f;
-    float end = 1.0f;
-    int trial;
     int i;
     for (i = 0; i < 6; i++) {
         way[i] = out->displacement[i] - origin[i];
@@ -1955,48 +1960,52 @@ static int step_approach(const circle20_online_f32_state *state, const float ori
         out->displacement[i] = origin[i];
     }
     step_drives(state, out);
-    for (i = 0; i < 6; i++) {
-        here[i] = out->drive[i];
-    }
-    if (limit_all(out->drive, U_LOW, U_HIGH, U_SLACK) != 0) {
-        return 1;
-    }
-    for (trial = 0; trial < 3; trial++) {
-        float part = 1.0f;
-        float next;
+    if (drives_admissible(out->drive) != 0) {
+        float here[6];
+        float share = 0.0f;
+        float end = 1.0f;
+        int trial;
         for (i = 0; i < 6; i++) {
-            if ((there[i] > (U_HIGH[i] + U_SLACK[i])) || (there[i] < (U_LOW[i] - U_SLACK[i]))) {
-                const float limit = (there[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
-                const float met = (limit - here[i]) / (there[i] - here[i]);
-                part = (met < part) ? met : part;
+            here[i] = out->drive[i];
+        }
+        for (trial = 0; trial < 3; trial++) {
+            float part = 1.0f;
+            float next;
+            for (i = 0; i < 6; i++) {
+                if ((there[i] > (U_HIGH[i] + U_SLACK[i])) || (there[i] < (U_LOW[i] - U_SLACK[i]))) {
+                    const float limit = (there[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                    const float met = (limit - here[i]) / (there[i] - here[i]);
+                    part = (met < part) ? met : part;
+                }
+            }
+            part = (part > 0.0f) ? part : 0.0f;
+            next = share + ((0.99609375f * part) * (end - share));
+            for (i = 0; i < 6; i++) {
+                out->displacement[i] = origin[i] + (next * way[i]);
+            }
+            step_drives(state, out);
+            if (drives_admissible(out->drive) != 0) {
+                share = next;
+                for (i = 0; i < 6; i++) {
+                    here[i] = out->drive[i];
+                }
+            } else {
+                end = next;
+                for (i = 0; i < 6; i++) {
+                    there[i] = out->drive[i];
+                }
             }
         }
-        part = (part > 0.0f) ? part : 0.0f;
-        next = share + ((0.99609375f * part) * (end - share));
         for (i = 0; i < 6; i++) {
-            out->displacement[i] = origin[i] + (next * way[i]);
+            out->displacement[i] = origin[i] + (share * way[i]);
         }
         step_drives(state, out);
-        if (drives_admissible(out->drive) != 0) {
-            share = next;
-            for (i = 0; i < 6; i++) {
-                here[i] = out->drive[i];
-            }
-        } else {
-            end = next;
-            for (i = 0; i < 6; i++) {
-                there[i] = out->drive[i];
-            }
-        }
     }
-    for (i = 0; i < 6; i++) {
-        out->displacement[i] = origin[i] + (share * way[i]);
-    }
-    step_drives(state, out);
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
 void circle20_online_f32_init(circle20_online_f32_state *state)
 {
+    static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     int i;
     if (state != NULL) {
         for (i = 0; i < 6; i++) {
@@ -2041,7 +2050,7 @@ static int settle_within(circle20_online_f32_state *state, circle20_online_f32_o
         if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
-            static const float home[6] = { 0.0f };
+            static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
             limited = settle_approach(state, home, out);
             status += CIRCLE20_ONLINE_F32_DRIVE;
         }
@@ -2068,7 +2077,7 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
         if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
         } else if (is_usable(target) != 0) {
-            const int hit = limit_all(out->displacement, Z_LOW, Z_HIGH, Z_SLACK);
+            const int hit = limit_displacement(out->displacement);
             status = settle_within(state, out);
             if (hit != 0) {
                 status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
@@ -2139,7 +2148,7 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
         if (displacement_inside(out->displacement) != 0) {
             status = step_within(state, out);
         } else if (is_usable(target) != 0) {
-            const int hit = limit_all(out->displacement, Z_LOW, Z_HIGH, Z_SLACK);
+            const int hit = limit_displacement(out->displacement);
             status = step_within(state, out);
             if (hit != 0) {
                 status += CIRCLE20_ONLINE_F32_DISPLACEMENT;

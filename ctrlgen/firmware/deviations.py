@@ -1,0 +1,65 @@
+"""The advisory MISRA C:2012 rules that the generated C does not follow, each with its reason: the text of DEVIATIONS.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Rule `number`, the files (patterns of names) it is not followed in, what stands there, and why."""
+
+    number: str
+    files: tuple[str, ...]
+    what: str
+    reason: str
+
+    def covers(self, number: str, name: str) -> bool:
+        """Whether it permits a finding of rule `number` in the file `name`."""
+        return number == self.number and any(fnmatch(name, pattern) for pattern in self.files)
+
+
+DEVIATIONS = (
+    Deviation(
+        "5.9", ("*_online_f??.c", "*_player_f??.c", "*_selftest_f??.c", "*_vectors_f??.c"),
+        "names of static functions and tables that several of these files have",
+        "Each file is complete without the others, and a name that no other file can see cannot be mistaken by the "
+        "linker. The same step has the same name in float and double, so the two can be compared line by line.",
+    ),
+    Deviation(
+        "2.5", ("*.h",),
+        "constants of an interface that its own source does not read",
+        "They are for the caller: the number of samples, the status to compare with, the tolerance.",
+    ),
+    Deviation(
+        "19.2", ("*_online_f??.c", "*_plant_f??.c"),
+        "the union in root(), by which the exponent of a number is halved",
+        "C99 defines what is read from another member; it spares a library call, and both members have the same bytes.",
+    ),
+)  # fmt: skip
+# Required, not advisory: only in the program that prints the outcome of the test on a computer. No firmware contains it.
+HOST_ONLY = (
+    Deviation(
+        "21.6", ("test_*.c",),
+        "printf",
+        "The test runs on a computer and says which vector disagrees. It is no part of the firmware.",
+    ),
+)  # fmt: skip
+
+
+def permits(number: str, name: str) -> bool:
+    """Whether DEVIATIONS.md lists rule `number` for the file `name`."""
+    return any(deviation.covers(number, name) for deviation in (*DEVIATIONS, *HOST_ONLY))
+
+
+def deviations_context(names: Sequence[str]) -> dict[str, Any]:
+    """What the template of DEVIATIONS.md needs; `names` are those of the generated C files."""
+
+    def rows(deviations: Sequence[Deviation]) -> list[dict[str, Any]]:
+        found = [(d, [name for name in sorted(names) if d.covers(d.number, name)]) for d in deviations]
+        return [{"number": d.number, "files": files, "what": d.what, "reason": d.reason} for d, files in found if files]
+
+    return {"advisory": rows(DEVIATIONS), "host": rows(HOST_ONLY)}

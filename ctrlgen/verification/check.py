@@ -1,0 +1,82 @@
+"""What a check of the generated C by a tool found, or why it did not run."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from ctrlgen.firmware.cprint import Real
+
+PATIENCE = 900.0  # s, after which a tool is taken to hang
+
+State = Literal["passed", "failed", "not run"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One remark of a tool: `rule` in the tool's own naming; `permitted` where DEVIATIONS.md lists it, or it only informs."""
+
+    file: str
+    line: int
+    rule: str
+    severity: str
+    text: str
+    permitted: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}: {self.severity}: {self.text} [{self.rule}]"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One tool over the files (name, arithmetic) in `subjects`; `note` has figures, or, when not run, reason and remedy."""
+
+    tool: str
+    version: str
+    subjects: tuple[tuple[str, Real], ...]
+    state: State
+    findings: tuple[Finding, ...] = ()
+    note: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it ran and found nothing that is not permitted."""
+        return self.state == "passed"
+
+
+def judged(
+    tool: str, version: str, subjects: Sequence[tuple[str, Real]], findings: Sequence[Finding], note: str = ""
+) -> Check:
+    """A check that ran: failed by any finding that is not permitted."""
+    ordered = tuple(sorted(set(findings), key=lambda f: (f.file, f.line, f.rule, f.text)))
+    state: State = "passed" if all(f.permitted for f in ordered) else "failed"
+    return Check(tool, version, tuple(subjects), state, ordered, note)
+
+
+def not_run(tool: str, subjects: Sequence[tuple[str, Real]], reason: str, version: str = "") -> Check:
+    """A check that did not run, with what to do about it."""
+    return Check(tool, version, tuple(subjects), "not run", (), reason)
+
+
+def run_tool(words: Sequence[str], **options: object) -> subprocess.CompletedProcess[str]:
+    """The finished program with its words. Raises KeyboardInterrupt where it was interrupted, OSError where it is missing."""
+    try:
+        done = subprocess.run(
+            list(words), capture_output=True, text=True, errors="replace", check=False, start_new_session=True,
+            timeout=PATIENCE, **options,
+        )  # type: ignore[call-overload]  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(list(words), 124, "", f"{words[0]} did not end within {PATIENCE:g} s")
+    return done
+
+
+def version_of(program: str) -> str | None:
+    """The line of `program --version` that names its version; None where the program is missing or broken."""
+    if not shutil.which(program):
+        return None
+    done = run_tool([program, "--version"])
+    lines = [line.strip() for line in done.stdout.splitlines() if any(c.isdigit() for c in line)]
+    return lines[0] if done.returncode == 0 and lines else None

@@ -1,0 +1,204 @@
+"""The generated C under hostile calls: sanitizers with random inputs, and a coverage-guided fuzzer.
+
+One harness (`hostile.c`) decodes bytes into calls: numbers that are none, infinite, denormal, out of range; missing
+pointers; a step before any init; states of garbage; several instances; extreme indices and times. After each call it
+checks what the headers promise. The bytes come from a fixed seed, or from libFuzzer.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.controller import Controller, Status
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.templates import write
+from ctrlgen.model import Model
+from ctrlgen.scenario import Scenario
+from ctrlgen.verification.check import Check, Finding, judged, not_run, run_tool, version_of
+
+RUNS = 200_000
+FUZZ_SECONDS = 20  # at most, for each arithmetic
+SEED = 1
+STOPPING = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+TOLD = ("-fsanitize=float-divide-by-zero", "-fsanitize-recover=all")  # defined by IEEE 754: told, not judged
+FUZZING = ("-fsanitize=fuzzer,address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-DHOSTILE_FUZZ")
+COVERING = ("-fsanitize=fuzzer", "-DHOSTILE_FUZZ", "-O0")
+BUILD = ("-std=c99", "-O1", "-g", "-w")
+EMPTY = "int main(void) { return 0; }\n"
+EMPTY_FUZZ = """int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size);
+int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size) { (void)data; (void)size; return 0; }
+"""
+INSTALL = "apt-get install gcc libasan8 libubsan1, or clang libclang-rt-14-dev"
+RUNTIME_ERROR = re.compile(r"^(?P<file>[^\n:]+):(?P<line>\d+):\d+: runtime error: (?P<text>.*)$", re.M)
+ADDRESS = re.compile(r"ERROR: (?P<rule>AddressSanitizer|LeakSanitizer|libFuzzer): (?P<text>[^\n]*)")
+PLACE = re.compile(r"#\d+ 0x\w+ in \w+ (?P<file>[^\s:]+\.c):(?P<line>\d+)")
+EDGES = re.compile(
+    r"^(?P<entered>COVERED|UNCOVERED)_FUNC: hits: \d+ edges: (?P<reached>\d+)/(?P<there>\d+) (?P<function>\w+) (?P<file>[^\n:]+):",
+    re.M,
+)
+PROMISE = re.compile(r"^broken promise: (?P<text>.*)$", re.M)
+
+
+def check_hostile(
+    folder: CFolder,
+    scenario: Scenario,
+    model: Model,
+    progress: Callable[[str], None] = lambda _: None,
+    runs: int = RUNS,
+) -> tuple[Check, ...]:
+    """The sanitizers over `runs` random calls, and libFuzzer over as many sequences or `FUZZ_SECONDS`, each in both arithmetics."""
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
+        scratch = Path(name)
+        for real in Real:
+            write("hostile.c", _context(folder, scenario, model, real), scratch / f"hostile_{real.suffix}.c")
+        random = _random(folder, scratch, runs)
+        progress(random.tool)
+        fuzzed = _fuzzed(folder, scratch, runs)
+        progress(fuzzed.tool)
+    return random, fuzzed
+
+
+def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
+    controller = Controller(model, scenario.file.follow, scenario.sample_time)
+    nominal = controller.nominal
+    bits = Status.DISPLACEMENT | Status.DRIVE | Status.INPUT
+    bits |= (Status.STATE if nominal.n_states else bits) | (Status.COMPOSITE if controller.guarded_limits else bits)
+    samples = len(scenario.command(model))
+    return {
+        "real": real, "online": folder.online[real], "player": folder.player.get(real) if folder.player else None,
+        "n": len(nominal.axes), "nx": nominal.x.numel(), "n_s": nominal.n_states, "m": len(controller.input_limits),
+        "rate": scenario.sample_time is not None, "bits": int(bits),
+        "input_limits": controller.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
+        "u_safe": controller.safe_drive, "z_typical": nominal.z_scale, "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
+        "samples": samples, "duration": samples * (scenario.sample_time or 0.0),
+    }  # fmt: skip
+
+
+def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
+    return [(path.name, real) for real in Real for path in folder.sources(real)]
+
+
+def _build(compiler: str, flags: Sequence[str], sources: Sequence[Path], include: Path, program: Path) -> str:
+    """What the compiler said when it failed; empty when `program` is there."""
+    done = run_tool([compiler, *BUILD, *flags, "-I", str(include), *map(str, sources), "-lm", "-o", str(program)])
+    return "" if done.returncode == 0 else (done.stderr or done.stdout).strip()[-500:] or f"status {done.returncode}"
+
+
+def _works(compiler: str, flags: Sequence[str], text: str, scratch: Path, *words: str) -> str:
+    """Whether an empty program can be built and run with these sanitizers: what stands against it, or nothing."""
+    if not shutil.which(compiler):
+        return f"{compiler} is missing"
+    (scratch / "empty.c").write_text(text)
+    said = _build(compiler, flags, [scratch / "empty.c"], scratch, scratch / "empty")
+    if said:
+        return f"{compiler} cannot build with {flags[0]}: {said.splitlines()[0]}"
+    done = run_tool([str(scratch / "empty"), *words], cwd=scratch)
+    return (
+        ""
+        if done.returncode == 0
+        else f"a program built with {flags[0]} does not run here: {done.stderr.strip()[:200]}"
+    )
+
+
+def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
+    """AddressSanitizer and UndefinedBehaviorSanitizer over calls from a fixed seed."""
+    tool, subjects = "sanitizers, random calls", _subjects(folder)
+    against = {compiler: _works(compiler, STOPPING, EMPTY, scratch) for compiler in ("clang", "gcc")}
+    compiler = next((name for name, said in against.items() if not said), None)
+    if compiler is None:
+        return not_run(
+            tool,
+            subjects,
+            "; ".join([*against.values(), INSTALL]),
+        )
+    findings: list[Finding] = []
+    notes = []
+    for real in Real:
+        sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
+        for flags in (STOPPING, TOLD):
+            program = scratch / f"hostile_{real.suffix}"
+            said = _build(compiler, flags, sources, folder.path, program)
+            if said and flags is STOPPING:
+                return judged(
+                    tool, version_of(compiler) or "", subjects, [Finding(sources[0].name, 0, "build", "error", said)]
+                )
+            if said:
+                notes.append(f"{real.value}: divisions by zero not looked for ({compiler} has no {flags[0]})")
+                continue
+            done = run_tool([str(program), str(SEED), str(runs)], cwd=scratch)
+            findings += _told(done.stderr, sources[0].name, done.returncode, judge=flags is STOPPING)
+            if flags is STOPPING:
+                notes.append(f"{real.value}: {done.stdout.strip() or 'stopped early'}, seed {SEED}")
+    return judged(tool, version_of(compiler) or "", subjects, findings, "; ".join(notes))
+
+
+def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
+    """libFuzzer with both sanitizers, from a small fixed corpus."""
+    tool, subjects, version = "libFuzzer", _subjects(folder), version_of("clang")
+    said = _works("clang", FUZZING, EMPTY_FUZZ, scratch, "-runs=1")
+    if said:
+        major = re.search(r"version (\d+)", version or "")
+        install = "apt-get install clang" + (f" libclang-rt-{major[1]}-dev" if major else " libclang-rt-14-dev")
+        return not_run(tool, subjects, f"{said}; {install}", version or "")
+    findings: list[Finding] = []
+    notes = []
+    for real in Real:
+        program, corpus = scratch / f"fuzz_{real.suffix}", scratch / f"corpus_{real.suffix}"
+        corpus.mkdir()
+        rng = np.random.default_rng(SEED)
+        for k in range(16):
+            (corpus / str(k)).write_bytes(rng.integers(0, 256, 64 * (1 + k % 6), dtype=np.uint8).tobytes())
+        sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
+        said = _build("clang", FUZZING, sources, folder.path, program)
+        if said:
+            return judged(tool, version or "", subjects, [Finding(sources[0].name, 0, "build", "error", said)])
+        words = [
+            f"-runs={runs}",
+            f"-max_total_time={FUZZ_SECONDS}",
+            f"-seed={SEED}",
+            "-max_len=400",
+            "-print_final_stats=1",
+        ]
+        done = run_tool([str(program), *words, f"-artifact_prefix={scratch}/", str(corpus)], cwd=scratch)
+        findings += _told(done.stderr, sources[0].name, done.returncode, judge=True)
+        ran = re.findall(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
+        notes.append(f"{real.value}: {ran[-1] if ran else 'unknown'} runs, {_coverage(sources, folder.path, corpus)}")
+    return judged(tool, version or "", subjects, findings, "; ".join(notes))
+
+
+def _coverage(sources: Sequence[Path], include: Path, corpus: Path) -> str:
+    """The edges of the generated C that the corpus the fuzzer kept reaches, counted without the sanitizers' own branches."""
+    program = corpus.with_suffix(".coverage")
+    if _build("clang", COVERING, sources, include, program):
+        return "coverage not counted"
+    told = run_tool([str(program), "-runs=0", "-print_coverage=1", str(corpus)], cwd=corpus.parent).stderr
+    inside = [m for m in EDGES.finditer(told) if any(m["file"].endswith(path.name) for path in sources[1:])]
+    reached, there = (sum(int(m[k]) for m in inside) for k in ("reached", "there"))
+    never = sorted(m["function"] for m in inside if m["entered"] == "UNCOVERED")
+    return f"{reached} of {there} edges of the generated C" + (f"; never entered: {', '.join(never)}" if never else "")
+
+
+def _told(words: str, harness: str, status: int, *, judge: bool) -> list[Finding]:
+    """The findings in what a sanitized program said. A program that stops without a word is a finding too."""
+    found = [
+        Finding(
+            Path(m["file"]).name, int(m["line"]), "undefined", "error" if judge else "information", m["text"], not judge
+        )
+        for m in RUNTIME_ERROR.finditer(words)
+    ]
+    found += [Finding(harness, 0, "promise", "error", m["text"]) for m in PROMISE.finditer(words)]
+    if not found and (error := ADDRESS.search(words)):
+        place = PLACE.search(words, error.end())
+        file, line = (Path(place["file"]).name, int(place["line"])) if place else (harness, 0)
+        found.append(Finding(file, line, error["rule"], "error", error["text"][:200]))
+    if not found and status != 0:
+        found.append(Finding(harness, 0, "stopped", "error", f"status {status}: {words.strip()[-200:]}"))
+    return found

@@ -1,0 +1,165 @@
+"""The generated C under static analysis: MISRA C:2012, clang-tidy, gcc's and clang's analyzers.
+
+A tool that is missing, or stops without a word on the C, did not run: it is never counted as passed.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.deviations import permits
+from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.misra import CPPCHECK, rule_class
+from ctrlgen.verification.check import Check, Finding, judged, not_run, run_tool, version_of
+
+AT_ONCE = 2  # tools running side by side
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion")
+# What clang-tidy is not asked, and why.
+TIDY = {
+    "Checks": ",".join([
+        "-*", "bugprone-*", "cert-*", "clang-analyzer-*", "misc-*", "performance-*", "portability-*", "readability-*",
+        "-readability-identifier-length",  # x, z, u, i are what the equations call them
+        "-readability-magic-numbers",  # the numbers are the device's, printed from its description
+        "-readability-uppercase-literal-suffix",  # 1.0f, as CMSIS and most C writes it; it hides no digit
+        "-bugprone-easily-swappable-parameters",  # low and high, x and z: both are vectors of one type, called in one place
+        "-readability-function-size",  # a printed kernel is a straight list of assignments, as long as the physics
+        "-readability-function-cognitive-complexity",  # it counts each maximum in such a list as a branch
+    ]),
+}  # fmt: skip
+GAVE_UP = "analyzer-too-complex"  # gcc then says nothing of what it has not looked at
+REMARK = re.compile(
+    r"^(?P<file>[^\n:]+):(?P<line>\d+):\d+: (?P<severity>warning|error): (?P<text>.*?)(?: \[(?P<rule>[^\]]+)\])?$", re.M
+)
+
+
+@dataclass(frozen=True)
+class _Analyzer:
+    """A program called once a file: `words` before the file, `after` it; how it is installed."""
+
+    tool: str
+    program: str
+    words: tuple[str, ...]
+    after: tuple[str, ...]
+    install: str
+
+
+ANALYZERS = (
+    _Analyzer(
+        "clang-tidy", "clang-tidy",
+        ("--quiet", "--config={" + ", ".join(f"{k}: '{v}'" for k, v in TIDY.items()) + "}"), ("--", *STRICT),
+        "apt-get install clang-tidy",
+    ),
+    _Analyzer(
+        "gcc -fanalyzer", "gcc",  # -O0: an optimiser removes what it should find; the rest lets it come to the end of a controller
+        ("-fanalyzer", "-fanalyzer-call-summaries", "--param=analyzer-bb-explosion-factor=100",
+         "--param=analyzer-max-enodes-per-program-point=64", f"-W{GAVE_UP}", *STRICT, "-O0", "-c", "-o", "/dev/null"), (),
+        "apt-get install gcc",
+    ),
+    _Analyzer(
+        "clang --analyze", "clang", ("--analyze", "--analyzer-output", "text", "-Xclang", "-analyzer-werror", *STRICT), (),
+        "apt-get install clang",
+    ),
+)  # fmt: skip
+
+
+def check_rules(folder: CFolder, progress: Callable[[str], None] = lambda _: None) -> tuple[Check, ...]:
+    """One Check a tool over all C of `folder`: controllers, players and tests in both arithmetics."""
+    checks = [_misra(folder)]
+    progress(checks[0].tool)
+    for analyzer in ANALYZERS:
+        checks.append(_analyzed(analyzer, folder))
+        progress(analyzer.tool)
+    return tuple(checks)
+
+
+def _files(folder: CFolder) -> list[tuple[Path, Real]]:
+    """Every C file that is compiled, with its arithmetic."""
+    return [(path, real) for real in Real for path in (*folder.sources(real), folder.runner(real))]
+
+
+def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
+    return [(path.name, real) for path, real in _files(folder)]
+
+
+def _misra(folder: CFolder) -> Check:
+    """cppcheck over what may be one program: both arithmetics of the controllers, then each test with its controllers."""
+    tool, subjects = "cppcheck --addon=misra", _subjects(folder)
+    version = version_of("cppcheck")
+    if version is None:
+        return not_run(tool, subjects, "cppcheck is missing; apt-get install cppcheck")
+    findings: list[Finding] = []
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:  # what one run has analysed the next takes over
+        words = [
+            "cppcheck", f"-j{AT_ONCE}", f"--cppcheck-build-dir={scratch}", "--addon=misra", "--std=c99", "-U__cplusplus", "--quiet",
+            "--enable=warning,style,performance,portability", "--error-exitcode=0",
+            "--template={file}\t{line}\t{severity}\t{id}\t{message}", "-I", str(folder.path),
+        ]  # fmt: skip
+        programs = [[path for real in Real for path in folder.sources(real)]]
+        programs += [[folder.runner(real), *folder.sources(real)] for real in Real]
+        for files in programs:
+            done = run_tool([*words, *map(str, files)])
+            said = [line.split("\t", 4) for line in done.stderr.splitlines() if line.count("\t") >= 4]
+            broken = [row for row in said if row[3] in ("internalError", "preprocessorErrorDirective")]
+            if done.returncode != 0 or broken:
+                words_of_it = (broken[0][4] if broken else done.stdout + done.stderr).strip()[:500]
+                return not_run(
+                    tool, subjects, f"cppcheck stopped: {words_of_it}; apt-get install --reinstall cppcheck", version
+                )
+            findings += [_of_cppcheck(*row) for row in said]
+    note = (
+        ""
+        if version.split()[-1] == CPPCHECK
+        else f"DEVIATIONS.md was held against cppcheck {CPPCHECK}; this one may know other rules"
+    )
+    return judged(tool, version, subjects, findings, note)
+
+
+def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> Finding:
+    name = Path(file).name
+    if not rule.startswith("misra-c2012-"):
+        return Finding(name, int(line), rule, severity, text)
+    number = rule.removeprefix("misra-c2012-")
+    return Finding(name, int(line), rule, rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name))
+
+
+def _analyzed(analyzer: _Analyzer, folder: CFolder) -> Check:
+    """One analyzer over all files, `AT_ONCE` at a time."""
+    subjects, version = _subjects(folder), version_of(analyzer.program)
+    if version is None:
+        return not_run(analyzer.tool, subjects, f"{analyzer.program} is missing; {analyzer.install}")
+    files = [path for path, _ in _files(folder)]
+
+    def run(path: Path) -> tuple[list[Finding], str]:
+        include = ("-I", str(folder.path))
+        words = [analyzer.program, *analyzer.words, *(() if analyzer.after else include), str(path)]
+        done = run_tool([*words, *((*analyzer.after, *include) if analyzer.after else ())], cwd=folder.path)
+        found = [
+            Finding(Path(m["file"]).name, int(m["line"]), m["rule"] or m["severity"], m["severity"], m["text"])
+            for m in REMARK.finditer(done.stdout + "\n" + done.stderr)
+        ]
+        return found, "" if done.returncode == 0 or found else (done.stderr or done.stdout).strip()[:500]
+
+    with ThreadPoolExecutor(max_workers=AT_ONCE) as pool:
+        results = list(pool.map(run, files))
+    incomplete = sorted({f.file for found, _ in results for f in found if GAVE_UP in f.rule})
+    if incomplete:
+        return not_run(
+            analyzer.tool,
+            subjects,
+            f"{analyzer.program} gave up before the end of {', '.join(incomplete)}; use a newer one",
+            version,
+        )
+    silent = [words for _, words in results if words]
+    if silent:
+        return not_run(analyzer.tool, subjects, f"{analyzer.program} stopped: {silent[0]}; {analyzer.install}", version)
+    return judged(analyzer.tool, version, subjects, _flat([found for found, _ in results]))
+
+
+def _flat(rows: Sequence[list[Finding]]) -> list[Finding]:
+    return [finding for row in rows for finding in row]
