@@ -1,6 +1,6 @@
 """Model and solution -> a folder of C99: the only writer of C.
 
-`online` controllers (any reachable target -> drives) and `player`s (the solved trajectory as a table), each in
+`online` controllers (any reachable target -> drives) and `player`s (the solved trajectory, compressed), each in
 double and in float, with a CMake file and a test of reference vectors. Same input, same bytes.
 """
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ctrlgen.controller import Controller
+from ctrlgen.firmware.compression import Compression, compress
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.player import player_context
@@ -28,6 +29,7 @@ class CFolder:
     online: dict[Real, str]
     player: dict[Real, str]
     test: dict[Real, str]
+    compression: dict[Real, Compression]
     operations: int
     worst_operations: int
 
@@ -39,6 +41,7 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
     player = (
         {real: f"{scenario.name}_player_{real.suffix}" for real in Real} if solution and scenario.sample_time else {}
     )
+    compression = compress(solution) if solution and player else {}
     cost = (0, 0)
     for real in Real:
         context = online_context(scenario, controller, real, online[real])
@@ -52,13 +55,15 @@ def generate(scenario: Scenario, model: Model, out: Path, solution: Solution | N
             out / f"test_{scenario.name}_{real.suffix}.c",
         )
         if solution and player:
-            write("player.h", context | player_context(solution, player[real]), out / f"{player[real]}.h")
-            write("player.c", context | player_context(solution, player[real]), out / f"{player[real]}.c")
+            held = context | player_context(solution, compression[real], player[real])
+            write("player.h", held, out / f"{player[real]}.h")
+            write("player.c", held, out / f"{player[real]}.c")
     sources = " ".join(
         f"{scenario.name}_{piece}_${{real}}.c" for piece in ("online", "player") if piece == "online" or player
     )
     write("CMakeLists.txt", {"name": scenario.name, "sources": sources}, out / "CMakeLists.txt")
-    return CFolder(out, online, player, {real: f"test_{scenario.name}_{real.suffix}" for real in Real}, *cost)
+    test = {real: f"test_{scenario.name}_{real.suffix}" for real in Real}
+    return CFolder(out, online, player, test, compression, *cost)
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
