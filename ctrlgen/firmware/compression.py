@@ -24,6 +24,7 @@ from ctrlgen.units import same_dimension
 LENGTH, ANGLE = 1e-10, 1e-8  # m, rad: what a compressed drive may move what is followed
 SHARE = 0.8  # of that; the rest is left to compilers that fuse a product and a sum
 BUDGET = 150  # instructions of one sample, Cortex-M4F
+SEARCH = 22  # of them to find the piece of a cubic
 STEPS = 6  # drive tolerances tried, a decade
 FINEST = 42  # 10^(-42/6) of a drive's range: below a float's rounding
 
@@ -84,13 +85,13 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Compression:
-    """The chosen `curve` in one arithmetic, the bounds [(axes,) or None where the curve cannot pass them] and all candidates."""
+    """The chosen `curve` in one arithmetic, the bounds (axes,) it keeps, infinite where it cannot pass them, and all candidates."""
 
     real: Real
     curve: Curve
     closed: bool
-    low: np.ndarray | None
-    high: np.ndarray | None
+    low: np.ndarray
+    high: np.ndarray
     candidates: tuple[Candidate, ...]
 
     @property
@@ -103,7 +104,8 @@ class Compression:
         part = np.zeros(len(k)) if part is None else part
         if not self.closed:
             part = np.where(k == _samples(self.curve) - 1, 0.0, part)
-        return _limited(self.curve.between(k, part, self.real), self.low, self.high).astype(float)
+        values = self.curve.between(k, part, self.real)
+        return np.clip(values, self.low.astype(values.dtype), self.high.astype(values.dtype)).astype(float)
 
 
 def compress(solution: Solution) -> dict[Real, Compression]:
@@ -128,14 +130,14 @@ def _compress(
     solution: Solution, real: Real, spline: Callable[[int], Spline | None], harmonics: Callable[[int], Fourier]
 ) -> Compression:
     bounds = _inward(solution.model, real)
-    n, axes = solution.drive.shape
+    n, closed = len(solution.drive), solution.scenario.closed
 
     def measured(curve: Curve) -> Candidate:
-        sides = _sides(curve, bounds, real)
-        values = _limited(curve.values(real), *sides).astype(float)
+        compression = Compression(real, curve, closed, *_kept(curve, bounds, real), ())
+        values = compression.drives(np.arange(n))
         length, angle = _error(solution, values)
         off = float(np.abs(values - solution.drive).max())
-        cost = instructions(curve, sum(side is not None for side in sides))
+        cost = instructions(curve, int(np.isfinite([compression.low, compression.high]).sum()))
         return Candidate(
             curve.kind, _size(curve), curve.bytes(real), curve.operations, cost, length, angle, off, False, ""
         )
@@ -169,7 +171,7 @@ def _compress(
             found.append(good[1:])
 
     search("cubic", spline, STEPS, FINEST, lambda step: step + STEPS)
-    if not solution.scenario.closed:
+    if not closed:
         found.append((None, _none("Fourier", "the path is not closed")))
     elif n < FEWEST:
         found.append((None, _none("Fourier", f"fewer than {FEWEST} samples")))
@@ -178,24 +180,20 @@ def _compress(
     usable = [(curve, c) for curve, c in found if curve is not None and _within(c) and _affordable(c)]
     curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else found[0]
     assert curve is not None
-    low, high = _sides(curve, bounds, real)
     candidates = tuple(replace(c, chosen=c is best, remark=c.remark or _remark(c, best, bool(usable))) for _, c in found)
-    return Compression(real, curve, solution.scenario.closed, low, high, candidates)
+    return Compression(real, curve, closed, *_kept(curve, bounds, real), candidates)
 
 
-def instructions(curve: Curve, sides: int) -> int:
-    """Estimated instructions of one sample on a Cortex-M4F in float, where `sides` of the limits are kept at run time.
+def instructions(curve: Curve, limited: int) -> int:
+    """Estimated instructions of one sample on a Cortex-M4F in float, where `limited` bounds of drives are kept at run time.
 
-    Counted in an emulator for clang -O2, one to eight drives, then fitted: a table's row costs 2 a drive, the cubic 12,
-    a harmonic 6 and its rotation 6; a piecewise cubic's search 7 a comparison; a limit 6 a drive.
+    Fitted to the counts of an emulator for clang -O2, one to eight drives. Double takes a library there, or a Cortex-M7.
     """
     if isinstance(curve, Table):
         return 20 + 2 * curve.drive.shape[1]
     if isinstance(curve, Spline):
-        own = 34 + 12 * curve.axes + (10 + 7 * curve.halvings if len(curve.pieces) > 1 else 0)
-    else:
-        own = 30 + 6 * curve.harmonics + (2 + 6 * curve.harmonics) * curve.axes
-    return own + 6 * sides * curve.axes
+        return round(45 + 12.5 * curve.axes + (SEARCH if len(curve.pieces) > 1 else 0) + 6 * limited)
+    return round(27 + 3 * curve.axes + (7 + 5.25 * curve.axes) * curve.harmonics + 6 * limited)
 
 
 def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
@@ -265,20 +263,12 @@ def _inward(model: Model, real: Real) -> tuple[np.ndarray, np.ndarray]:
     return below.astype(float), above.astype(float)
 
 
-def _sides(
-    curve: Curve, bounds: tuple[np.ndarray, np.ndarray], real: Real
-) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """The bounds that must be kept at run time: those that the curve's own extremes, with eight roundings, may pass."""
-    if isinstance(curve, Table):
-        return None, None
+def _kept(curve: Curve, bounds: tuple[np.ndarray, np.ndarray], real: Real) -> tuple[np.ndarray, np.ndarray]:
+    """The bounds that must be kept at run time: those that the curve's own extremes, with eight roundings, may pass; else infinite."""
     low, high = curve.extremes()
     slack = 8 * float(np.finfo(np.float32 if real is Real.FLOAT else np.float64).eps) * np.maximum(abs(low), abs(high))
-    sums_up = isinstance(curve, Fourier)  # a cubic of controls >= 0 is >= 0 in any arithmetic
-    may_low = np.any((low - slack < bounds[0]) & ~((bounds[0] == 0) & (low >= 0) & (not sums_up)))
-    return bounds[0] if may_low else None, bounds[1] if np.any(high + slack > bounds[1]) else None
-
-
-def _limited(values: np.ndarray, low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
-    if low is not None:
-        values = np.maximum(values, low.astype(values.dtype))
-    return values if high is None else np.minimum(values, high.astype(values.dtype))
+    if isinstance(curve, Table):
+        slack = 0 * slack
+    positive = (bounds[0] == 0) & (low >= 0) & isinstance(curve, Spline)  # a sum of products of none below zero
+    keep_low, keep_high = (low - slack < bounds[0]) & ~positive, high + slack > bounds[1]
+    return np.where(keep_low, bounds[0], -np.inf), np.where(keep_high, bounds[1], np.inf)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ctrlgen.firmware.compression import BUDGET, Compression, Table
+import numpy as np
+
+from ctrlgen.firmware.compression import BUDGET, Candidate, Compression, Table
 from ctrlgen.firmware.spline import Spline
 from ctrlgen.firmware.templates import comment
 from ctrlgen.solution import Solution
@@ -14,6 +16,10 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
     """Everything the templates of one player need."""
     curve = compression.curve
     pieces = curve.pieces if isinstance(curve, Spline) else ()
+    limited = {
+        side: [(i, v) for i, v in enumerate(bound.tolist()) if np.isfinite(v)]
+        for side, bound in (("low", compression.low), ("high", compression.high))
+    }
     return {
         "prefix": prefix,
         "title": comment(solution.scenario.file.title),
@@ -23,8 +29,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "table": curve.drive if isinstance(curve, Table) else None,
         "segments": [piece.segments for piece in pieces],
         "scales": [1 / (piece.stop - piece.start) for piece in pieces],
-        "low": compression.low,
-        "high": compression.high,
+        "limited": limited if any(limited.values()) else None,
         "chosen": compression.chosen,
         "lines": [_line(c) for c in compression.candidates],
         "budget": BUDGET,
@@ -32,10 +37,10 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
     }
 
 
-def _line(c: Any) -> str:
+def _line(c: Candidate) -> str:
     """One candidate, as the header's comment lists it."""
     verdict = f"chosen: {c.remark}" if c.chosen else c.remark
-    if c.bytes is None:
+    if c.bytes is None or c.length is None:
         return f"{c.kind:<8} {verdict}"
     off = f"{1e9 * c.length:.2g} nm, {c.angle:.2g} rad"
     return (

@@ -56,14 +56,19 @@ class Spline:
         return self.pieces[0].control.shape[1]
 
     @property
-    def halvings(self) -> int:
-        """Comparisons that find a sample's piece."""
-        return (len(self.pieces) - 1).bit_length()
+    def block_bits(self) -> int:
+        """Bits of an index inside a block: the largest blocks in which not more than one piece begins."""
+        starts = np.array([p.start for p in self.pieces[1:]], dtype=int)
+        bits = (self.samples - 1).bit_length()
+        while bits and any(np.bincount(starts[starts % 2**bits > 0] >> bits, minlength=1) > 1):
+            bits -= 1
+        return bits
 
     @property
-    def starts(self) -> list[int]:
-        """First sample of each piece, then the number of samples, up to one more than a power of two."""
-        return [p.start for p in self.pieces] + [self.samples] * (2**self.halvings + 1 - len(self.pieces))
+    def blocks(self) -> list[int]:
+        """The piece that the first sample of each block is in."""
+        at = np.arange(0, self.samples, 2**self.block_bits)
+        return (np.searchsorted([p.start for p in self.pieces], at, side="right") - 1).tolist()
 
     @property
     def control(self) -> np.ndarray:
@@ -77,18 +82,23 @@ class Spline:
 
     @property
     def word(self) -> int:
-        """Bytes of an index."""
+        """Bytes of a sample or row number."""
         return 2 if max(self.samples, len(self.control)) < 2**16 else 4
 
+    @property
+    def block_word(self) -> int:
+        """Bytes of a piece's number."""
+        return 1 if len(self.pieces) <= 2**8 else self.word
+
     def bytes(self, real: Real) -> int:
-        """Constants of the C."""
-        search = (2**self.halvings + 1 + 2 * len(self.pieces)) * self.word + len(self.pieces) * real.bytes
+        """Constants of the C, padding not counted."""
+        search = len(self.blocks) * self.block_word + len(self.pieces) * (4 * self.word + real.bytes)
         return self.control.size * real.bytes + (search if len(self.pieces) > 1 else 0)
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations of one sample: place, blending functions, seven a drive; two for each comparison."""
-        return 5 + 11 + 7 * self.axes + 2 * self.halvings
+        """Arithmetic operations of one sample: place, blending functions, seven a drive; the search of a piece."""
+        return 5 + 11 + 7 * self.axes + (5 if len(self.pieces) > 1 else 0)
 
     def extremes(self) -> tuple[np.ndarray, np.ndarray]:
         """(axes,) bounds of every value: a B-spline lies between its control points."""
