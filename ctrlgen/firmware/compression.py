@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
@@ -65,8 +65,9 @@ Curve = Table | Spline | Fourier
 
 @dataclass(frozen=True)
 class Candidate:
-    """One way to hold the drive. `length` [m], `angle` [rad]: how far the model driven so is off the command; `drive`: off the solved drive.
+    """One way to hold the drive. `length` [m], `angle` [rad]: how far the model driven so is off the command.
 
+    `drive`: how far the drive is off the solved one.
     `instructions` of one sample, Cortex-M4F, are estimated. `remark` says why it was chosen, or why not. Numbers are None
     where there is no such curve.
     """
@@ -115,11 +116,11 @@ def compress(solution: Solution) -> dict[Real, Compression]:
     span = np.ptp(drive, axis=0)
     span = np.where(span > 0, span, solution.model.u_scale * 1e-3)
 
-    @lru_cache(maxsize=None)
+    @cache
     def spline(step: int) -> Spline | None:
         return fit(drive, low, high, span * 10 ** (-step / STEPS), closed)
 
-    @lru_cache(maxsize=None)
+    @cache
     def harmonics(count: int) -> Fourier:
         return series(drive, count)
 
@@ -145,7 +146,9 @@ def _compress(
     table = Table(np.clip(solution.drive, *bounds))
     found: list[tuple[Curve | None, Candidate]] = [(table, measured(table))]
 
-    def search(kind: str, make: Callable[[int], Curve | None], first: int, last: int, further: Callable[[int], int]) -> None:
+    def search(
+        kind: str, make: Callable[[int], Curve | None], first: int, last: int, further: Callable[[int], int]
+    ) -> None:
         """Appends the coarsest curve within tolerance, or why there is none."""
         bad, at, good, reached = first - 1, first, None, None
         while good is None and at <= last:
@@ -180,7 +183,9 @@ def _compress(
     usable = [(curve, c) for curve, c in found if curve is not None and _within(c) and _affordable(c)]
     curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else found[0]
     assert curve is not None
-    candidates = tuple(replace(c, chosen=c is best, remark=c.remark or _remark(c, best, bool(usable))) for _, c in found)
+    candidates = tuple(
+        replace(c, chosen=c is best, remark=c.remark or _remark(c, best, bool(usable))) for _, c in found
+    )
     return Compression(real, curve, closed, *_kept(curve, bounds, real), candidates)
 
 
@@ -242,7 +247,7 @@ def _size(curve: Curve) -> str:
     if isinstance(curve, Table):
         return f"{len(curve.drive)} rows"
     if isinstance(curve, Fourier):
-        return f"{curve.harmonics} harmonics"
+        return f"{curve.harmonics} harmonic{'s' * (curve.harmonics > 1)}"
     count = sum(p.segments for p in curve.pieces)
     return f"{count} segments" + (f" in {len(curve.pieces)} pieces" if len(curve.pieces) > 1 else "")
 

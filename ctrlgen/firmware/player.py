@@ -43,6 +43,4 @@ def _line(c: Candidate) -> str:
     if c.bytes is None or c.length is None:
         return f"{c.kind:<8} {verdict}"
     off = f"{1e9 * c.length:.2g} nm, {c.angle:.2g} rad"
-    return (
-        f"{c.kind:<8} {c.size}: {c.bytes} bytes, {c.operations} operations, about {c.instructions} instructions, {off}; {verdict}"
-    )
+    return f"{c.kind:<8} {c.size}: {c.bytes} bytes, {c.operations} operations, about {c.instructions} instructions, {off}; {verdict}"

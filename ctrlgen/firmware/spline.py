@@ -11,6 +11,7 @@ a piece has continuous curvature and costs M + 3 rows; a closed path without a j
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sparse
@@ -122,7 +123,10 @@ class Spline:
         start, count, length, row = (
             np.array(column)[piece]
             for column in zip(
-                *((p.start, p.segments, p.stop - p.start, r) for p, r in zip(self.pieces, self.first_rows, strict=True)),
+                *(
+                    (p.start, p.segments, p.stop - p.start, r)
+                    for p, r in zip(self.pieces, self.first_rows, strict=True)
+                ),
                 strict=True,
             )
         )
@@ -171,7 +175,7 @@ def fit(drive: np.ndarray, low: np.ndarray, high: np.ndarray, tolerance: np.ndar
     fixed = set(switches(drive, low, high))
     around = _segments(drive, tolerance, True, n) + 3 if closed and not fixed else n
     edges = [0, *sorted({*fixed, *kinks(drive, tolerance)}), n]
-    count = [_segments(drive[a:b], tolerance, False, b - a) for a, b in zip(edges, edges[1:], strict=False)]
+    count = [_segments(drive[a:b], tolerance, False, b - a) for a, b in pairwise(edges)]
     merged: dict[tuple[int, int], int] = {}
     while True:
         best, place = 0, None
@@ -236,4 +240,6 @@ def _blending(n: int, segments: int, periodic: bool) -> sparse.csr_matrix:
     j = k * segments // n
     t = (k * segments - j * n) / n
     weights = np.stack([(1 - t) ** 3, 4 + 3 * t**2 * (t - 2), 1 + 3 * t * (1 + t * (1 - t)), t**3]) / 6
-    return sparse.csr_matrix((weights.ravel(), (np.tile(k, 4), np.concatenate([j, j + 1, j + 2, j + 3]))), (n, segments + 3))
+    return sparse.csr_matrix(
+        (weights.ravel(), (np.tile(k, 4), np.concatenate([j, j + 1, j + 2, j + 3]))), (n, segments + 3)
+    )
