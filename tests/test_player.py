@@ -57,10 +57,8 @@ def solutions(circle, tmp_path_factory):
     short = line(tmp_path_factory.mktemp("line"), 7)
     still = line(tmp_path_factory.mktemp("still"), 2, "0 um")
     ring = load_scenario(SCENARIOS / "rrr_circle")
-    high = np.clip(
-        3.9 * (circle.drive - 0.06), 0.0, 0.3
-    )  # some heaters off, others as hot as the device bears, for a while
-    model = replace_bounds(circle.model, 0.0, 0.3)
+    high = np.minimum(circle.drive * [1, 1, 1, 0.8, 1, 0.8], 0.2)  # one heater as hot as the device bears, for a while
+    model = replace_bounds(circle.model, 0.0, 0.2)
     return {
         "closed": circle,
         "raster": solve(raster, build_model(raster.device)),
@@ -109,7 +107,7 @@ def test_what_the_chosen_curve_follows_is_within_the_tolerance_and_what_is_recor
 ):
     chosen = compressions[kind][real]
     length, angle = off(solutions[kind], chosen.drives(np.arange(len(solutions[kind].drive))))
-    assert length <= SHARE * LENGTH and angle <= SHARE * ANGLE
+    assert length <= 0.1e-9 and angle <= 1e-8
     assert length <= chosen.chosen.length * 1.001 + 1e-15 and angle <= chosen.chosen.angle * 1.001 + 1e-13
 
 
@@ -138,10 +136,10 @@ def test_a_smooth_circle_takes_a_thirtieth_of_the_table_and_a_short_path_the_tab
 
 def test_pieces_begin_where_a_drive_reaches_or_leaves_its_limit(solutions):
     solution = solutions["limited"]
-    held = np.hstack([solution.drive == 0.0, solution.drive == 0.3])
+    held = np.hstack([solution.drive == 0.0, solution.drive == 0.2])
     changes = np.flatnonzero(np.any(held[1:] != held[:-1], axis=1)) + 1
     low, high = solution.model.u_bounds
-    assert changes.size >= 12 and spline.switches(solution.drive, low, high) == changes.tolist()
+    assert changes.size == 2 and spline.switches(solution.drive, low, high) == changes.tolist()
     fitted = spline.fit(solution.drive, low, high, np.full(6, 1e-6), True)
     assert set(changes) <= {p.start for p in fitted.pieces}
     assert np.abs(fitted.values(Real.DOUBLE) - solution.drive).max() < 1.001e-6
@@ -152,7 +150,8 @@ def test_drives_stay_inside_their_limits_between_samples_too(solutions, compress
     c, n = compressions["limited"][real], len(solutions["limited"].drive)
     for part in (0.0, 0.25, 0.5, 0.999):
         drives = c.drives(np.arange(n), np.full(n, part))
-        assert drives.min() >= 0.0 and drives.max() <= 0.3
+        assert drives.min() >= 0.0 and drives.max() <= np.float64(0.2)
+    assert c.chosen.kind == "cubic" and np.isfinite(c.high).any()  # so the C has a limit to keep
 
 
 def test_a_series_reproduces_its_drive_and_uneven_periods():
