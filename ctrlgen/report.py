@@ -82,7 +82,10 @@ def summary(
             }
             for e in expected
         ],
-        "c": None if c is None else {"operations_per_sample": c.operations, "operations_worst": c.worst_operations},
+        "c": None if c is None else {
+            "operations_per_sample": c.operations, "operations_worst": c.worst_operations,
+            "player": {real.value: [vars(candidate) for candidate in held.candidates] for real, held in c.compression.items()},
+        },
         "compilers": comparison.compilers if comparison else {},
         "compilers_not_run": list(comparison.missing) if comparison else [],
         "comparison": [{**vars(row), "passed": row.passed} for row in comparison.rows] if comparison else [],

@@ -1,6 +1,6 @@
 """Model and solution -> a folder of C99: the only writer of C.
 
-`online` controllers (any reachable target -> drives) and `player`s (the solved trajectory as a table), each in
+`online` controllers (any reachable target -> drives) and `player`s (the solved trajectory, compressed), each in
 double and in float, with a test of reference `vectors` that runs on the target; around them the package of
 `ctrlgen.firmware.package`. Same input, same bytes.
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ctrlgen.controller import Controller
+from ctrlgen.firmware.compression import Compression, compress
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.deviations import deviations_context
 from ctrlgen.firmware.misra import CPPCHECK
@@ -40,6 +41,7 @@ class CFolder:
     player: dict[Real, str]
     selftest: dict[Real, str]
     vectors: dict[Real, str]
+    compression: dict[Real, Compression]
     operations: int
     worst_operations: int
 
@@ -68,12 +70,13 @@ def generate(
     played = solution if scenario.sample_time else None
     command = scenario.command(model) if solution is None else solution.command
     names = {piece: {real: f"{scenario.name}_{piece}_{real.suffix}" for real in Real} for piece in PIECES}
+    compression = compress(played) if played else {}
     contexts, written = {}, []
     for real in Real:
         of = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
         online = online_context(scenario, controller, real, of["online"])
-        samples = {} if played is None else player_context(played, of["player"])
-        reference = vectors(controller, command, real) | played_vectors(played and played.drive, real)
+        samples = {} if played is None else player_context(played, compression[real], of["player"])
+        reference = vectors(controller, command, real) | played_vectors(compression.get(real), len(command))
         contexts[real] = samples | online | of | reference | {"solved": solution is not None}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:
@@ -87,7 +90,7 @@ def generate(
     write_package(out, scenario, contexts, figures or {}, written)
     cost = contexts[Real.FLOAT]["cost"]
     pieces = names if played else names | {"player": {}}
-    return CFolder(out, scenario.name, *(pieces[piece] for piece in PIECES), cost["step"], cost["worst"])
+    return CFolder(out, scenario.name, *(pieces[piece] for piece in PIECES), compression, cost["step"], cost["worst"])
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:

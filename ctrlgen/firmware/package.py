@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from ctrlgen._version import __version__
 from ctrlgen.devices.base import Signal
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.files import read_text, write_text
+from ctrlgen.firmware.compression import Candidate
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.scenario import Scenario
@@ -125,7 +126,7 @@ def _context(
         ],
         "target": c["rows"][0]["target"],
         "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
-        "memory": _memory(c),
+        "memory": _memory(c, [contexts[real].get("chosen") for real in Real]),
         "vectors": len(c["rows"]) + len(c["played"]),
         "tolerance": {real.suffix: contexts[real]["tolerance"] for real in Real},
         "figures": list(figures),
@@ -133,8 +134,8 @@ def _context(
     }
 
 
-def _memory(c: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows of the README's table: `count` numbers of the arithmetic and `extra` bytes."""
+def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
+    """Rows of the README's table, bytes in double and in float; `chosen` is how the player's samples are held in each."""
     x, n, n_s, m, rows = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
@@ -144,16 +145,24 @@ def _memory(c: dict[str, Any]) -> list[dict[str, Any]]:
         vectors = vectors.replace(
             ", constants", f", {played} x {n} numbers and {played} `unsigned long` of 4 B, constants"
         )
-    table = []
-    if played:
-        formula = f"{c['samples']} x {n} numbers, constants; only if the player is called"
-        table = [{"what": "player's table", "count": c["samples"] * n, "extra": 0, "formula": formula}]
-    return [
-        {"what": "state", "count": x + n, "extra": 0, "formula": state},
-        {"what": "output", "count": 2 * n + n_s, "extra": 0, "formula": output},
-        *table,
-        {"what": "vectors", "count": rows * (m + n) + played * n, "extra": 12 * rows + 4 * played, "formula": vectors},
+    rows = [
+        _counted("state", x + n, 0, state),
+        _counted("output", 2 * n + n_s, 0, output),
+        _counted("vectors", rows * (m + n) + played * n, 12 * rows + 4 * played, vectors),
     ]
+    if played:
+        held = "; ".join(
+            f"{real.value}: {kept.kind}, {kept.size}" for real, kept in zip(Real, chosen, strict=True) if kept
+        )
+        sizes = [kept.bytes if kept else 0 for kept in chosen]
+        formula = f"constants, only if the player is called; {held}"
+        rows.insert(2, {"what": "player's table", "double": sizes[0], "float": sizes[1], "formula": formula})
+    return rows
+
+
+def _counted(what: str, numbers: int, extra: int, formula: str) -> dict[str, Any]:
+    """A row for so many `numbers` of the arithmetic and `extra` bytes."""
+    return {"what": what, "formula": formula, **{real.value: numbers * real.bytes + extra for real in Real}}
 
 
 def _platformio(context: dict[str, Any]) -> dict[str, Any]:

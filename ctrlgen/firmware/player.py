@@ -1,20 +1,46 @@
-"""What the template of the player needs: the solved trajectory."""
+"""What the template of the player needs: the solved trajectory as `compression` holds it."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from ctrlgen.firmware.compression import BUDGET, Candidate, Compression, Table
+from ctrlgen.firmware.spline import Spline
 from ctrlgen.firmware.templates import comment
 from ctrlgen.solution import Solution
 
 
-def player_context(solution: Solution, prefix: str) -> dict[str, Any]:
+def player_context(solution: Solution, compression: Compression, prefix: str) -> dict[str, Any]:
     """Everything the templates of one player need."""
+    curve = compression.curve
+    pieces = curve.pieces if isinstance(curve, Spline) else ()
+    limited = {
+        side: [(i, v) for i, v in enumerate(bound.tolist()) if np.isfinite(v)]
+        for side, bound in (("low", compression.low), ("high", compression.high))
+    }
     return {
         "prefix": prefix,
         "title": comment(solution.scenario.file.title),
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
-        "table": solution.drive,
+        "curve": curve,
+        "table": curve.drive if isinstance(curve, Table) else None,
+        "segments": [piece.segments for piece in pieces],
+        "scales": [1 / (piece.stop - piece.start) for piece in pieces],
+        "limited": limited if any(limited.values()) else None,
+        "chosen": compression.chosen,
+        "lines": [_line(c) for c in compression.candidates],
+        "budget": BUDGET,
         "rate": 1 / (solution.scenario.sample_time or 1.0),
     }
+
+
+def _line(c: Candidate) -> str:
+    """One candidate, as the header's comment lists it."""
+    verdict = f"chosen: {c.remark}" if c.chosen else c.remark
+    if c.bytes is None or c.length is None:
+        return f"{c.kind:<8} {verdict}"
+    off = f"{1e9 * c.length:.2g} nm, {c.angle:.2g} rad"
+    return f"{c.kind:<8} {c.size}: {c.bytes} bytes, {c.operations} operations, about {c.instructions} instructions, {off}; {verdict}"

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.controller import Controller, Status
+from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.online import FLOAT_SLACK
 
@@ -26,7 +27,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     beyond = rng.normal(size=(16, command.shape[1])) * 40 * scale
     targets = [*command[:VECTORS], *beyond, np.full(command.shape[1], 1e9)]
     rows, tolerance, state = [], 0.0, controller.rest()
-    rounding = 4 * _epsilon(real)
+    rounding = 4 * real.epsilon
     for k, target in enumerate(targets):
         target = np.array(target, dtype=np.float32).astype(float) if real is Real.FLOAT else target
         settle = k == 0 or k >= len(targets) - len(beyond) - 1 or controller.moving is None
@@ -47,16 +48,15 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     return {"rows": rows, "tolerance": tolerance}
 
 
-def played_vectors(drives: np.ndarray | None, real: Real) -> dict[str, Any]:
-    """Samples of the solved `drives` (samples, axes), the first and the last among them, and four roundings of the largest."""
-    if drives is None:
+def played_vectors(compression: Compression | None, samples: int) -> dict[str, Any]:
+    """Samples of what the player answers, the first and the last among them; 16 roundings of the largest, since a target may
+    fuse multiplications with additions."""
+    if compression is None:
         return {"played": [], "played_tolerance": 0.0}
-    indices = np.unique(np.linspace(0, len(drives) - 1, PLAYED).round().astype(int))
+    indices = np.unique(np.linspace(0, samples - 1, PLAYED).round().astype(int))
+    drives = compression.drives(indices)
+    rounding = 16 * compression.real.epsilon * float(np.max(np.abs(drives)))
     return {
-        "played": [{"index": int(k), "drive": drives[k]} for k in indices],
-        "played_tolerance": max(4 * _epsilon(real) * float(np.max(np.abs(drives))), float(np.finfo(np.float32).tiny)),
+        "played": [{"index": int(k), "drive": drive} for k, drive in zip(indices, drives, strict=True)],
+        "played_tolerance": max(rounding, float(np.finfo(np.float32).tiny)),
     }
-
-
-def _epsilon(real: Real) -> float:
-    return float(np.finfo(np.float32 if real is Real.FLOAT else np.float64).eps)

@@ -19,6 +19,8 @@ import numpy as np
 
 from ctrlgen.controller import Status
 from ctrlgen.errors import ToolError
+from ctrlgen.firmware import compression as compressed
+from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.model import Model
@@ -84,7 +86,7 @@ def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None]
         reference = Reference(solution)  # while the compilers work
         rows: list[Row] = []
         for (compiler, real), program in zip(builds, programs, strict=True):
-            rows += _rows(f"{compiler} {real.value}", real, program.result(), reference)
+            rows += _rows(f"{compiler} {real.value}", real, program.result(), reference, folder.compression.get(real))
             progress(f"{compiler} {real.value}")
     return Comparison(tuple(rows), compilers, tuple(c for c in COMPILERS if c not in compilers))
 
@@ -113,7 +115,7 @@ def _run(program: Path, mode: str, records: np.ndarray, width: int, start: tuple
     return answer.reshape(len(records), 1 + width)
 
 
-def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
+def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Compression | None) -> list[Row]:
     """All comparisons of one build."""
     n, m = len(ref.model.axes), ref.model
     signals = [("drive", slice(1, 1 + n)), ("displacement", slice(1 + n, 1 + 2 * n))]
@@ -199,23 +201,23 @@ def _rows(build: str, real: Real, program: Path, ref: Reference) -> list[Row]:
             z, state = followed[:, 1 + n : 1 + 2 * n], followed[:, 1 + 2 * n :]
             x = np.hstack([state, ref.solution.trace.x[:, m.n_states :]])
             reached = trace(m, np.zeros(len(z)), x, z, drives).signals[role]
-        for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
+        angle, length = (ANGLE[real], LENGTH[real]) if what == "online C" else (compressed.ANGLE, compressed.LENGTH)
+        for unit, limit in (("rad", angle), ("um", length)):
             channels = [i for i, u in enumerate(m.signals[role].units) if same_dimension(u, unit)]
             if channels:
                 add(f"{what} -> model - command", role, reached - ref.path, limit, slice(channels[0], channels[-1] + 1))
-    if ref.scenario.sample_time:
-        table = _run(program, "sample", np.arange(len(solved)), n)
-        single = solved if real is Real.DOUBLE else solved.astype(np.float32).astype(float)
-        add("player C - IPOPT", "drive", table[:, 1:] - single, 0.0)
-        times = (
-            np.arange(len(solved) - 1) + 0.75
-        ) * ref.scenario.sample_time  # a quarter of the way from middle to middle
-        between = _run(program, "at", times, n)
-        expected = 0.75 * solved[:-1] + 0.25 * solved[1:]
-        limit = (1e-9 if real is Real.DOUBLE else 1e-4) * max(
-            np.abs(solved).max(), 1e-3 * m.u_scale.max()
-        )  # rounding of the time
-        add("player C a quarter on - linear between samples", "drive", between[:, 1:] - expected, limit)
+    if compression is not None:
+        # against the curve evaluated by NumPy: its roundings, for a compiler that fuses a product and a sum
+        near = ROUNDINGS * float(np.finfo(np.float32 if real is Real.FLOAT else float).eps) * np.abs(solved).max()
+        k = np.arange(len(solved))
+        played = _run(program, "sample", k, n)[:, 1:]
+        add("player C - its curve", "drive", played - compression.drives(k), near)
+        add("player C - IPOPT", "drive", played - solved, (compression.chosen.drive or 0.0) + near)
+        times = (k[:-1] + 0.75) * ref.scenario.sample_time  # a quarter of the way from middle to middle
+        quarter = _run(program, "at", times, n)[:, 1:] - compression.drives(k[:-1], np.full(len(k) - 1, 0.25))
+        # the time itself is rounded: that much of the steepest change from sample to sample
+        steep = 4 * float(np.finfo(np.float32 if real is Real.FLOAT else float).eps) * 2 * len(k)
+        add("player C a quarter on - its curve", "drive", quarter, near + steep * np.abs(np.diff(solved, axis=0)).max())
     return rows
 
 
