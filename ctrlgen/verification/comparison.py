@@ -18,7 +18,6 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller import Status
-from ctrlgen.errors import ToolError
 from ctrlgen.firmware import compression as compressed
 from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
@@ -27,8 +26,9 @@ from ctrlgen.model import Model
 from ctrlgen.simulation import simulate, trace
 from ctrlgen.solution import Solution
 from ctrlgen.units import from_si, same_dimension
+from ctrlgen.verification.host import build_host, run_host
 from ctrlgen.verification.reference import Reference
-from ctrlgen.verification.toolchains import COMPILERS, compile_c, find_compilers
+from ctrlgen.verification.toolchains import COMPILERS, find_compilers
 
 # What a difference may be, and why.
 LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometre; a tenth, below any sensor here
@@ -82,37 +82,13 @@ def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None]
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch, ThreadPoolExecutor(max_workers=2) as pool:
         for real in Real:
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
-        programs = [pool.submit(_build, compiler, real, folder, Path(scratch)) for compiler, real in builds]
+        programs = [pool.submit(build_host, compiler, real, folder, Path(scratch)) for compiler, real in builds]
         reference = Reference(solution)  # while the compilers work
         rows: list[Row] = []
         for (compiler, real), program in zip(builds, programs, strict=True):
             rows += _rows(f"{compiler} {real.value}", real, program.result(), reference, folder.compression.get(real))
             progress(f"{compiler} {real.value}")
     return Comparison(tuple(rows), compilers, tuple(c for c in COMPILERS if c not in compilers))
-
-
-def _build(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
-    """The harness and the shipped test, linked with the same objects; returns the harness, the test beside it."""
-    program = scratch / f"{compiler}_{real.suffix}"
-    sources = folder.sources(real)
-    objects = [scratch / f"{compiler}_{source.stem}.o" for source in sources]
-    for source, target in zip(sources, objects, strict=True):
-        compile_c(compiler, folder.path, ["-c", str(source), "-o", str(target)])
-    linked = [*map(str, objects), "-lm", "-o"]
-    compile_c(compiler, folder.path, [str(scratch / f"harness_{real.suffix}.c"), *linked, str(program)])
-    compile_c(compiler, folder.path, [str(folder.runner(real)), *linked, f"{program}_test"])
-    return program
-
-
-def _run(program: Path, mode: str, records: np.ndarray, width: int, start: tuple[np.ndarray, ...] = ()) -> np.ndarray:
-    """Output records (n, 1 + width) of doubles; the first column is the status. `start` is read before the records."""
-    sent = b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in (*start, records))
-    done = subprocess.run([str(program), mode], input=sent, capture_output=True, check=False, start_new_session=True)
-    answer = np.frombuffer(done.stdout, dtype=float)
-    if done.returncode != 0 or answer.size != len(records) * (1 + width):
-        got = f"{answer.size // (1 + width)} of {len(records)} records"
-        raise ToolError(f"{program.name} stopped in mode '{mode}' with status {done.returncode} after {got}")
-    return answer.reshape(len(records), 1 + width)
 
 
 def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Compression | None) -> list[Row]:
@@ -153,12 +129,12 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
 
     moving = ref.scenario.sample_time is not None
     followed = (
-        _run(program, "follow", ref.command, width, ref.start)
+        run_host(program, "follow", ref.command, width, ref.start)
         if moving
-        else _run(program, "settle", ref.command, width)
+        else run_host(program, "settle", ref.command, width)
     )
     against_casadi("scenario, online C - CasADi", followed, ref.followed)
-    settled = _run(program, "settle", ref.random, width)
+    settled = run_host(program, "settle", ref.random, width)
     # Far targets are large numbers that cancel on the way to a displacement: their roundings count, not the result's.
     far = ref.cancelling / m.z_bounds[1].max()
     against_casadi("random targets, online C - CasADi", settled, ref.settled, max(1.0, float(far)))
@@ -178,7 +154,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
             )
     if moving:
         cold = ref.controller.rest()
-        chased = _run(program, "follow", ref.hostile, width, cold)
+        chased = run_host(program, "follow", ref.hostile, width, cold)
         if real is Real.DOUBLE:  # in float the bisections lead apart
             against_casadi("hostile sequence, online C - CasADi", chased, ref.chased, ties=True)
         what = "hostile sequence -> model: excess over a limit"
@@ -210,11 +186,11 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
         # against the curve evaluated by NumPy: its roundings, for a compiler that fuses a product and a sum
         near = ROUNDINGS * float(np.finfo(np.float32 if real is Real.FLOAT else float).eps) * np.abs(solved).max()
         k = np.arange(len(solved))
-        played = _run(program, "sample", k, n)[:, 1:]
+        played = run_host(program, "sample", k, n)[:, 1:]
         add("player C - its curve", "drive", played - compression.drives(k), near)
         add("player C - IPOPT", "drive", played - solved, (compression.chosen.drive or 0.0) + near)
         times = (k[:-1] + 0.75) * ref.scenario.sample_time  # a quarter of the way from middle to middle
-        quarter = _run(program, "at", times, n)[:, 1:] - compression.drives(k[:-1], np.full(len(k) - 1, 0.25))
+        quarter = run_host(program, "at", times, n)[:, 1:] - compression.drives(k[:-1], np.full(len(k) - 1, 0.25))
         # the time itself is rounded: that much of the steepest change from sample to sample
         steep = 4 * float(np.finfo(np.float32 if real is Real.FLOAT else float).eps) * 2 * len(k)
         add("player C a quarter on - its curve", "drive", quarter, near + steep * np.abs(np.diff(solved, axis=0)).max())
@@ -252,7 +228,9 @@ def _drive_sets(program: Path, ref: Reference, online: np.ndarray) -> list[tuple
     """Drives to send through the model: those of the online C, and the player's."""
     sets = [("online C", online)]
     if ref.scenario.sample_time:
-        sets.append(("player C", _run(program, "sample", np.arange(len(ref.solution.drive)), online.shape[1])[:, 1:]))
+        sets.append(
+            ("player C", run_host(program, "sample", np.arange(len(ref.solution.drive)), online.shape[1])[:, 1:])
+        )
     return sets
 
 

@@ -9,7 +9,17 @@ from pathlib import Path
 
 from ctrlgen.errors import ToolError
 
-FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O2")
+FLAGS = (
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Werror",
+    "-O2",
+    "-ffp-contract=off",
+)  # as on targets: the same bits
 COMPILERS = ("gcc", "clang")
 
 

@@ -1,0 +1,57 @@
+"""The package's own test of reference vectors on emulated boards: arm-none-eabi-gcc and qemu-system-arm."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from ctrlgen.errors import ToolError
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.templates import write
+from ctrlgen.verification.check import Check, Finding, judged, not_run, run_tool, version_of
+from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile
+
+TOOL = "qemu-system-arm"
+REMEDY = "apt-get install qemu-system-arm"
+WORDS = ("-nographic", "-monitor", "none", "-serial", "none", "-chardev", "stdio,id=sh")
+SEMIHOSTING = ("-semihosting-config", "enable=on,target=native,chardev=sh")
+SAID = re.compile(r"^(\d+) of (\d+) disagree$", re.M)
+
+
+def check_on_boards(folder: CFolder, progress: Callable[[str], None] = lambda _: None) -> tuple[Check, ...]:
+    """The selftest of every arithmetic on every core's board; passed where every vector agrees."""
+    compiler = "arm-none-eabi-gcc"
+    missing = [remedy for tool, remedy in ((compiler, INSTALL[compiler]), (TOOL, REMEDY)) if not shutil.which(tool)]
+    subjects = tuple((folder.selftest[real], real) for real in Real)
+    if missing:
+        return (not_run(TOOL, subjects, "; ".join(missing)),)
+    checks = []
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
+        for core in CORES:
+            for real in core.reals:
+                progress(f"{core.board}, {real.value}")
+                checks.append(_run(folder, core, real, compiler, Path(scratch)))
+    return tuple(checks)
+
+
+def _run(folder: CFolder, core: Core, real: Real, compiler: str, scratch: Path) -> Check:
+    subject = ((folder.selftest[real], real),)
+    tool, version = f"{TOOL} -M {core.board} ({core.name})", version_of(TOOL) or ""
+    for name in ("board.c", "board.ld"):
+        write(name, {"selftest": folder.selftest[real]}, scratch / name)
+    program = scratch / f"{core.board}_{real.suffix}.elf"
+    sources = [*folder.sources(real), scratch / "board.c"]
+    cross_compile(compiler, core, sources, folder.path, "reset", program, ("-T", str(scratch / "board.ld"), "-lc"))
+    try:
+        done = run_tool([TOOL, "-M", core.board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
+    except OSError as error:
+        raise ToolError(f"{TOOL} does not start: {error}") from error
+    said = SAID.search(done.stdout)
+    if said and said[1] == "0" and done.returncode == 0:
+        return judged(tool, version, subject, (), f"{said[2]} of {said[2]} reference vectors agree")
+    text = done.stdout.strip() or done.stderr.strip()[:500] or f"ended with status {done.returncode} and said nothing"
+    return judged(tool, version, subject, [Finding(f"{subject[0][0]}.c", 1, "vectors", "error", text)])
