@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.mapped import evaluate
+from ctrlgen.diagnosis.mapped import Recursion, evaluate
 from ctrlgen.model import Model, build_model
 from ctrlgen.motion import balanced, next_sample
 from ctrlgen.recording import Record
@@ -109,15 +109,8 @@ class Response:
 
     def motion(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y), SI."""
-        constants, sample = self._kernel
-        n = len(record.time)
-        if ("motion", n) not in self._runs:
-            S, *others = self._symbols
-            values = [ca.densify(value) for value in sample(S, *others)[:2]]
-            self._runs["motion", n] = ca.Function("one", [S, *others], values).mapaccum(n)
-        c = np.tile(constants(p)[0].full().T, (n, 1))
-        following, y = evaluate(self._runs["motion", n], self._start(record, p, start), *self._inputs(record), c)
-        return following, y
+        c = np.tile(self._kernel[0](p)[0].full().T, (len(record.time), 1))
+        return self._moving.run(self._start(record, p, start), *self._inputs(record), c)
 
     def sensitivities(
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None
@@ -130,31 +123,29 @@ class Response:
         D_0[list(self.initial), k + np.arange(n_i)] = 1.0
         begin = np.concatenate([self._start(record, p, start), D_0.ravel(order="F")])
         slow = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(by_p.nonzeros())))
-        values = evaluate(self._sensitive(n), begin, *self._inputs(record), *slow)[1]
+        values = self._sensitive.run(begin, *self._inputs(record), *slow)[1]
         return values[:, :n_y], values[:, n_y:].reshape(n, k + n_i, n_y).transpose(0, 2, 1)
 
-    def _sensitive(self, n: int) -> ca.Function:
-        """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
-        if ("sensitive", n) not in self._runs:
-            k, n_i = len(self.free), len(self.initial)
-            by_p = ca.SX.sym("by_p", self._kernel[0].sparsity_out(1))
-            seed = ca.horzcat(by_p, ca.SX(by_p.shape[0], n_i))
-            S, *others = (
-                ca.SX.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols)
-            )  # an empty one has no name
-            D = ca.SX.sym("D", self.n_s, k + n_i)
-            following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
-            D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
-            one = ca.Function(
-                "one", [ca.vertcat(S, ca.vec(D)), *others, ca.vertcat(ca.SX(0, 1), *by_p.nonzeros())],
-                [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((following, D_next), (y, Y))], {"cse": True},
-            )  # fmt: skip
-            self._runs["sensitive", n] = one.mapaccum(n)
-        return self._runs["sensitive", n]
+    @cached_property
+    def _moving(self) -> Recursion:
+        """The sample map."""
+        S, *others = self._symbols
+        values = [ca.densify(value) for value in self._kernel[1](S, *others)[:2]]
+        return Recursion(ca.Function("one", [S, *others], values))
 
     @cached_property
-    def _runs(self) -> dict:
-        return {}
+    def _sensitive(self) -> Recursion:
+        """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
+        k, n_i = len(self.free), len(self.initial)
+        by_p = ca.SX.sym("by_p", self._kernel[0].sparsity_out(1))
+        seed = ca.horzcat(by_p, ca.SX(by_p.shape[0], n_i))
+        S, *others = (ca.SX.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols))  # an empty one has no name
+        D = ca.SX.sym("D", self.n_s, k + n_i)
+        following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
+        results = (following, F_S @ D + F_c @ seed), (y, H_S @ D + H_c @ seed)
+        given = [ca.vertcat(S, ca.vec(D)), *others, ca.vertcat(ca.SX(0, 1), *by_p.nonzeros())]
+        values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in results]
+        return Recursion(ca.Function("one", given, values, {"cse": True}))
 
     @cached_property
     def _symbols(self) -> list[ca.MX]:
