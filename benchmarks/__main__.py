@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks import job, online, trajectory
+from benchmarks import diagnosis, job, online, trajectory
 from benchmarks.measure import Line, Note, print_table
 from benchmarks.samples import Disagreement
 
-BENCHMARKS = {"trajectory": trajectory, "online": online, "job": job}
+BENCHMARKS = {"trajectory": trajectory, "online": online, "job": job, "diagnosis": diagnosis}
 
 
 def main() -> int:

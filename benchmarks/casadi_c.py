@@ -20,22 +20,22 @@ NEWTON, SQP = "CasADi Newton in C", "CasADi SQP (qrqp) in C"
 TOLERANCE = 1e-7  # of scaled residuals: 0.0001 nm of pose, about 0.002 nm of balance
 
 
-def newton(samples: Samples) -> ca.Function:
+def newton(samples: Samples, tolerance: float = TOLERANCE) -> ca.Function:
     """`rootfinder`: pose and balance for (z, T), no bounds. `fast_newton` is the Newton that CasADi can write as C."""
     y, _, target = samples.symbols
     problem = {"x": y, "p": target, "g": ca.vertcat(samples.pose_error, samples.balance)}
-    options = {"abstol": TOLERANCE, "abstolStep": TOLERANCE, "max_iter": 50}
+    options = {"abstol": tolerance, "abstolStep": tolerance, "max_iter": 50}
     root = ca.rootfinder("root", "fast_newton", problem, options)
     return _peer("newton", samples, lambda before, wanted: root(before, wanted))
 
 
-def sqp(samples: Samples) -> ca.Function:
+def sqp(samples: Samples, tolerance: float = TOLERANCE) -> ca.Function:
     """`sqpmethod`: the nearest pose within the bounds of z and T, under the balance; exact Hessian."""
     y, _, target = samples.symbols
     problem = {"x": y, "p": target, "f": 0.5 * ca.sumsqr(samples.pose_error), "g": samples.balance}
     quiet_qp = {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False}
     options = {
-        "qpsol": "qrqp", "qpsol_options": quiet_qp, "tol_pr": TOLERANCE, "tol_du": 1e-6, "max_iter": 50,
+        "qpsol": "qrqp", "qpsol_options": quiet_qp, "tol_pr": tolerance, "tol_du": 10 * tolerance, "max_iter": 50,
         "print_header": False, "print_iteration": False, "print_time": False, "print_status": False,
     }  # fmt: skip
     solver = ca.nlpsol("sqp_solver", "sqpmethod", problem, options)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Links
@@ -146,26 +145,9 @@ def _linearised(
     r: Response, record: Record, p: np.ndarray, chosen: list[int], before: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """F_S, F_f, H_S, H_f along the motion."""
-    constants, sample = r._kernel
-    c, by_p = (value.full() for value in constants(p))
-    args = [ca.MX.sym(k, n) for k, n in (("S", r.n_s), ("u", r.model.u.numel()), ("u1", r.model.u.numel()), ("e", 1))]
-    _, _, F_S, F_c, H_S, H_c = sample(*args, c)
-    by_f = by_p[:, chosen]
-    blocks = [F_S, F_c @ by_f, H_S, H_c @ by_f]
-    linear = ca.Function("linearised", args, [ca.densify(block) for block in blocks])
-    inputs, n = (before.T, *r._inputs(record)), len(before)
-    parts = []
-    for a in range(0, n, BLOCK):
-        b = min(a + BLOCK, n)
-        values = linear.map(b - a)(*(x[:, a:b] for x in inputs))
-        parts.append([_stacked(value, b - a) for value in values])
+    linear, inputs = r.linearised(p, chosen), (before, *r._inputs(record))
+    parts = [linear.along(*(x[a : a + BLOCK] for x in inputs)) for a in range(0, len(before), BLOCK)]
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
-
-
-def _stacked(flat: ca.DM, n: int) -> np.ndarray:
-    """(rows, n * columns) as CasADi's map gives it -> (n, rows, columns)."""
-    dense = flat.full()
-    return dense.reshape(dense.shape[0], n, -1).transpose(1, 0, 2)
 
 
 def _velocity(r: Response, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:

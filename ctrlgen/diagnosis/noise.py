@@ -40,13 +40,20 @@ class Noise:
 
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
         """`values` (n, n_y, ...) filtered to unit white noise; zero where a sample or one that it leans on is not `valid`."""
-        white = np.zeros_like(values)
-        for i, (sd, a) in enumerate(zip(self.sd, self.ar, strict=True)):
+        white, usable = np.zeros_like(values), self.usable(valid)
+        for i, a in enumerate(self.ar):
             clean = np.where(valid[:, i].reshape(-1, *(1,) * (values.ndim - 2)), values[:, i], 0.0)
-            white[:, i] = clean / sd
-            for lag, coefficient in enumerate(a, 1):
-                white[lag:, i] -= coefficient / sd * clean[:-lag]
-            white[~self.usable(valid)[:, i], i] = 0.0
+            white[len(a) :, i] = self.filtered(clean, i)
+            white[~usable[:, i], i] = 0.0
+        return white
+
+    def filtered(self, values: np.ndarray, i: int) -> np.ndarray:
+        """`values` (n, ...) of channel i as unit white noise, from the first sample on whose memory is there, (n - order, ...)."""
+        sd, a = self.sd[i], self.ar[i]
+        n, order = len(values), len(a)
+        white = values[order:] / sd
+        for lag, coefficient in enumerate(a, 1):
+            white -= coefficient / sd * values[order - lag : n - lag]
         return white
 
     def usable(self, valid: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.mapped import Recursion, evaluate
 from ctrlgen.model import Model, build_model
 from ctrlgen.motion import balanced, next_sample
 from ctrlgen.recording import Record
@@ -78,6 +79,15 @@ class Response:
         )  # fmt: skip
         return constants, sample
 
+    def linearised(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
+        """Along any motion, for the `chosen` m of the free numbers, at `p`."""
+        constants, sample = self._kernel
+        c, by_p = constants(p)
+        given = self._symbols[:4]
+        _, _, F_S, F_c, H_S, H_c = sample(*given, c)
+        by_f = by_p[:, list(chosen)]
+        return Linearised(ca.Function("linearised", given, [F_S, F_c @ by_f, H_S, H_c @ by_f]))
+
     def begin(self, record: Record, p: np.ndarray) -> np.ndarray:
         """S before the first sample: actuators at rest; the stage at home, or in balance where it has no inertia."""
         m = self.model
@@ -99,15 +109,8 @@ class Response:
 
     def motion(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y), SI."""
-        constants, sample = self._kernel
-        n = len(record.time)
-        if ("motion", n) not in self._runs:
-            S, *others = self._symbols
-            following, y = sample(S, *others)[:2]
-            self._runs["motion", n] = ca.Function("one", [S, *others], [following, y]).mapaccum(n)
-        c = np.tile(constants(p)[0].full(), (1, n))
-        following, y = self._runs["motion", n](self._start(record, p, start), *self._inputs(record), c)
-        return following.full().T, y.full().T
+        c = np.tile(self._kernel[0](p)[0].full().T, (len(record.time), 1))
+        return self._moving.run(self._start(record, p, start), *self._inputs(record), c)
 
     def sensitivities(
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None
@@ -119,33 +122,30 @@ class Response:
         D_0 = np.zeros((self.n_s, k + n_i))
         D_0[list(self.initial), k + np.arange(n_i)] = 1.0
         begin = np.concatenate([self._start(record, p, start), D_0.ravel(order="F")])
-        slow = (np.tile(np.reshape(v, (-1, 1)), (1, n)) for v in (c.full(), np.array(by_p.nonzeros())))
-        values = self._sensitive(n)(begin, *self._inputs(record), *slow)[1].full()
-        slopes = values[n_y:].reshape(k + n_i, n_y, n)
-        return values[:n_y].T, np.moveaxis(slopes, 2, 0).transpose(0, 2, 1)
-
-    def _sensitive(self, n: int) -> ca.Function:
-        """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
-        if ("sensitive", n) not in self._runs:
-            k, n_i = len(self.free), len(self.initial)
-            by_p = ca.SX.sym("by_p", self._kernel[0].sparsity_out(1))
-            seed = ca.horzcat(by_p, ca.SX(by_p.shape[0], n_i))
-            S, *others = (
-                ca.SX.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols)
-            )  # an empty one has no name
-            D = ca.SX.sym("D", self.n_s, k + n_i)
-            following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
-            D_next, Y = F_S @ D + F_c @ seed, H_S @ D + H_c @ seed
-            one = ca.Function(
-                "one", [ca.vertcat(S, ca.vec(D)), *others, ca.vertcat(ca.SX(0, 1), *by_p.nonzeros())],
-                [ca.vertcat(following, ca.vec(D_next)), ca.vertcat(y, ca.vec(Y))], {"cse": True},
-            )  # fmt: skip
-            self._runs["sensitive", n] = one.mapaccum(n)
-        return self._runs["sensitive", n]
+        slow = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(by_p.nonzeros())))
+        values = self._sensitive.run(begin, *self._inputs(record), *slow)[1]
+        return values[:, :n_y], values[:, n_y:].reshape(n, k + n_i, n_y).transpose(0, 2, 1)
 
     @cached_property
-    def _runs(self) -> dict:
-        return {}
+    def _moving(self) -> Recursion:
+        """The sample map."""
+        S, *others = self._symbols
+        values = [ca.densify(value) for value in self._kernel[1](S, *others)[:2]]
+        return Recursion(ca.Function("one", [S, *others], values))
+
+    @cached_property
+    def _sensitive(self) -> Recursion:
+        """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
+        k, n_i = len(self.free), len(self.initial)
+        by_p = ca.SX.sym("by_p", self._kernel[0].sparsity_out(1))
+        seed = ca.horzcat(by_p, ca.SX(by_p.shape[0], n_i))
+        S, *others = (ca.SX.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols))  # an empty one has no name
+        D = ca.SX.sym("D", self.n_s, k + n_i)
+        following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
+        results = (following, F_S @ D + F_c @ seed), (y, H_S @ D + H_c @ seed)
+        given = [ca.vertcat(S, ca.vec(D)), *others, ca.vertcat(ca.SX(0, 1), *by_p.nonzeros())]
+        values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in results]
+        return Recursion(ca.Function("one", given, values, {"cse": True}))
 
     @cached_property
     def _symbols(self) -> list[ca.MX]:
@@ -160,8 +160,27 @@ class Response:
         return S
 
     def _inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Drive now, drive at the next sample, ambient; for settled poses the pose's own drive comes as the next."""
+        """Drive now and at the next sample (n, n_u), ambient (n, 1); for settled poses the pose's own drive comes as the next."""
         u = record.drive
         following = np.vstack([u[1:], u[-1:]]) if np.isfinite(self.sample_time) else u
         before = u if np.isfinite(self.sample_time) else np.vstack([u[:1], u[:-1]])
-        return before.T, following.T, self._ambients(record)[None, :]
+        return before, following, self._ambients(record)[:, None]
+
+
+class Linearised:
+    """F_S (n_s, n_s), F_f (n_s, m), H_S (n_y, n_s) and H_f (n_y, m) by (S, u, u+, ambient); `patterns` says which of
+    their entries can differ from zero."""
+
+    def __init__(self, one: ca.Function) -> None:
+        self.patterns = [ca.DM(one.sparsity_out(i), 1).full() > 0 for i in range(one.n_out())]
+        given = one.mx_in()
+        self._one = ca.Function("dense", given, [ca.densify(value) for value in one(*given)])
+        self._mapped: dict[int, ca.Function] = {}
+
+    def along(self, S: np.ndarray, *inputs: np.ndarray) -> list[np.ndarray]:
+        """Each at n samples, (n, ., .); all arguments (n, .)."""
+        n = len(S)
+        if n not in self._mapped:
+            self._mapped[n] = self._one.map(n)
+        values = evaluate(self._mapped[n], S, *inputs)
+        return [v.reshape(n, *p.T.shape).transpose(0, 2, 1) for v, p in zip(values, self.patterns, strict=True)]

@@ -3,7 +3,7 @@
 With r the whitened residual of the fitted structure, J its whitened slopes (prior rows included) and s the slope of
 the readings by one amplitude at `off`, for fixed shape,
 
-    s_perp = s - J (J'J)^-1 J's,   z = s_perp'r/|s_perp|,   amplitude = s_perp'r/|s_perp|^2.
+    s_perp = s - U U's,   z = s_perp'r/|s_perp|,   amplitude = s_perp'r/|s_perp|^2,   J = U (...) with U'U = 1.
 
 Under "nothing left out" the z of all hypotheses are jointly normal with the correlation cos(s_perp, s_perp'); the
 largest |z| is judged against simulations of that. |cos| near one says what this record cannot tell apart.
@@ -18,9 +18,11 @@ from scipy.signal import find_peaks
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.slopes import Column, Slopes, Sums
+from ctrlgen.diagnosis.laws import Column
+from ctrlgen.diagnosis.slopes import Slopes, Sums
 from ctrlgen.diagnosis.together import Suspect, Together
 
+ALIKE = 1e-6  # of the largest: free directions with smaller slopes are taken as one with the others
 OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
 LINES = 3  # of the spectrum of what is left, tried as frequencies
 ZEROS = 8  # padding of that spectrum
@@ -57,18 +59,25 @@ class Screen:
         """All hypotheses that the fit does not contain yet."""
         beside = (h.beside(fit.structure.causes) for h in self.hypotheses)
         open_ = [h for h in beside if h is not None]
-        sums = Sums()
+        sums: Sums | None = None
         columns: list[Column] = []
+        U, back = _directions(fit.J)
         first, lines = 0, self._lines(fit)
-        for index, record in enumerate(self.fitter.to_fit):
+        for record, start in zip(self.fitter.to_fit, fit.starts or [None] * len(self.fitter.to_fit), strict=True):
             slopes = Slopes(self.fitter, fit, record, open_, lines)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)
-            J = fit.J[first : first + n]
+            free = U[first : first + n].reshape(*record.valid.shape, -1)
             first += n
-            slopes.accumulate(sums, white, J, index, fit.starts[index] if fit.starts else None)
-        return self._judge(fit, columns, sums, fit.J[first:], fit.residual[first:])
+            here = slopes.sums(white, free, start)
+            sums = here if sums is None else sums.plus(here)
+        if not columns or sums is None:
+            return Screened((), np.zeros((0, 0)), np.inf, {})
+        size = np.linalg.norm(fit.J[:first], axis=0)
+        return self._judge(
+            columns, sums, U.T @ fit.residual, np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
+        )
 
     def _lines(self, fit: Fit) -> tuple[float, ...]:
         """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
@@ -84,19 +93,14 @@ class Screen:
         best = peaks[np.argsort(-power[peaks])[:LINES]]
         return tuple(float(f) for f in np.sort(best) / (ZEROS * len(left) * records[k].sample_time))
 
-    def _judge(self, fit: Fit, columns: list[Column], sums: Sums, prior: np.ndarray, held: np.ndarray) -> Screened:
-        if not columns or sums.SS is None:
-            return Screened((), np.zeros((0, 0)), np.inf, {})
-        norm = sums.norm2
-        A = sums.JJ + prior.T @ prior
-        scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
-        inverse = np.linalg.pinv(A / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
-        project = inverse @ sums.JS
-        own = norm - np.einsum("ij,ij->j", sums.JS, project)
-        score = sums.Sr - project.T @ (sums.Jr + prior.T @ held)  # the rest of the gradient, zero at the optimum
+    def _judge(self, columns: list[Column], sums: Sums, gradient: np.ndarray, likeness: np.ndarray) -> Screened:
+        """`gradient` U'r (k,), zero at an optimum inside all bounds; `likeness` |J's|/|J| (free numbers, columns)."""
+        norm = np.diag(sums.SS)
+        own = norm - np.sum(sums.US**2, axis=0)
+        score = sums.Sr - gradient @ sums.US
         left = np.where(norm > 0, own / np.where(norm > 0, norm, 1.0), 0.0)
         seen = np.flatnonzero((left > OWN_LEFT) & (norm > 0) & np.isfinite(norm))
-        gram = sums.SS - sums.JS.T @ project  # from the rows kept
+        gram = sums.SS - sums.US.T @ sums.US
         d = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         cosine = np.clip(gram / np.outer(d, d), -1, 1)
         z = np.zeros(len(columns))
@@ -116,8 +120,7 @@ class Screen:
             for j in order
         }
         together = Together(columns, seen, score, own, left, cosine, self._suspect)
-        own_size = np.sqrt(np.maximum(np.diag(sums.JJ), 1e-300))[:, None]
-        resembles = np.argmax(np.abs(sums.JS) / own_size, axis=0) if len(project) else np.full(len(columns), -1)
+        resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
         hidden = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
         hidden = {h: k for h, k in hidden.items() if h not in best}
         threshold = self._threshold(cosine[np.ix_(seen, seen)])
@@ -139,3 +142,12 @@ class Screen:
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = np.random.default_rng(self.seed).standard_normal((NULLS, len(cosine)))
         return float(np.quantile(np.abs(draws @ root.T).max(axis=1), 0.99))
+
+
+def _directions(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """U (N, k), orthonormal, that spans the slopes J (N, n) of the free numbers, and `back` (n, k) with J = U back'."""
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0] = 1.0
+    U, s, V = np.linalg.svd(J / scale, full_matrices=False)
+    kept = s > ALIKE * s.max(initial=0.0)
+    return U[:, kept], scale[:, None] * (V.T * s)[:, kept]

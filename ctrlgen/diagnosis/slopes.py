@@ -6,56 +6,41 @@ S+ = F(S, u) + F_delta delta, y = H(S, u) + H_delta delta, linearised along the 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from types import SimpleNamespace
 
-import casadi as ca
 import numpy as np
-from scipy.linalg import expm
 
-from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links
+from ctrlgen.diagnosis.laws import Column, Laws
+from ctrlgen.diagnosis.mapped import evaluate
 from ctrlgen.diagnosis.probe import with_probes
 from ctrlgen.diagnosis.response import Response
+from ctrlgen.diagnosis.spread import Spread
 from ctrlgen.recording import Record
 
-BLOCK = 5000  # samples worked on at a time
-SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
+BLOCK = 500  # samples worked on at a time: what belongs to them stays in the cache
 LOST = 1e100
 
 
-@dataclass(frozen=True)
-class Column:
-    """One hypothesis with one choice of shape; `injections` (probe, sign) where its term enters."""
-
-    hypothesis: Hypothesis
-    shape: dict[str, float]
-    probes: tuple[int, ...]
-    size: float
-    one_sided: int
-    range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
-
-
+@dataclass(eq=False)
 class Sums:
-    """Inner products, accumulated over blocks of samples."""
+    """Inner products over all samples of the m hypotheses' slopes S: with the k free directions U (k, m), with the residual
+    (m,), and with one another (m, m)."""
 
-    def __init__(self) -> None:
-        self.JJ = self.JS = self.Jr = self.Sr = self.SS = self.norm2 = None
+    US: np.ndarray
+    Sr: np.ndarray
+    SS: np.ndarray
 
-    def add(self, J: np.ndarray, S: np.ndarray, r: np.ndarray) -> None:
-        """Inner products of one block: free slopes J, hypotheses S, residual r."""
-        parts = {
-            "JJ": J.T @ J,
-            "JS": J.T @ S,
-            "Jr": J.T @ r,
-            "Sr": S.T @ r,
-            "SS": S.T @ S,
-            "norm2": np.einsum("ij,ij->j", S, S),
-        }
-        for name, value in parts.items():
-            old = getattr(self, name)
-            setattr(self, name, value if old is None else old + value)
+    @classmethod
+    def none(cls, k: int, m: int) -> Sums:
+        """Of no sample."""
+        return cls(np.zeros((k, m)), np.zeros(m), np.zeros((m, m)))
+
+    def plus(self, other: Sums) -> Sums:
+        """Of the samples of both."""
+        return Sums(self.US + other.US, self.Sr + other.Sr, self.SS + other.SS)
 
 
 class Slopes:
@@ -64,209 +49,81 @@ class Slopes:
     def __init__(
         self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis], lines: tuple[float, ...]
     ) -> None:
-        self.fitter, self.fit, self.record, self.lines = fitter, fit, record, lines
-        device = fit.structure.described
-        probed, probes = with_probes(device, nominal_links(fit.structure.device))
-        self.numbers = [h for h in hypotheses if h.effect == PARAMETER]
+        self.fitter, self.record = fitter, record
+        probed, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
         known = [u.path for u in fit.structure.unknowns]
-        self.probe_paths = list(probes.values())
-        number_paths = [h.path for h in self.numbers if h.path not in known]
-        free = [*known, *number_paths, *self.probe_paths]
-        key = ("screen", fit.structure.causes, record.sample_time, record.linear)
+        numbers = [h for h in hypotheses if h.effect == PARAMETER]
+        number_paths = [h.path for h in numbers if h.path not in known]
+        free = [*known, *number_paths, *probes.values()]
+        key = ("screen", fit.structure.causes, tuple(free), record.sample_time, record.linear)
         if key not in fitter.cache:
             fitter.cache[key] = Response(probed, free, fitter.recording.channels, record.sample_time, record.linear)
         self.response: Response = fitter.cache[key]
         self.p = self.response.model.p_nominal.copy()
         self.p[: len(known)] = fit.theta
         self.p[len(known) + len(number_paths) :] = 0.0
-        self.probe_index = {where: free.index(path) for where, path in probes.items()}
-        self.columns, self.evaluators = self._laws([h for h in hypotheses if h.effect != PARAMETER], device)
-        self.law_columns = len(self.columns)
-        for h in self.numbers:
-            i = free.index(h.path)
-            value = self.p[i]
-            size = max(abs(value), 1e-3) * 1e-3
-            self.columns.append(Column(h, {"value": value}, (i,), size, 0, (-500.0, 500.0)))
+        entered = {where: free.index(path) for where, path in probes.items()}
+        others = [h for h in hypotheses if h.effect != PARAMETER]
+        self.laws = Laws(self.response, fit.structure, others, lines, entered)
+        places = [free.index(h.path) for h in numbers]
+        self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
+        self.columns = list(self.laws.columns)
+        for k, (h, i) in enumerate(zip(numbers, places, strict=True)):
+            term, size = len(self.laws.terms) + k, float(self.sizes[k])
+            self.columns.append(Column(h, {"value": self.p[i]}, (i,), (term,), size, 0, (-500.0, 500.0)))
+        self.linear = self.response.linearised(self.p, range(len(free)))
+        self.spread = Spread(self.linear.patterns, self.columns)
 
-    def _laws(self, hypotheses: list[Hypothesis], device: object) -> tuple[list[Column], SimpleNamespace]:
-        """Columns, and the terms' derivatives by amplitude as functions along the motion."""
-        m, structure = self.response.model, self.fit.structure
-        links = nominal_links(structure.device)
-        columns, terms, states, rates, stepped, clocks, blocks = [], [], [], [], [], [], []
-        amplitudes, offs, sizes = [], [], []
-        for h in hypotheses:
-            law, where = h.law, structure.place(h)
-            names = [w.channel for w in channels(links, law.place)]
-            partner = names.index(h.of) if h.of else None
-            at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
-            if law.mutual:
-                at += [(partner, i) for i, _ in at]
-            amplitude = law.amplitude()
-            low, high = (where.si(b, amplitude) for b in amplitude.bounds)
-            off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
-            side = 1 if off <= low else -1 if off >= high else 0
-            for shape in h.shapes(where, self.lines):
-                for i, other in at:
-                    m_states = {s.name: ca.SX.sym(f"m{len(states)}_{s.name}") for s in law.states}
-                    a = ca.SX.sym("a")
-                    p = SimpleNamespace(**shape, **{amplitude.name: a})
-                    s = m.seen(law.place, i, other, m_states)
-                    instance = law(h.at, {}, h.of)
-                    new = instance.update(s, p)
-                    s.__dict__.update(new)
-                    change = {state.name: ca.SX(float(state.clock)) for state in law.states} | instance.rates(s, p)
-                    terms.append(ca.SX(instance.term(s, p)))
-                    amplitudes.append(a)
-                    offs.append(off)
-                    sizes.append(size)
-                    blocks.append(list(range(len(states), len(states) + len(m_states))))
-                    states += list(m_states.values())
-                    rates += [ca.substitute(ca.SX(change[state.name]), a, off) for state in law.states]
-                    stepped += [
-                        ca.substitute(ca.SX(new[state.name]), a, off) if state.stepped else None for state in law.states
-                    ]
-                    clocks += [state.clock for state in law.states]
-                meant = amplitude.expected or (low - off, high - off)
-                span = (meant[0] / size, meant[1] / size)
-                columns.append(Column(h, shape, tuple(self.probe_index[law.place, i] for i, _ in at), size, side, span))
-        if terms:  # each term depends on its own amplitude alone: one derivative of all of them
-            every, a = ca.vertcat(*terms), ca.vertcat(*amplitudes)
-            slope = ca.substitute(ca.jtimes(every, a, ca.DM(sizes)), a, ca.DM(offs))
-            terms = ca.vertsplit(slope)
-        return columns, SimpleNamespace(
-            terms=terms, states=states, rates=rates, stepped=stepped, clocks=clocks, blocks=blocks
-        )
+    def sums(self, white: np.ndarray, U: np.ndarray, start: np.ndarray | None) -> Sums:
+        """This record's inner products with its whitened residual `white` (n, n_y) and free directions U (n, n_y, k)."""
+        noise, seen = self.fitter.noise, self.spread.seen
+        usable = noise.usable(self.record.valid)
+        SS = [np.zeros((len(s), len(s))) for s in seen]
+        tails = [np.zeros((len(ar), len(s))) for ar, s in zip(noise.ar, seen, strict=True)]
+        total = Sums.none(U.shape[2], len(self.columns))
+        lost = np.zeros(len(self.laws.terms) + len(self.sizes), bool)
+        for a, b, readings in self._blocks(start, lost):
+            for i, Y in enumerate(readings):
+                if len(noise.ar[i]):
+                    Y = np.vstack([tails[i], Y])
+                    tails[i] = Y[len(Y) - len(tails[i]) :]
+                S = noise.filtered(Y, i)
+                S[~usable[a:b, i]] = 0.0
+                if not np.isfinite(S.sum()):
+                    S = np.nan_to_num(S)
+                SS[i] += S.T @ S
+                total.US[:, seen[i]] += U[a:b, i].T @ S
+                total.Sr[seen[i]] += white[a:b, i] @ S
+        for own, columns in zip(SS, seen, strict=True):
+            total.SS[np.ix_(columns, columns)] += own
+        gone = [j for j, column in enumerate(self.columns) if lost[list(column.terms)].any()]
+        total.US[:, gone], total.Sr[gone], total.SS[gone], total.SS[:, gone] = 0.0, 0.0, 0.0, 0.0
+        return total
 
-    def _motion(self, start: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """S (n, n_s) at which terms are evaluated, and S before each sample (n, n_s)."""
-        r, record = self.response, self.record
+    def _blocks(self, start: np.ndarray | None, lost: np.ndarray) -> Iterator[tuple[int, int, Iterator[np.ndarray]]]:
+        """Blocks of samples [a, b) with what each channel reads of its columns; marks terms as `lost` on the way.
+
+        Every block is evaluated with the sample after it, whose terms act together with its last ones.
+        """
+        r, record, n = self.response, self.record, len(self.record.time)
+        series = np.isfinite(r.sample_time)
         after, _ = r.motion(record, self.p, start)
         before = np.vstack([r._start(record, self.p, start), after[:-1]])
-        return (before if np.isfinite(r.sample_time) else after), before
-
-    def _terms(self, at: np.ndarray) -> np.ndarray:
-        """Every law's dterm/damplitude along the motion, (n, n_terms)."""
-        r, record, law = self.response, self.record, self.evaluators
-        m, n = r.model, len(record.time)
-        if not law.terms:
-            return np.zeros((n, 0))
-        S, e = ca.vertcat(m.x, m.z), r.ambient
-        memory = ca.vertcat(ca.SX(0, 1), *law.states)
-        dx = ca.vertcat(ca.SX(0, 1), *law.rates)
-        given = [S, m.u, e, m.p]
-        inputs = [at.T, record.drive.T, r._ambients(record)[None, :], np.tile(self.p[:, None], (1, n))]
-        values = np.zeros((0, n))
-        if memory.numel():
-            values = self._memories(memory, m.closed(dx), given, inputs)
-        f = ca.Function("terms", [*given, memory], [m.closed(ca.vertcat(*law.terms))], {"cse": True})
-        found = f.map(n)(*inputs, values).full().T
-        lost = ~np.all(np.abs(found) < LOST, axis=0)  # memories that have left the numbers say nothing
-        found[:, lost] = 0.0
-        return found
-
-    def _memories(self, memory: ca.SX, rates: ca.SX, given: list[ca.SX], inputs: list[np.ndarray]) -> np.ndarray:
-        """The laws' own states before each sample, (n_memory, n): linear ones exactly, stepped ones by their update."""
-        h = self.response.sample_time
-        settled = not np.isfinite(h)
-        h = SETTLED_LAG if settled else h
-        law, m = self.evaluators, self.response.model
-        after = list(ca.vertsplit(memory + h * rates))
-        for block in law.blocks:
-            A = ca.jacobian(rates[block], memory[block])
-            if not ca.symvar(A):  # rates of linear memories: m + h phi_1(h A) rates
-                phi = _phi_1(h * ca.DM(A).full())
-                for k, i in enumerate(block):
-                    after[i] = memory[i] + h * ca.DM(phi[k : k + 1]) @ rates[block]
-        for i, new in enumerate(law.stepped):
-            if new is not None:
-                after[i] = m.closed(new)
-            elif law.clocks[i]:
-                after[i] = memory[i] + (1.0 if settled else h)
-        step = ca.Function("memories", [memory, *given], [ca.vertcat(*after)], {"cse": True})
-        start = np.zeros(memory.numel())
-        start[[i for i, clock in enumerate(law.clocks) if clock]] = 0.0 if settled else self.record.time[0]
-        values = step.mapaccum(inputs[0].shape[1])(start, *inputs).full()
-        return values if settled else np.hstack([start[:, None], values[:, :-1]])
-
-    def accumulate(self, sums: Sums, white: np.ndarray, J: np.ndarray, index: int, start: np.ndarray | None) -> None:
-        """Adds this record's inner products, block by block."""
-        r, record, noise = self.response, self.record, self.fitter.noise
-        at, before = self._motion(start)
-        terms = self._terms(at)
-        n, n_y, order = len(record.time), len(r.channels), max(map(len, noise.ar), default=0)
-        linear = self._linearised()
-        D = np.zeros((r.n_s, len(self.columns)))
-        tail = np.zeros((0, n_y, len(self.columns)))
-        usable = noise.usable(record.valid)
-        u, u_1, e = r._inputs(record)
-        for a in range(0, n, BLOCK):
-            b = min(a + BLOCK, n)
-            block = linear.map(b - a)(
-                before[a:b].T, u[:, a:b], u_1[:, a:b], e[:, a:b], np.tile(self.p[:, None], (1, b - a))
-            )
-            F_S, F_p, H_S, H_p = (_stacked(x, b - a) for x in block)
-            following = (
-                np.vstack([terms[a + 1 : b + 1], terms[-1:]])[: b - a] if np.isfinite(r.sample_time) else terms[a:b]
-            )
-            Y, D = self._propagate(F_S, F_p, H_S, H_p, terms[a:b], following, D)
-            joined = np.concatenate([tail, Y])
-            valid = np.vstack([np.ones((len(tail), n_y), bool), np.ones((b - a, n_y), bool)])
-            W = noise.whiten(joined, valid)[len(tail) :]
-            tail = joined[-order:] if order else tail
-            mask = usable[a:b].reshape(-1)
-            S = np.nan_to_num(W.reshape(-1, len(self.columns)))[mask]
-            sums.add(J[a * n_y : b * n_y][mask], S, white[a:b].reshape(-1)[mask])
-
-    def _linearised(self) -> ca.Function:
-        """(S, u, u+, e, p) -> F_S, F_p, H_S, H_p for the columns' probes and numbers."""
-        constants, sample = self.response._kernel
-        r = self.response
-        args = [
-            ca.MX.sym(k, n)
-            for k, n in (
-                ("S", r.n_s),
-                ("u", r.model.u.numel()),
-                ("u1", r.model.u.numel()),
-                ("e", 1),
-                ("p", len(r.free)),
-            )
-        ]
-        c, by_p = constants(args[4])
-        _, _, F_S, F_c, H_S, H_c = sample(*args[:4], c)
-        return ca.Function("linearised", args, [ca.densify(x) for x in (F_S, F_c @ by_p, H_S, H_c @ by_p)])
-
-    def _propagate(self, F_S, F_p, H_S, H_p, terms, following, D):
-        """Slopes of the readings (n, n_y, columns) over one block, and D after it."""
-        n = len(terms)
-        inject_x = np.zeros((n, F_S.shape[1], len(self.columns)))
-        inject_y = np.zeros((n, H_S.shape[1], len(self.columns)))
-        mean = (terms + following) / 2
-        k = 0
-        for j, column in enumerate(self.columns):
-            for probe in column.probes:
-                if j < self.law_columns:
-                    inject_x[:, :, j] += F_p[:, :, probe] * mean[:, k, None]
-                    inject_y[:, :, j] += H_p[:, :, probe] * terms[:, k, None]
-                    k += 1
-                else:
-                    inject_x[:, :, j] = F_p[:, :, probe] * column.size
-                    inject_y[:, :, j] = H_p[:, :, probe] * column.size
-        states = np.empty((n, *D.shape))
-        for i in range(n):
-            states[i] = D
-            D = F_S[i] @ D + inject_x[i]
-        return H_S @ states + inject_y, D
-
-
-def _stacked(flat: ca.DM, n: int) -> np.ndarray:
-    """(rows, n * columns) as CasADi's map gives it -> (n, rows, columns)."""
-    dense = flat.full()
-    return dense.reshape(dense.shape[0], n, -1).transpose(1, 0, 2)
-
-
-def _phi_1(M: np.ndarray) -> np.ndarray:
-    """M^-1 (e^M - 1), also where M is singular: the upper right block of exp [[M, 1], [0, 0]]."""
-    n = len(M)
-    if n == 1:
-        return np.expm1(M) / M if M[0, 0] else np.ones((1, 1))
-    return expm(np.block([[M, np.eye(n)], [np.zeros((n, 2 * n))]]))[:n, n:]
+        inputs = (before, *r._inputs(record))
+        seen = (before if series else after, record.drive, inputs[3])
+        size = min(BLOCK, n)
+        laws = self.laws.compiled(self.p).mapaccum(size + 1)
+        memory = self.laws.start(record.time[0])
+        for a in range(0, n, size):
+            here = np.minimum(np.arange(a, a + size + 1), n - 1)  # the last block is filled up
+            k = min(size, n - a)
+            memories, found = evaluate(laws, memory, *(x[here] for x in seen))
+            memory = memories[size - 1]
+            if a + k == n:
+                found[k:] = found[k - 1]
+            found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])
+            lost |= ~np.all(np.abs(found) < LOST, axis=0)
+            found[:, lost] = 0.0  # memories that have left the numbers say nothing
+            f, following = found[:k], found[1 : k + 1] if series else found[:k]
+            linear = self.linear.along(*(x[here[:size]] for x in inputs))
+            yield a, a + k, self.spread.readings([block[:k] for block in linear], f, following)

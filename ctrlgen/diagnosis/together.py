@@ -57,8 +57,8 @@ class Together:
         return tuple(sorted(found, key=lambda f: -f[0]))
 
     def _grown(self, beam: list[tuple[float, tuple[int, ...]]]) -> list[tuple[float, tuple[int, ...]]]:
-        grown: dict[frozenset, tuple[float, tuple[int, ...]]] = {}
-        for gain, members in beam:
+        gains, places = [], []
+        for member, (gain, members) in enumerate(beam):
             K = list(members)
             if K:
                 W = np.linalg.solve(self.C[np.ix_(K, K)] + RIDGE * np.eye(len(K)), self.C[K])
@@ -68,12 +68,19 @@ class Together:
                 rest, score = np.ones(len(self.z)), self.z
             more = np.where(rest > TOO_ALIKE, score**2 / np.maximum(rest, TOO_ALIKE), 0.0)
             more[np.isin(self.group, self.group[K])] = 0.0
-            for j in np.argsort(-more)[:BEAM]:
-                if more[j] > 0:
-                    key = frozenset(self.group[[*K, j]])
-                    if key not in grown or grown[key][0] < gain + more[j]:
-                        grown[key] = (gain + float(more[j]), (*members, int(j)))
-        return sorted(grown.values(), key=lambda g: -g[0])[:BEAM]
+            best = np.argsort(-more)[:BEAM]
+            best = best[more[best] > 0]
+            gains.append(gain + more[best])
+            places += [(member, int(j)) for j in best]
+        grown: dict[frozenset, tuple[float, tuple[int, ...]]] = {}
+        joined = np.concatenate([np.zeros(0), *gains])
+        for i in np.argsort(-joined, kind="stable"):  # the best with each group first
+            member, j = places[i]
+            members = (*beam[member][1], j)
+            grown.setdefault(frozenset(self.group[list(members)]), (float(joined[i]), members))
+            if len(grown) == BEAM:
+                break
+        return list(grown.values())
 
     def _amplitudes(self, members: tuple[int, ...]) -> np.ndarray:
         K = list(members)

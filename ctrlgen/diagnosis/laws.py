@@ -1,0 +1,151 @@
+"""The laws of all hypotheses, evaluated along one motion: their terms' slopes by the amplitude, with their own memories.
+
+A law at one place with one shape is one term, however many hypotheses hold it: "all" actuators share those of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import casadi as ca
+import numpy as np
+from scipy.linalg import expm
+
+from ctrlgen.chain import channels
+from ctrlgen.diagnosis.hypotheses import Hypothesis, nominal_links
+from ctrlgen.diagnosis.response import Response
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.effect import Effect, Place
+
+SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
+
+
+@dataclass(frozen=True)
+class Column:
+    """One hypothesis with one choice of shape. `probes` where it enters, `terms` which term enters at each; `size` [SI]
+    of the amplitude's unit, `one_sided` the only sign it may have (0: both)."""
+
+    hypothesis: Hypothesis
+    shape: dict[str, float]
+    probes: tuple[int, ...]
+    terms: tuple[int, ...]
+    size: float
+    one_sided: int
+    range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
+
+
+@dataclass(frozen=True, eq=False)
+class _Term:
+    """One law at one place: its `value`, by its amplitude `a` around `off` in steps of `size`, with its states' symbols,
+    `rates` and new values (`stepped`, None where a state is not)."""
+
+    value: ca.SX
+    a: ca.SX
+    off: float
+    size: float
+    states: list[ca.SX]
+    rates: list[ca.SX]
+    stepped: list[ca.SX | None]
+    clocks: list[bool]
+
+
+class Laws:
+    """The terms of `hypotheses` on the motions of `response`, and one column for every choice of shape."""
+
+    def __init__(
+        self, response: Response, structure: Structure, hypotheses: list[Hypothesis], lines: tuple[float, ...],
+        probes: dict[tuple[Place, int], int],
+    ) -> None:  # fmt: skip
+        self.response = response
+        self.terms: list[_Term] = []
+        self._known: dict[tuple, int] = {}
+        self.columns = [c for h in hypotheses for c in self._of(h, structure, lines, probes)]
+
+    def _of(
+        self, h: Hypothesis, structure: Structure, lines: tuple[float, ...], probes: dict[tuple[Place, int], int]
+    ) -> Iterator[Column]:
+        law, where = h.law, structure.place(h)
+        names = [w.channel for w in channels(nominal_links(structure.device), law.place)]
+        partner = names.index(h.of) if h.of else None
+        at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
+        if law.mutual:
+            at += [(partner, i) for i, _ in at]
+        amplitude = law.amplitude()
+        low, high = (where.si(b, amplitude) for b in amplitude.bounds)
+        off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
+        side = 1 if off <= low else -1 if off >= high else 0
+        meant = amplitude.expected or (low - off, high - off)
+        span = (meant[0] / size, meant[1] / size)
+        entered = tuple(probes[law.place, i] for i, _ in at)
+        for shape in h.shapes(where, lines):
+            terms = tuple(self._term(law(h.at, {}, h.of), i, other, shape, off, size) for i, other in at)
+            yield Column(h, shape, entered, terms, size, side, span)
+
+    def _term(self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float) -> int:
+        key = (law.kind, i, partner, tuple(shape.items()), off, size)
+        if key not in self._known:
+            states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
+            a = ca.SX.sym("a")
+            p = SimpleNamespace(**shape, **{law.amplitude().name: a})
+            s = self.response.model.seen(law.place, i, partner, states)
+            new = law.update(s, p)
+            s.__dict__.update(new)
+            change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
+            self._known[key] = len(self.terms)
+            rates = [ca.substitute(ca.SX(change[state.name]), a, off) for state in law.states]
+            stepped = [ca.substitute(ca.SX(new[state.name]), a, off) if state.stepped else None for state in law.states]
+            clocks = [state.clock for state in law.states]
+            value = ca.SX(law.term(s, p))
+            self.terms.append(_Term(value, a, off, size, list(states.values()), rates, stepped, clocks))
+        return self._known[key]
+
+    def start(self, time: float) -> np.ndarray:
+        """The laws' states before the first sample, at `time` [s]: zero, but for clocks."""
+        clocks = [clock for term in self.terms for clock in term.clocks]
+        return np.where(clocks, time if np.isfinite(self.response.sample_time) else 0.0, 0.0)
+
+    def compiled(self, p: np.ndarray) -> ca.Function:
+        """(memory, S, u, ambient) -> (memory after the sample, every dterm/damplitude * size), with the numbers `p`.
+
+        A settled pose is read with the memories that it has settled to.
+        """
+        m = self.response.model
+        memory = ca.vertcat(ca.SX(0, 1), *(s for term in self.terms for s in term.states))
+        after = m.closed(ca.vertcat(ca.SX(0, 1), *(value for term in self.terms for value in self._after(term))))
+        found = ca.SX(0, 1)
+        if self.terms:  # each term depends on its own amplitude alone: one derivative of all of them
+            a, offs = ca.vertcat(*(t.a for t in self.terms)), ca.DM([t.off for t in self.terms])
+            every = ca.vertcat(*(t.value for t in self.terms))
+            found = m.closed(ca.substitute(ca.jtimes(every, a, ca.DM([t.size for t in self.terms])), a, offs))
+        if not np.isfinite(self.response.sample_time):
+            found = ca.substitute(found, memory, after)
+        given = [memory, ca.vertcat(m.x, m.z), m.u, self.response.ambient]
+        general = ca.Function("general", [*given, m.p], [after, found])
+        return ca.Function("laws", given, [ca.densify(value) for value in general(*given, p)], {"cse": True})
+
+    def _after(self, term: _Term) -> list[ca.SX]:
+        """The states of one law after a sample: linear ones exactly, stepped ones by their update."""
+        if not term.states:
+            return []
+        h = self.response.sample_time
+        settled = not np.isfinite(h)
+        h = SETTLED_LAG if settled else h
+        memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)
+        A = ca.jacobian(rates, memory)
+        step = h * rates if ca.symvar(A) else h * ca.DM(_phi_1(h * ca.DM(A).full())) @ rates
+        return [
+            new if new is not None else state + (1.0 if settled else h) if clock else state + change
+            for state, new, clock, change in zip(
+                term.states, term.stepped, term.clocks, ca.vertsplit(step), strict=True
+            )
+        ]
+
+
+def _phi_1(M: np.ndarray) -> np.ndarray:
+    """M^-1 (e^M - 1), also where M is singular: the upper right block of exp [[M, 1], [0, 0]]."""
+    n = len(M)
+    if n == 1:
+        return np.expm1(M) / M if M[0, 0] else np.ones((1, 1))
+    return expm(np.block([[M, np.eye(n)], [np.zeros((n, 2 * n))]]))[:n, n:]

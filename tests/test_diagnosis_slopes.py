@@ -1,0 +1,128 @@
+"""The screen's slopes against what they stand for: a plain recursion, and differences of simulated readings."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from conftest import SCENARIOS
+
+from ctrlgen import build_model, load_device
+from ctrlgen.diagnosis import slopes as slopes_module
+from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.noise import Noise
+from ctrlgen.diagnosis.response import Response
+from ctrlgen.diagnosis.screen import Screen
+from ctrlgen.diagnosis.slopes import Slopes
+from ctrlgen.diagnosis.spread import Spread
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.recording import Record, Recording
+
+H, N = 1e-3, 700
+HEXAPOD = load_device(SCENARIOS / "devices" / "mems_hexapod.toml")
+LAWS = [
+    Hypothesis("creep", "stage:1X", "1X"), Hypothesis("stiffening", "stage:2Y", "2Y"),
+    Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("drive_gain", "actuator:1Y", "1Y"),
+    Hypothesis("drive_gain", "actuator:all", "all"), Hypothesis("heater_resistance", "actuator:2X", "2X"),
+    Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"), Hypothesis("low_pass", "sensor:theta_z", "theta_z"),
+    Hypothesis("swapped", "actuator:1X", "1X", "2X"), Hypothesis("frame_turn", "mechanism:delta_x", "delta_x"),
+    Hypothesis(PARAMETER, "actuator:thermal_resistance", path="actuator.thermal_resistance"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def hexapod():
+    """A fitter on one record of six moving actuators, with noise that remembers in three channels and a gap in one."""
+    model = build_model(HEXAPOD)
+    channels = tuple(f"reading.{name}" for name in model.signals["reading"].channels)
+    t = np.arange(N)[:, None] * H
+    u = model.u_scale * (0.4 + 0.3 * np.sin(2 * np.pi * (3.0 + np.arange(6)) * t + np.arange(6)))
+    valid = np.ones((N, 6), bool)
+    valid[300:320, 2] = False
+    records = [Record(role, role, t[:, 0], H, u, np.zeros((N, 6)), False, None, valid) for role in ("fit", "hold_out")]
+    y = Response(HEXAPOD, (), channels, H, False).outputs(records[0], np.zeros(0))
+    sd = np.ptp(y, axis=0) / 300
+    noisy = y + sd * np.random.default_rng(4).standard_normal(y.shape)
+    records = [Record(r.name, r.role, r.time, H, u, noisy, False, None, valid) for r in records]
+    recording = Recording(
+        "t", HEXAPOD.name, "series", channels, ("rad",) * 3 + ("m",) * 3, (None,) * 6, tuple(records), ()
+    )
+    ar = tuple(np.array([0.4, -0.1]) if i % 2 else np.zeros(0) for i in range(6))
+    return Fitter(recording, Noise(sd, ar, np.ones(6, bool), ("",) * 6, np.full(6, np.inf)))
+
+
+def brute(slopes, start):
+    """S (n, n_y, columns) by the recursion over all states and all columns, whitened."""
+    r, record = slopes.response, slopes.record
+    after, _ = r.motion(record, slopes.p, start)
+    before = np.vstack([r._start(record, slopes.p, start), after[:-1]])
+    F_S, F_p, H_S, H_p = slopes.linear.along(before, *r._inputs(record))
+    step, memory, f = slopes.laws.compiled(slopes.p), slopes.laws.start(record.time[0]), []
+    for k in range(N):
+        memory, term = step(memory, before[k], record.drive[k], 0.0)
+        f.append([*term.full().ravel(), *slopes.sizes])
+    f = np.array(f)
+    mean = (f + np.vstack([f[1:], f[-1:]])) / 2
+    D, Y = np.zeros((r.n_s, len(slopes.columns))), np.zeros((N, 6, len(slopes.columns)))
+    enters = np.zeros((f.shape[1], len(slopes.columns), F_p.shape[2]))
+    for j, column in enumerate(slopes.columns):
+        for probe, term in zip(column.probes, column.terms, strict=True):
+            enters[term, j, probe] += 1.0
+    for k in range(N):
+        Y[k] = H_S[k] @ D + H_p[k] @ np.einsum("t,tjp->pj", f[k], enters)
+        D = F_S[k] @ D + F_p[k] @ np.einsum("t,tjp->pj", mean[k], enters)
+    return Y
+
+
+def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypatch):
+    monkeypatch.setattr(slopes_module, "BLOCK", 123)
+    fit = hexapod.fit(Structure(HEXAPOD))
+    record = hexapod.to_fit[0]
+    slopes = Slopes(hexapod, fit, record, LAWS, ())
+    white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
+    found = slopes.sums(white, J, fit.starts[0])
+    noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
+    S = noise.whiten(brute(slopes, fit.starts[0]), np.ones((N, 6), bool)) * usable[:, :, None]
+    for name, value in (
+        ("US", np.einsum("nik,nij->kj", J, S)),
+        ("Sr", np.einsum("nij,ni->j", S, white)),
+        ("SS", np.einsum("nij,nik->jk", S, S, optimize=True)),
+    ):
+        size = np.sqrt(np.outer(np.sum(J**2, axis=(0, 1)), np.sum(S**2, axis=(0, 1)))) if name == "US" else 1.0
+        size = np.sqrt(np.einsum("nij,nij->j", S, S)) * np.linalg.norm(white) if name == "Sr" else size
+        size = np.sqrt(np.outer(*(np.einsum("nij,nij->j", S, S),) * 2)) if name == "SS" else size
+        assert np.abs((getattr(found, name) - value) / size).max() < 1e-12, name
+
+
+@pytest.mark.parametrize("law", [h for h in LAWS if h.effect != PARAMETER], ids=lambda h: f"{h.effect}-{h.at}")
+def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
+    fit = hexapod.fit(Structure(HEXAPOD))
+    record = hexapod.to_fit[0]
+    slopes = Slopes(hexapod, fit, record, [law], ())
+    column, start = slopes.columns[-1], np.zeros(len(fit.starts[0]))
+    name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
+    slope = brute(slopes, start)[:, :, -1]
+    structure = Structure(HEXAPOD).with_cause(law, {**column.shape, name: off + column.size})
+    response = Response(structure.described, (f"effect[0].{name}",), hexapod.recording.channels, H, False)
+    ends = [response.outputs(record, np.array([off + share * column.size])) for share in (0.01, 0.0)]
+    apart = (ends[0] - ends[1]) / 0.01
+    assert np.linalg.norm(slope - apart) < 0.04 * np.linalg.norm(apart)
+
+
+def test_groups_carry_only_what_enters_them():
+    F_S = np.array([[1, 0, 0], [1, 1, 0], [0, 0, 1]], bool)
+    F_p = np.array([[1, 0, 0], [0, 0, 0], [0, 1, 0]], bool)
+    H_S, H_p = np.array([[0, 1, 0], [0, 0, 1]], bool), np.array([[0, 0, 0], [0, 0, 1]], bool)
+    columns = [SimpleNamespace(probes=p, terms=range(len(p))) for p in ((0,), (1,), (2,), (0, 1))]
+    spread = Spread((F_S, F_p, H_S, H_p), columns)
+    assert [(list(g.states), list(g.columns)) for g in spread.groups] == [([0, 1], [0, 3]), ([2], [1, 3])]
+    assert [list(seen) for seen in spread.seen] == [[0, 3], [1, 2, 3]]
+
+
+def test_a_device_without_free_numbers_is_screened(hexapod):
+    fit = hexapod.fit(Structure(HEXAPOD))
+    bare = SimpleNamespace(**{k: getattr(fit, k) for k in ("structure", "theta", "starts", "residual", "objective")})
+    bare.J = np.zeros((len(fit.residual), 0))
+    assert len(Screen(hexapod, LAWS[:2]).run(bare).suspects) == 2
