@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks import diagnosis, job, online, trajectory
-from benchmarks.measure import Line, Note, print_table
+from benchmarks import diagnosis, job, online, target, trajectory
+from benchmarks.measure import Count, Line, Note, print_table
 from benchmarks.samples import Disagreement
 
-BENCHMARKS = {"trajectory": trajectory, "online": online, "job": job, "diagnosis": diagnosis}
+BENCHMARKS = {"trajectory": trajectory, "online": online, "target": target, "job": job, "diagnosis": diagnosis}
 
 
 def main() -> int:
@@ -32,7 +32,7 @@ def main() -> int:
     for name in arguments.names:
         if name not in BENCHMARKS:
             parser.error(f"no benchmark {name!r}; there are {', '.join(BENCHMARKS)}")
-    results: list[Line | Note] = []
+    results: list[Line | Count | Note] = []
     try:
         for name in dict.fromkeys(arguments.names or BENCHMARKS):
             print(f"{name} ...", file=sys.stderr, flush=True)

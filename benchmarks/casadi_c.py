@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks.samples import Samples
 from benchmarks.timed_c import Program, build
+from ctrlgen.firmware.cprint import Real
 
 NEWTON, SQP = "CasADi Newton in C", "CasADi SQP (qrqp) in C"
 TOLERANCE = 1e-7  # of scaled residuals: 0.0001 nm of pose, about 0.002 nm of balance
@@ -51,30 +52,29 @@ def _peer(name: str, samples: Samples, solve: Callable[[ca.MX, ca.MX], ca.MX]) -
     return ca.Function(name, [before, wanted], [y, samples.drive(y, before[samples.axes :])])
 
 
-def build_peer(title: str, function: ca.Function, samples: Samples, folder: Path) -> Program:
-    """CasADi's C of `function`, built like ours. Raises RuntimeError or Disagreement where that is not possible."""
-    name = function.name()
-    generator = ca.CodeGenerator(name, {"with_header": True})
+def contender(function: ca.Function, samples: Samples, folder: Path, real: Real = Real.DOUBLE) -> str:
+    """CasADi's C of `function`, written to `folder`, and the C around it that `timed_c` and `target` call."""
+    name, m = function.name(), samples.model
+    generator = ca.CodeGenerator(name, {"with_header": True, "casadi_real": real.value})
     generator.add(function)
     with contextlib.redirect_stdout(io.StringIO()):
         generator.generate(f"{folder}/")
-    m = samples.model
     start = np.full(2 * samples.axes, 1.0)
-    contender = f"""#include "{name}.h"
+    return f"""#include "{name}.h"
 #define N {samples.axes}
-typedef double real;
-static const double z_scale[N] = {_braces(m.z_scale)}, x_scale[N] = {_braces(m.x_scale)}, rest[N] = {_braces(m.rest)};
-static double y[2][2 * N] = {{ {_braces(start)}, {_braces(start)} }}, u[N];
+typedef {real.value} real;
+static const real z_scale[N] = {_braces(m.z_scale)}, x_scale[N] = {_braces(m.x_scale)}, rest[N] = {_braces(m.rest)};
+static real y[2][2 * N] = {{ {_braces(start)}, {_braces(start)} }}, u[N];
 static int now = 0;
-static const double *arg[{function.sz_arg()}];
-static double *res[{function.sz_res()}];
+static const real *arg[{function.sz_arg()}];
+static real *res[{function.sz_res()}];
 static casadi_int iw[{function.sz_iw()} + 1];
-static double w[{function.sz_w()} + 1];
+static real w[{function.sz_w()} + 1];
 static int mem;
 #define Z(i) (y[now][i] * z_scale[i])
 #define T(i) (y[now][N + i] * x_scale[i] + rest[i])
 #define U(i) u[i]
-static int answer_to(const double *target)
+LINKAGE int answer_to(const real *target)
 {{
     arg[0] = y[now];
     arg[1] = target;
@@ -83,14 +83,19 @@ static int answer_to(const double *target)
     now = 1 - now;
     return {name}(arg, res, iw, w, mem);
 }}
-static void start(const double *target)
+LINKAGE void start(const real *target)
 {{
     mem = {name}_checkout();
     (void)answer_to(target);
     (void)answer_to(target);
 }}
 """
-    return build(title, contender, folder / f"{name}.c", samples.axes)
+
+
+def build_peer(title: str, function: ca.Function, samples: Samples, folder: Path) -> Program:
+    """CasADi's C of `function`, built like ours. Raises RuntimeError or Disagreement where that is not possible."""
+    text = contender(function, samples, folder).replace("LINKAGE", "static")
+    return build(title, text, folder / f"{function.name()}.c", samples.axes)
 
 
 def _braces(values: np.ndarray) -> str:

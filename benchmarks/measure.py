@@ -38,6 +38,27 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Count:
+    """Instructions of the longest call, ours and the peer's; `aim`: what ours should not exceed."""
+
+    what: str
+    ours: int
+    peer_name: str
+    peer: int
+    aim: int | None = None
+
+    @property
+    def held(self) -> bool | None:
+        """Whether the aim holds; None without one."""
+        return None if self.aim is None else self.ours <= self.aim
+
+    def cells(self) -> tuple[str, ...]:
+        """One text per column of HEADER."""
+        aim = "" if self.aim is None else f"<= {self.aim} {'ok' if self.held else 'MISSED'}"
+        return self.what, str(self.ours), self.peer_name, str(self.peer), f"{self.ours / self.peer:.3g}", "exact", aim
+
+
+@dataclass(frozen=True)
 class Note:
     """A remark between the measurements, such as a peer that is not available."""
 
@@ -70,9 +91,9 @@ def duration(seconds: float) -> str:
     return f"{seconds / scale:.3g} {unit}"
 
 
-def print_table(results: list[Line | Note]) -> None:
+def print_table(results: list[Line | Count | Note]) -> None:
     """Aligned columns on standard output; notes below."""
-    rows = [HEADER, *(r.cells() for r in results if isinstance(r, Line))]
+    rows = [HEADER, *(r.cells() for r in results if not isinstance(r, Note))]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
     right = {1, 3, 4}
     for row in rows:

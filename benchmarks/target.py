@@ -1,0 +1,106 @@
+"""Instructions a sample on emulated microcontrollers: the generated C against CasADi's C for the same sample."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from benchmarks import casadi_c
+from benchmarks.measure import Count, Note
+from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
+from ctrlgen.errors import ToolError
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.folder import CFolder, generate
+from ctrlgen.verification.cores import BASE, CORES, INSTALL, Core, cross_compile, cross_compilers
+from ctrlgen.verification.emulation import MISSING, Machine, available
+
+COMPILER = "arm-none-eabi-gcc"  # CasADi's C calls sqrt, which needs a library
+TOLERANCE = {Real.DOUBLE: casadi_c.TOLERANCE, Real.FLOAT: 2e-5}  # of scaled residuals: what single precision can meet
+OFF = {Real.DOUBLE: NEAR, Real.FLOAT: 10 * NEAR_FLOAT}  # m: a peer's answer may be; ours is held to less by `online`
+PEERS = {casadi_c.NEWTON: casadi_c.newton, casadi_c.SQP: casadi_c.sqp}
+# What makes single precision of CasADi's C with casadi_real = float: as generated it computes in double.
+REPAIRED = "#include <math.h>\n" + "".join(f"#define {f} {f}f\n" for f in ("sqrt", "fabs", "fmin", "fmax"))
+LIBRARIES = ("-Wl,--start-group", "-lm", "-lc", "-lnosys", "-lgcc", "-Wl,--end-group")
+WITHIN, AT_WORST = 700, 6000  # instructions of ours in float on a Cortex-M4F
+
+
+def run(repeat: int) -> list[Count | Note]:
+    """The longest call on the circle, and of ours on jumps beyond every limit. Counts are exact: `repeat` changes nothing."""
+    if not available() or COMPILER not in cross_compilers():
+        return [Note(f"target: not run; {MISSING}; {INSTALL[COMPILER]}")]
+    samples = Samples()
+    found: list[Count | Note] = []
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-bench-") as name:
+        scratch = Path(name)
+        c = generate(samples.scenario, samples.model, scratch / "c", samples.solution)
+        for core, real in ((CORES[0], Real.FLOAT), (CORES[1], Real.DOUBLE)):
+            where, single = f"{core.name}, {real.value}", real is Real.FLOAT
+            circle, jumps = _ours(samples, c, core, real, scratch)
+            for title, make in PEERS.items():
+                for repaired in (True, False) if single else (False,):
+                    how = f"{title}, {'repaired' if repaired else 'as generated'}" if single else title
+                    try:
+                        theirs = _peer(samples, make, core, real, repaired, scratch)
+                    except (RuntimeError, ToolError, Disagreement) as error:
+                        found.append(Note(f"{where}: {how}: not available: {' '.join(str(error).split())[:300]}"))
+                    else:
+                        aim = WITHIN if single else None
+                        found.append(Count(f"online C, circle, {where}", circle, how, theirs, aim))
+            aim = AT_WORST if single else None
+            found.append(Count(f"online C, jumps beyond limits, {where}", jumps, "online C, circle", circle, aim))
+    return found
+
+
+def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -> tuple[int, int]:
+    """Instructions of the longest step on the circle, and on the jumps."""
+    name, n = c.online[real], samples.axes
+    program = scratch / f"{name}.elf"
+    cross_compile(COMPILER, core, [c.path / f"{name}.c"], c.path, f"{name}_init", program)
+    machine = Machine(core, program)
+    state, target, out = (machine.reserve(count, real) for count in (2 * n, samples.command.shape[1], 3 * n))
+
+    def call(function: str, wanted: np.ndarray) -> int:
+        machine.write(target, wanted, real)
+        return machine.call(f"{name}_{function}", state, target, out)[1]
+
+    machine.call(f"{name}_init", state)
+    call("settle", samples.command[-1])
+    return max(call("step", t) for t in samples.command), max(call("step", t) for t in samples.jumps())
+
+
+def _peer(
+    samples: Samples, make: Callable[..., ca.Function], core: Core, real: Real, repaired: bool, scratch: Path
+) -> int:
+    """Instructions of the longest call on the circle, answers checked. Raises what it raises where it cannot be built or run."""
+    function = make(samples, TOLERANCE[real])
+    folder = scratch / f"{function.name()}_{real.suffix}_{repaired}"
+    folder.mkdir()
+    text = casadi_c.contender(function, samples, folder, real).replace("LINKAGE", "")
+    source, program = folder / "contender.c", folder / "contender.elf"
+    source.write_text(
+        text + "const real *displacement(int i);\nconst real *displacement(int i) { return &y[now][i]; }\n"
+    )
+    (folder / "repaired.h").write_text(REPAIRED)
+    single = ("-fsingle-precision-constant", "-include", str(folder / "repaired.h")) if repaired else ()
+    more = (*single, "-w", f"-Wl,-Ttext={BASE:#x}", *LIBRARIES)
+    cross_compile(COMPILER, core, [source, folder / f"{function.name()}.c"], folder, "answer_to", program, more)
+    machine = Machine(core, program)
+    target = machine.reserve(samples.command.shape[1], real)
+    model, n = samples.model, samples.axes
+    pose = ca.Function("pose", [model.x, model.z], [model.signals[samples.scenario.file.follow].expr])
+    machine.write(target, samples.command[-1], real)
+    machine.call("start", target)
+    longest = 0
+    for k, wanted in enumerate(samples.command):
+        machine.write(target, wanted, real)
+        longest = max(longest, machine.call("answer_to", target)[1])
+        if k % 100 == 0:
+            y = machine.read(machine.call("displacement", 0)[0], n, real).astype(float)
+            off = np.abs(pose(model.rest, y * model.z_scale).full().ravel() - wanted)[3:].max()
+            if not off <= OFF[real]:
+                raise Disagreement(f"{1e9 * off:.3g} nm off its target")
+    return longest
