@@ -23,6 +23,8 @@ SPIKE = 7.0
 MOST_SPIKES = 0.01
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
+NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
+HALVINGS = 6  # of a record's start that does not keep what its slopes promise
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
 
 
@@ -72,11 +74,24 @@ class Fitter:
         self.to_fit = [r for r in recording.records if r.role == "fit"]
         self.held = [r for r in recording.records if r.role == "hold_out"]
 
-    def fit(self, structure: Structure, theta: np.ndarray | None = None, steps: int = STEPS) -> Fit:
-        """The optimum from `theta`, or from the structure's own start."""
+    def fit(
+        self, structure: Structure, theta: np.ndarray | None = None, steps: int = STEPS, nested: Fit | None = None
+    ) -> Fit:
+        """The optimum from `theta`, or from the structure's own start.
+
+        What ends above a fit `nested` in it began too far away: it begins again there, its new causes all but off.
+        """
         problem = _Problem(self, structure)
         begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)])
-        return problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
+        found = problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
+        if nested is None or found.objective <= nested.objective:
+            return found
+        for i, u in enumerate(structure.unknowns):
+            if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
+                begin[i] = u.nominal + NEAR_OFF * (begin[i] - u.nominal)
+        begin[problem.k :] = np.concatenate(nested.starts)
+        again = problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
+        return min(found, again, key=lambda fit: fit.objective)
 
     def mark_spikes(self, fit: Fit) -> str:
         """Marks as not valid what stands out alone, for one or two samples, from what `fit` leaves over; says how many.
@@ -139,13 +154,22 @@ class Fitter:
             return response.outputs(record, fit.theta)
         sizes = _start_sizes(response)
         y, slopes = response.sensitivities(record, fit.theta, start)  # close to linear in what a record starts with
-        white = self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
+        white = self._white(record, y)
         J = self.noise.whiten(slopes[:, :, len(fit.theta) :], record.valid).reshape(len(white), len(start)) * sizes
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
             return y
         with_prior = np.vstack([J, np.eye(len(start))])
-        start = sizes * np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(start))]), rcond=None)[0]
-        return response.outputs(record, fit.theta, start)
+        step = np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(start))]), rcond=None)[0]
+        for _ in range(HALVINGS):  # but not where something has to be crossed before anything moves
+            found = response.outputs(record, fit.theta, sizes * step)
+            left = self._white(record, found)
+            if left @ left + step @ step <= white @ white:
+                return found
+            step = step / 4
+        return y
+
+    def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
+        return self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
 
     def whitened(self, fit: Fit, record: Record) -> np.ndarray:
         """The whitened residual (n, n_y) on any record; zero where a sample is not usable."""

@@ -80,13 +80,14 @@ class Searcher:
         structure: Structure,
         cause: Hypothesis | None = None,
         steps: int = TRIAL_STEPS,
+        nested: Fit | None = None,
     ) -> Trial:
-        """Fits one structure and judges it on the held-out records."""
+        """Fits one structure, which contains that of `nested`, and judges it on the held-out records."""
         key = frozenset(structure.causes)
         known, done = self.known.get(key, (None, 0))
         if known is not None and done >= steps:
             return replace(known, cause=cause)
-        fit = self.fitter.fit(structure, steps=steps)
+        fit = self.fitter.fit(structure, steps=steps, nested=nested)
         if known is not None and known.fit.objective <= fit.objective:
             self.known[key] = (known, steps)
             return replace(known, cause=cause)
@@ -166,13 +167,13 @@ class Searcher:
         trials = []
         for s in suspects:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
-            trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis)
+            trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis, current.fit)
         return tuple(sorted(trials, key=lambda t: t.total))
 
-    def _attempt(self, structure: Structure, cause: Hypothesis) -> list[Trial]:
+    def _attempt(self, structure: Structure, cause: Hypothesis, nested: Fit) -> list[Trial]:
         """The trial; none where no device can be built with the numbers suspected."""
         try:
-            return [self.trial(structure, cause)]
+            return [self.trial(structure, cause, nested=nested)]
         except ValueError:
             return []
 
@@ -193,7 +194,7 @@ class Searcher:
                     used[s.hypothesis] = used.get(s.hypothesis, 0) + 1
                     structure = structure.with_cause(s.hypothesis, s.start)
                 self.step("trying " + ", ".join(f"{s.hypothesis.effect} at {s.hypothesis.location}" for s in suspects))
-                trials += self._attempt(structure, suspects[-1].hypothesis)
+                trials += self._attempt(structure, suspects[-1].hypothesis, current.fit)
                 tried += 1
             best = max([best, *(current.fit.objective - t.fit.objective for t in trials if self._meant(t))])
         return trials
@@ -265,9 +266,10 @@ class Searcher:
 
 
 def _cooled(fit: Fit) -> Structure:
-    """The structure with its causes starting where the fit ended."""
+    """The structure with its causes and the device's own numbers starting where the fit ended."""
     s = fit.structure
-    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))))
+    own = {u.path: float(v) for u, v in zip(s.unknowns, fit.theta, strict=True) if u.cause is None}
+    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))), own)
 
 
 def _warm(fit: Fit, cause: Hypothesis, start: dict[str, float]) -> Structure:
