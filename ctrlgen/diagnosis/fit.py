@@ -21,9 +21,13 @@ NEGLIGIBLE = 0.01
 LITTLE = 1.3  # times the noise: what leaves more is not noise
 SPIKE = 7.0
 MOST_SPIKES = 0.01
+WIDEST_SPIKE = 2  # samples
+BESIDE = 0.3  # of a spike: what its neighbours have at most
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
+DECADES = 100.0  # ratio of the bounds from which on a shape is searched by its logarithm
+LONGEST_STEP = 1.5  # of a logarithm
 HALVINGS = 6  # of a record's start that does not keep what its slopes promise
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
 
@@ -83,14 +87,14 @@ class Fitter:
         """
         problem = _Problem(self, structure)
         begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)])
-        found = problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
+        found = problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
         if nested is None or found.objective <= nested.objective:
             return found
         for i, u in enumerate(structure.unknowns):
             if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
                 begin[i] = u.nominal + NEAR_OFF * (begin[i] - u.nominal)
         begin[problem.k :] = np.concatenate(nested.starts)
-        again = problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
+        again = problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
         return min(found, again, key=lambda fit: fit.objective)
 
     def mark_spikes(self, fit: Fit) -> str:
@@ -191,6 +195,11 @@ def _alone(left: np.ndarray) -> np.ndarray:
     )
     found = np.abs(rough) > near
     found[:, found.mean(axis=0) > MOST_SPIKES] = False
+    for column, size in zip(found.T, np.abs(rough).T, strict=True):
+        for run in np.split(np.flatnonzero(column), np.flatnonzero(np.diff(np.flatnonzero(column)) > 1) + 1):
+            beside = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)] if len(run) else []
+            if len(run) > WIDEST_SPIKE or (beside and max(beside) > BESIDE * size[run].max()):
+                column[run] = False  # a mass that is pushed moves before and after too
     return found
 
 
@@ -219,6 +228,7 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
         H, g = H[np.ix_(open_, open_)], gradient[open_]
         step = np.zeros_like(x)
         step[open_] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]
+        step = np.clip(step, -problem.most, problem.most)
         promised = -(g @ step[open_] + 0.5 * step[open_] @ H @ step[open_])
         if promised < NEGLIGIBLE:
             break
@@ -234,7 +244,10 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
 
 
 class _Problem:
-    """Residual and slopes of one structure, in numbers of order one."""
+    """Residual and slopes of one structure, in numbers of order one: `inner` ones.
+
+    A shape that may lie anywhere in decades (a time constant, a width) is searched by its logarithm.
+    """
 
     def __init__(self, fitter: Fitter, structure: Structure) -> None:
         self.fitter, self.structure = fitter, structure
@@ -245,6 +258,27 @@ class _Problem:
         self.k = len(structure.unknowns)
         self.scale = np.concatenate([[u.size for u in structure.unknowns], *self.sizes]).astype(float)
         self.at: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.log = np.array(
+            [
+                u.cause is not None and not u.amplitude and u.low > 0 and u.high > DECADES * u.low
+                for u in structure.unknowns
+            ]
+            + [False] * self.n_starts,
+            dtype=bool,
+        )
+        self.most = np.where(self.log, LONGEST_STEP, np.inf)
+
+    def inner(self, values: np.ndarray) -> np.ndarray:
+        """Numbers of order one from SI."""
+        found = values / self.scale
+        found[self.log] = np.log(values[self.log])
+        return found
+
+    def outer(self, inner: np.ndarray) -> np.ndarray:
+        """SI from numbers of order one."""
+        found = inner * self.scale
+        found[self.log] = np.exp(inner[self.log])
+        return found
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -254,12 +288,13 @@ class _Problem:
         high = np.concatenate(
             [[u.high for u in self.structure.unknowns], np.full(self.n_starts, 1e3) * self.scale[self.k :]]
         )
-        return low / self.scale, high / self.scale
+        return self.inner(low), self.inner(high)
 
     def _evaluate(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.at is not None and np.array_equal(self.at[0], scaled):
             return self.at
-        values, k, noise = scaled * self.scale, self.k, self.fitter.noise
+        values, k, noise = self.outer(scaled), self.k, self.fitter.noise
+        by_inner = np.where(self.log, values, self.scale)
         rows, slopes, first = [], [], k
         for record, sizes in zip(self.records, self.sizes, strict=True):
             response = self.responses[record.sample_time, record.linear]
@@ -272,7 +307,7 @@ class _Problem:
             W = noise.whiten(np.clip(np.nan_to_num(Y), -FAR, FAR), record.valid).reshape(len(white), Y.shape[2])
             J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
             rows.append(white)
-            slopes.append(J * self.scale)
+            slopes.append(J * by_inner)
         self.n_readings = sum(map(len, rows))
         prior = [(i, u) for i, u in enumerate(self.structure.unknowns) if u.sd]
         rows.append(np.array([(values[i] - u.nominal) / u.sd for i, u in prior]))
@@ -292,12 +327,15 @@ class _Problem:
         """Residual and slopes."""
         return self._evaluate(scaled)[1:]
 
-    def result(self, values: np.ndarray) -> Fit:
-        _, rows, J = self._evaluate(values / self.scale)
+    def result(self, inner: np.ndarray) -> Fit:
+        """The fit at an optimum."""
+        _, rows, J = self._evaluate(inner)
+        values = self.outer(inner)
         starts = np.split(values[self.k :], np.cumsum([len(s) for s in self.sizes])[:-1])
         readings = rows[: self.n_readings]
         usable = sum(int(self.fitter.noise.usable(r.valid).sum()) for r in self.records)
         return Fit(
-            self.structure, values[: self.k], tuple(starts), float(readings @ readings), usable, rows, J / self.scale,
+            self.structure, values[: self.k], tuple(starts), float(readings @ readings), usable, rows,
+            J / np.where(self.log, values, self.scale),
             float(rows[self.n_readings :] @ rows[self.n_readings :]),
         )  # fmt: skip

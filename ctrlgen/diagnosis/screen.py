@@ -18,7 +18,7 @@ from scipy.signal import find_peaks
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.slopes import Column, Slopes, Sums
+from ctrlgen.diagnosis.slopes import Column, Peaks, Slopes, Sums, peaks
 from ctrlgen.diagnosis.together import Suspect, Together
 
 OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
@@ -52,6 +52,7 @@ class Screen:
 
     def __init__(self, fitter: Fitter, hypotheses: list[Hypothesis], seed: int = 0) -> None:
         self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
+        self.peaks: Peaks | None = None
 
     def run(self, fit: Fit) -> Screened:
         """All hypotheses that the fit does not contain yet."""
@@ -60,8 +61,10 @@ class Screen:
         sums = Sums()
         columns: list[Column] = []
         first, lines = 0, self._lines(fit)
+        if self.peaks is None:
+            self.peaks = peaks(self.fitter, fit)
         for index, record in enumerate(self.fitter.to_fit):
-            slopes = Slopes(self.fitter, fit, record, open_, lines)
+            slopes = Slopes(self.fitter, fit, record, open_, lines, self.peaks)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)

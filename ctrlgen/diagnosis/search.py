@@ -26,6 +26,7 @@ WORTHWHILE = (
 LEARNINGS = 8  # of the noise from what is left, at most
 TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
 TRIAL_STEPS = 8
+ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
@@ -108,7 +109,8 @@ class Searcher:
             if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind]:
                 break
             trials = self._try(current, self._conspicuous(current, screened))
-            trials = tuple(sorted((*trials, *self._together(current, screened, trials)), key=lambda t: t.total))
+            trials = (*trials, *self._together(current, screened, trials))
+            trials = tuple(sorted(self._ended(current, trials), key=lambda t: t.total))
             rounds.append(Round(screened, trials, current))
             better = [t for t in trials if self._justified(current, t)]
             if not better:
@@ -132,6 +134,12 @@ class Searcher:
     def _polished(self, trial: Trial) -> Trial:
         """The same fit driven to its end; trials stop early."""
         return self.trial(_cooled(trial.fit), trial.cause, steps=40)
+
+    def _ended(self, current: Trial, trials: tuple[Trial, ...]) -> tuple[Trial, ...]:
+        """The trials, those driven to their end that leave least on the records to fit but are not justified so early."""
+        best = sorted((t for t in trials if self._meant(t)), key=lambda t: t.fit.objective)[:ENDED]
+        early = [t for t in best if t.fit.objective < current.fit.objective and not self._justified(current, t)]
+        return tuple(self._polished(t) if t in early else t for t in trials)
 
     def _measured(self, trial: Trial) -> Trial:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""

@@ -18,7 +18,10 @@ from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links
 from ctrlgen.diagnosis.probe import with_probes
 from ctrlgen.diagnosis.response import Response
+from ctrlgen.effect import Place
 from ctrlgen.recording import Record
+
+Peaks = dict[tuple[Place, int], dict[str, float]]  # of the signal ("channel") and of the displacement ("travel") [SI]
 
 BLOCK = 5000  # samples worked on at a time
 SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
@@ -35,6 +38,27 @@ class Column:
     size: float
     one_sided: int
     range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
+
+
+def peaks(fitter: Fitter, fit: Fit) -> Peaks:
+    """How far the signals at every place go in the records to fit."""
+    found: Peaks = {}
+    links = nominal_links(fit.structure.device)
+    responses = fit.structure.responses(fitter.recording, fitter.cache)
+    places = [(place, i) for place in (Place.DRIVE, Place.FORCE) for i in range(len(channels(links, place)))]
+    for record, start in zip(fitter.to_fit, fit.starts, strict=True):
+        response = responses[record.sample_time, record.linear]
+        m, n = response.model, len(record.time)
+        seen = [m.seen(place, i, None, {}) for place, i in places]
+        rows = m.closed(ca.vertcat(*(ca.vertcat(s.value, s.displacement) for s in seen)))
+        f = ca.Function("signals", [ca.vertcat(m.x, m.z), m.u, response.ambient, m.p], [rows])
+        S = response.motion(record, fit.theta, start if len(start) else None)[0]
+        values = f.map(n)(S.T, record.drive.T, response._ambients(record)[None, :], np.tile(fit.theta[:, None], (1, n)))
+        most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, 2)
+        for where, row in zip(places, most, strict=True):
+            old = found.get(where, {"channel": 0.0, "travel": 0.0})
+            found[where] = {"channel": max(old["channel"], row[0]), "travel": max(old["travel"], row[1])}
+    return found
 
 
 class Sums:
@@ -62,9 +86,10 @@ class Slopes:
     """The slopes of the readings by every hypothesis' amplitude on one record."""
 
     def __init__(
-        self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis], lines: tuple[float, ...]
+        self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis], lines: tuple[float, ...],
+        peaks: Peaks,
     ) -> None:
-        self.fitter, self.fit, self.record, self.lines = fitter, fit, record, lines
+        self.fitter, self.fit, self.record, self.lines, self.peaks = fitter, fit, record, lines, peaks
         device = fit.structure.described
         probed, probes = with_probes(device, nominal_links(fit.structure.device))
         self.numbers = [h for h in hypotheses if h.effect == PARAMETER]
@@ -105,7 +130,7 @@ class Slopes:
             low, high = (where.si(b, amplitude) for b in amplitude.bounds)
             off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
             side = 1 if off <= low else -1 if off >= high else 0
-            for shape in h.shapes(where, self.lines):
+            for shape in h.shapes(where, self.lines, self.peaks.get((law.place, at[0][0]))):
                 for i, other in at:
                     m_states = {s.name: ca.SX.sym(f"m{len(states)}_{s.name}") for s in law.states}
                     a = ca.SX.sym("a")
