@@ -146,6 +146,9 @@ class Effect:
     partner_unit: ClassVar[str | None] = None
     several: ClassVar[bool] = False  # may act more than once at one place, as harmonics do
     active: ClassVar[bool] = False  # may put energy into the stage
+    rarity: ClassVar[float] = (
+        0.0  # ln of how many times rarer it is than a wrong gain: decides among causes that explain alike
+    )
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 
     def __init__(self, at: str, values: dict[str, Quantity], of: str | None = None) -> None:

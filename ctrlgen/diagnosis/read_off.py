@@ -33,7 +33,11 @@ def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
         values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
         for law in Effect.library.values():
             seen = law.read_off(values) if law.place is Place.SENSOR and law.fits(where) else None
-            if seen is None or seen[1] < NOTICED * fitter.noise.floor[i] or {(law.kind, where.channel), (law.kind, "all")} & known:
+            if (
+                seen is None
+                or seen[1] < NOTICED * fitter.noise.floor[i]
+                or {(law.kind, where.channel), (law.kind, "all")} & known
+            ):
                 continue
             parameters = {}
             for p in law.params:

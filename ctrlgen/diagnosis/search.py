@@ -1,8 +1,9 @@
 """Steps 7 and 8: fit the suspects jointly with the device, add the one that explains most, drop what is not needed, swap.
 
 Structures are compared by T = objective on the records to fit + BIC's price of their numbers + whitened squares on the
-held-out records, where nothing was fitted. A cause is added only if the record shows it beyond what chance does
-anywhere among all hypotheses, if it is material (a tenth of the noise), and if the held-out records gain.
+held-out records, where nothing was fitted, + twice the rarity of their causes: among equals the plainer one is named.
+A cause is added only if the record shows it beyond what chance does anywhere among all hypotheses, if it is material (a
+tenth of the noise), and if the held-out records gain.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
 
@@ -94,6 +95,7 @@ class Searcher:
             return replace(known, cause=cause)
         held, _ = self.fitter.held_out(fit)
         price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
+        price += 2 * sum(c.law.rarity for c in structure.causes if c.effect != PARAMETER)
         found = Trial(fit, held, fit.objective + price + held, cause)
         self.known[key] = (found, steps)
         return found

@@ -86,7 +86,12 @@ class Slopes:
     """The slopes of the readings by every hypothesis' amplitude on one record."""
 
     def __init__(
-        self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis], lines: tuple[float, ...],
+        self,
+        fitter: Fitter,
+        fit: Fit,
+        record: Record,
+        hypotheses: list[Hypothesis],
+        lines: tuple[float, ...],
         peaks: Peaks,
     ) -> None:
         self.fitter, self.fit, self.record, self.lines, self.peaks = fitter, fit, record, lines, peaks

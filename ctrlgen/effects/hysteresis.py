@@ -21,7 +21,7 @@ class Hysteresis(Effect):
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
         Param("reach", "travel", (1e-3, 5.0), "travel at which all slip", grid=(0.03, 0.1, 0.3, 1.0, 2.0)),
-        Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones", grid=(0.0, 1.0)),
+        Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones", grid=(0.5,)),
     )
     states = (
         *(State(f"play{j}", "travel", 1.0, stepped=True) for j in range(1, ELEMENTS + 1)),

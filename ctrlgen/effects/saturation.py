@@ -17,7 +17,12 @@ class Saturation(Effect):
     params = (
         Param("share", "1", (0.0, 1.5), "1 where nothing above the level is delivered", off=0.0),
         Param(
-            "level", "channel", (0.01, 1.0), "drive that is not exceeded", grid=(0.2, 0.4, 0.6, 0.8, 0.9, 0.97), level=True,
+            "level",
+            "channel",
+            (0.01, 1.0),
+            "drive that is not exceeded",
+            grid=(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
+            level=True,
         ),
     )
 
