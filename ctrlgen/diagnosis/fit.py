@@ -26,7 +26,6 @@ BESIDE = 0.3  # of a spike: what its neighbours have at most
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
-DECADES = 100.0  # ratio of the bounds from which on a shape is searched by its logarithm
 LONGEST_STEP = 1.5  # of a logarithm
 HALVINGS = 6  # of a record's start that does not keep what its slopes promise
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
@@ -246,7 +245,7 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
 class _Problem:
     """Residual and slopes of one structure, in numbers of order one: `inner` ones.
 
-    A shape that may lie anywhere in decades (a time constant, a width) is searched by its logarithm.
+    A time constant may lie anywhere in decades, and is searched by its logarithm.
     """
 
     def __init__(self, fitter: Fitter, structure: Structure) -> None:
@@ -259,10 +258,7 @@ class _Problem:
         self.scale = np.concatenate([[u.size for u in structure.unknowns], *self.sizes]).astype(float)
         self.at: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.log = np.array(
-            [
-                u.cause is not None and not u.amplitude and u.low > 0 and u.high > DECADES * u.low
-                for u in structure.unknowns
-            ]
+            [u.cause is not None and not u.amplitude and u.unit == "s" and u.low > 0 for u in structure.unknowns]
             + [False] * self.n_starts,
             dtype=bool,
         )

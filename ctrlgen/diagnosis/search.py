@@ -29,6 +29,7 @@ TRIALS = 6  # suspects fitted a round, and as many sets of each size; three time
 TRIAL_STEPS = 8
 ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
+SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
 ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
@@ -95,7 +96,7 @@ class Searcher:
             return replace(known, cause=cause)
         held, _ = self.fitter.held_out(fit)
         price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
-        price += 2 * sum(c.law.rarity for c in structure.causes if c.effect != PARAMETER)
+        price += 2 * _rarity(structure)
         found = Trial(fit, held, fit.objective + price + held, cause)
         self.known[key] = (found, steps)
         return found
@@ -117,7 +118,7 @@ class Searcher:
             better = [t for t in trials if self._justified(current, t)]
             if not better:
                 break
-            current = self._prune(self._swap(self._polished(better[0])))
+            current = self._prune(self._swap(self._polished(self._plainest(better))))
             if frozenset(current.fit.structure.causes) in visited:
                 break
             visited.add(frozenset(current.fit.structure.causes))
@@ -136,6 +137,19 @@ class Searcher:
     def _polished(self, trial: Trial) -> Trial:
         """The same fit driven to its end; trials stop early."""
         return self.trial(_cooled(trial.fit), trial.cause, steps=40)
+
+    def _slack(self, trial: Trial) -> float:
+        """The difference of T that says nothing where a structure leaves much over: what is left is not noise."""
+        return SLACK * max(trial.total - self.n_fit - self.n_held, 0.0)
+
+    def _plainest(self, better: list[Trial]) -> Trial:
+        """The best trial, or one of as few numbers that explains as much to the slack and is less rare."""
+        first = better[0]
+        numbers = len(first.fit.structure.unknowns)
+        alike = [
+            t for t in better if t.total < first.total + self._slack(first) and len(t.fit.structure.unknowns) <= numbers
+        ]
+        return min(alike, key=lambda t: (_rarity(t.fit.structure), t.total), default=first)
 
     def _ended(self, current: Trial, trials: tuple[Trial, ...]) -> tuple[Trial, ...]:
         """The trials, those driven to their end that leave least on the records to fit but are not justified so early."""
@@ -240,7 +254,7 @@ class Searcher:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
         for k in range(len(current.fit.structure.causes) - 1):
             for rival in self._replacements(current, k):
-                if rival.total < current.total - RIVAL:
+                if rival.total < current.total - max(RIVAL, self._slack(current)):
                     current = rival
         return current
 
@@ -273,6 +287,10 @@ class Searcher:
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
         return tuple(t for t in self._replacements(current, k) if t.total < current.total + RIVAL)
+
+
+def _rarity(structure: Structure) -> float:
+    return sum(c.law.rarity for c in structure.causes if c.effect != PARAMETER)
 
 
 def _cooled(fit: Fit) -> Structure:

@@ -6,8 +6,8 @@ from ctrlgen.effect import Effect, Param, Place, State
 class LowPass(Effect):
     """tau dw/dt = v, tau dv/dt = y - w - 2 D v, Delta y = g (w - y): g = 1 a second-order filter, below it a slow part only.
 
-    D below one rings, D = 1/sqrt 2 is Butterworth's, a large D is one pole with time constant 2 D tau. The sampling must
-    resolve tau.
+    D below one rings, D = 1/sqrt 2 is Butterworth's, a large D is one pole with time constant 2 D tau. Holds where
+    the sampling resolves tau.
     """
 
     place = Place.SENSOR

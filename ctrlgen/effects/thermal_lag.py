@@ -6,8 +6,8 @@ from ctrlgen.effect import Effect, Param, Place, State
 class ThermalLag(Effect):
     """dv/dt = (u - v)/tau, dw/dt = (v - w)/(r tau), Delta u = g (w - u): a share g of the drive acts late.
 
-    Two thermal masses in a row, the second smaller; r = 0.01 is one mass alone, a larger one the rounded onset of a
-    long body. A heated actuator has its own time constant, and `second_pole` for another one.
+    Holds for two thermal masses in a row, the second smaller; r = 0.01 is one mass alone, a larger one the rounded onset
+    of a long body. A heated actuator has its own time constant, and `second_pole` for another one.
     """
 
     place = Place.DRIVE
