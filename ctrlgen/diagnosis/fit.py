@@ -10,19 +10,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from ctrlgen.diagnosis.noise import Noise, autoregression
+from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.recording import Record, Recording
 
 STEPS = 40
 NEGLIGIBLE = 0.01
 LITTLE = 1.3  # times the noise: what leaves more is not noise
-SPIKE = 7.0
-MOST_SPIKES = 0.01
-WIDEST_SPIKE = 2  # samples
-BESIDE = 0.3  # of a spike: what its neighbours have at most
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
@@ -109,7 +105,7 @@ class Fitter:
                 records.append(record)
                 continue
             left = np.where(record.valid, record.observed - self.predicted(fit, record), 0.0)
-            spikes = record.valid & _alone(np.nan_to_num(left))
+            spikes = record.valid & alone(np.nan_to_num(left))
             count += int(spikes.sum())
             records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
         self.recording = replace(self.recording, records=tuple(records))
@@ -186,22 +182,6 @@ class Fitter:
         return total, int(sum(self.noise.usable(r.valid).sum() for r in self.held))
 
 
-def _alone(left: np.ndarray) -> np.ndarray:
-    """Samples (n, n_y) more than `SPIKE` robust deviations from the median of their neighbours; never over one percent."""
-    rough = left - median_filter(left, size=(7, 1), mode="nearest")
-    near = SPIKE * np.maximum(
-        1.4826 * np.median(np.abs(rough), axis=0), median_filter(np.abs(rough), size=(51, 1)) * 1.4826
-    )
-    found = np.abs(rough) > near
-    found[:, found.mean(axis=0) > MOST_SPIKES] = False
-    for column, size in zip(found.T, np.abs(rough).T, strict=True):
-        for run in np.split(np.flatnonzero(column), np.flatnonzero(np.diff(np.flatnonzero(column)) > 1) + 1):
-            beside = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)] if len(run) else []
-            if len(run) > WIDEST_SPIKE or (beside and max(beside) > BESIDE * size[run].max()):
-                column[run] = False  # a mass that is pushed moves before and after too
-    return found
-
-
 def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), np.clip(values, -WORST, WORST), WORST)
 
@@ -227,7 +207,7 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
         H, g = H[np.ix_(open_, open_)], gradient[open_]
         step = np.zeros_like(x)
         step[open_] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]
-        step = np.clip(step, -problem.most, problem.most)
+        step /= max(1.0, float(np.max(np.abs(step) / problem.most)))
         promised = -(g @ step[open_] + 0.5 * step[open_] @ H @ step[open_])
         if promised < NEGLIGIBLE:
             break
