@@ -266,7 +266,7 @@ def test_a_shape_without_amplitude_is_not_bounded():
     fitter = axis_fitter(n=1500)
     fit = fitter.fit(Structure(AXIS).with_cause(CREEP, {"gain": 1e-4, "tau": 0.3}))
     found = {p.parameter: p for p in profiles(fitter, fit)}
-    assert found["tau"].shape != BOUNDED
+    assert found["tau"].shape != BOUNDED and found["tau"].verified
 
 
 def test_noise_with_memory_taken_as_white_widens_the_interval():

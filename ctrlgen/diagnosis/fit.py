@@ -256,6 +256,10 @@ class _Problem:
         found[self.log] = np.exp(inner[self.log])
         return found
 
+    def by_inner(self, values: np.ndarray) -> np.ndarray:
+        """How SI numbers change with those of order one."""
+        return np.where(self.log, values, self.scale)
+
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low = np.concatenate(
@@ -270,7 +274,7 @@ class _Problem:
         if self.at is not None and np.array_equal(self.at[0], scaled):
             return self.at
         values, k, noise = self.outer(scaled), self.k, self.fitter.noise
-        by_inner = np.where(self.log, values, self.scale)
+        by_inner = self.by_inner(values)
         rows, slopes, first = [], [], k
         for record, sizes in zip(self.records, self.sizes, strict=True):
             response = self.responses[record.sample_time, record.linear]
@@ -312,6 +316,6 @@ class _Problem:
         usable = sum(int(self.fitter.noise.usable(r.valid).sum()) for r in self.records)
         return Fit(
             self.structure, values[: self.k], tuple(starts), float(readings @ readings), usable, rows,
-            J / np.where(self.log, values, self.scale),
+            J / self.by_inner(values),
             float(rows[self.n_readings :] @ rows[self.n_readings :]),
         )  # fmt: skip
