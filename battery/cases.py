@@ -159,7 +159,7 @@ def _place(name: str, rng: Rng, bench: axis_cases.Bench, ruler: Ruler, low: floa
 
 def _confusable(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str, Any]]:
     """Records on which the truth and its rivals give the same output after a refit, to below 0.3 noise."""
-    for _ in range(40):
+    for _ in range(200):
         bench, pair = _inseparable(order.wanted[0], rng, order.seconds)
         ruler = _ruler(bench)
         order_of = list(pair) if order.wanted[0] == "commuting" else rng.permutation(pair).tolist()

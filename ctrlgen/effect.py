@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
+import numpy as np
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -40,7 +41,8 @@ class Param:
     In `unit` the word `channel` stands for the unit of the signal the effect acts on, `travel` for that of the stage
     displacement and `partner` for that of the other channel of a pair; `bounds` and `grid` then count in typical
     sizes of those signals, so that one law serves micrometres and degrees. `grid` are the values tried when a shape
-    is unknown and the effect is only suspected.
+    is unknown and the effect is only suspected. A `level` is where a signal meets a limit: its grid counts in peaks of
+    that signal in the records at hand.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Param:
     off: float | None = None
     grid: tuple[float, ...] = ()
     expected: tuple[float, float] | None = None
+    level: bool = False
 
     @property
     def relative(self) -> bool:
@@ -143,6 +146,9 @@ class Effect:
     partner_unit: ClassVar[str | None] = None
     several: ClassVar[bool] = False  # may act more than once at one place, as harmonics do
     active: ClassVar[bool] = False  # may put energy into the stage
+    rarity: ClassVar[float] = (
+        0.0  # ln of how many times rarer it is than a wrong gain: decides among causes that explain alike
+    )
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 
     def __init__(self, at: str, values: dict[str, Quantity], of: str | None = None) -> None:
@@ -164,6 +170,12 @@ class Effect:
     def amplitude(cls) -> Param:
         """The parameter that switches the effect off."""
         return next(p for p in cls.params if p.off is not None)
+
+    @classmethod
+    def read_off(cls, readings: np.ndarray) -> tuple[dict[str, float], float] | None:
+        """The parameters [SI] of a sensor's law that raw `readings` (n,) show without any model, and what it does to them,
+        root mean square; None where they do not show it."""
+        return None
 
     @classmethod
     def fits(cls, where: Where) -> bool:

@@ -80,7 +80,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
     monkeypatch.setattr(slopes_module, "BLOCK", 123)
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.to_fit[0]
-    slopes = Slopes(hexapod, fit, record, LAWS, ())
+    slopes = Slopes(hexapod, fit, record, LAWS, (), {})
     white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
     found = slopes.sums(white, J, fit.starts[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
@@ -100,7 +100,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.to_fit[0]
-    slopes = Slopes(hexapod, fit, record, [law], ())
+    slopes = Slopes(hexapod, fit, record, [law], (), {})
     column, start = slopes.columns[-1], np.zeros(len(fit.starts[0]))
     name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
     slope = brute(slopes, start)[:, :, -1]

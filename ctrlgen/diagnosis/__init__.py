@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.evidence import evidence
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses, nominal_links
 from ctrlgen.diagnosis.noise import estimate
+from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.structure import Structure
@@ -64,12 +65,13 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
     found = Searcher(fitter, Screen(fitter, open_, seed), step).run(Structure(device))
     step("judging")
     after = judge(fitter, found.chosen.fit)
-    said = verdict(found, after, bool(noise.known.all()))
+    seen = read_off(fitter, found)
+    said = verdict(found, after, bool(noise.known.all()), bool(seen))
     step("evidence")
     beside = evidence(fitter, found, after.passed, seed)
     return Diagnosis(
         verdict=said,
-        findings=findings(found),
+        findings=(*findings(found), *seen),
         held_out=errors(fitter, found, noise.known),
         adequacy=after,
         where=beside.where,

@@ -92,7 +92,7 @@ class Replicate:
             float(np.clip(value + u.sd * rng.standard_normal(), u.low, u.high)) if u.sd else u.nominal
             for u, value in zip(s.unknowns, self.theta, strict=True)
         )
-        return fitter.fit(_Drawn(s.device, s.causes, s.starts, stated), self.theta).theta
+        return fitter.fit(_Drawn(s.device, s.causes, s.starts, stated=stated), self.theta).theta
 
 
 _COMPILED: dict[str, dict] = {}  # of the one bootstrap at hand: every replicate of it integrates the same expressions

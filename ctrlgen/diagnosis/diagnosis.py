@@ -92,12 +92,12 @@ class Diagnosis:
         return changed(Structure(fit.structure.device, fit.structure.causes, starts).described, own)
 
 
-def verdict(search: Search, after: Adequacy, known: bool) -> str:
-    """consistent | explained | partly | ambiguous | unexplained.
+def verdict(search: Search, after: Adequacy, known: bool, seen: bool = False) -> str:
+    """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
 
     Partly: causes are found, but nothing tells the noise, so that nobody can say whether all is explained.
     """
-    found = search.chosen.fit.structure.causes
+    found = seen or search.chosen.fit.structure.causes
     if not known:
         return (AMBIGUOUS if any(search.rivals) else PARTLY) if found else CONSISTENT
     if not after.passed:

@@ -10,19 +10,20 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from ctrlgen.diagnosis.noise import Noise, autoregression
+from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.recording import Record, Recording
 
 STEPS = 40
 NEGLIGIBLE = 0.01
 LITTLE = 1.3  # times the noise: what leaves more is not noise
-SPIKE = 7.0
-MOST_SPIKES = 0.01
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
+NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
+LONGEST_STEP = 1.5  # of a logarithm
+HALVINGS = 6  # of a record's start that does not keep what its slopes promise
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
 
 
@@ -72,11 +73,24 @@ class Fitter:
         self.to_fit = [r for r in recording.records if r.role == "fit"]
         self.held = [r for r in recording.records if r.role == "hold_out"]
 
-    def fit(self, structure: Structure, theta: np.ndarray | None = None, steps: int = STEPS) -> Fit:
-        """The optimum from `theta`, or from the structure's own start."""
+    def fit(
+        self, structure: Structure, theta: np.ndarray | None = None, steps: int = STEPS, nested: Fit | None = None
+    ) -> Fit:
+        """The optimum from `theta`, or from the structure's own start.
+
+        What ends above a fit `nested` in it began too far away: it begins again there, its new causes all but off.
+        """
         problem = _Problem(self, structure)
         begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)])
-        return problem.result(levenberg_marquardt(problem, begin / problem.scale, steps) * problem.scale)
+        found = problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
+        if nested is None or found.objective <= nested.objective:
+            return found
+        for i, u in enumerate(structure.unknowns):
+            if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
+                begin[i] = u.nominal + NEAR_OFF * (begin[i] - u.nominal)
+        begin[problem.k :] = np.concatenate(nested.starts)
+        again = problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
+        return min(found, again, key=lambda fit: fit.objective)
 
     def mark_spikes(self, fit: Fit) -> str:
         """Marks as not valid what stands out alone, for one or two samples, from what `fit` leaves over; says how many.
@@ -91,7 +105,7 @@ class Fitter:
                 records.append(record)
                 continue
             left = np.where(record.valid, record.observed - self.predicted(fit, record), 0.0)
-            spikes = record.valid & _alone(np.nan_to_num(left))
+            spikes = record.valid & alone(np.nan_to_num(left))
             count += int(spikes.sum())
             records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
         self.recording = replace(self.recording, records=tuple(records))
@@ -139,13 +153,22 @@ class Fitter:
             return response.outputs(record, fit.theta)
         sizes = _start_sizes(response)
         y, slopes = response.sensitivities(record, fit.theta, start)  # close to linear in what a record starts with
-        white = self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
+        white = self._white(record, y)
         J = self.noise.whiten(slopes[:, :, len(fit.theta) :], record.valid).reshape(len(white), len(start)) * sizes
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
             return y
         with_prior = np.vstack([J, np.eye(len(start))])
-        start = sizes * np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(start))]), rcond=None)[0]
-        return response.outputs(record, fit.theta, start)
+        step = np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(start))]), rcond=None)[0]
+        for _ in range(HALVINGS):  # but not where something has to be crossed before anything moves
+            found = response.outputs(record, fit.theta, sizes * step)
+            left = self._white(record, found)
+            if left @ left + step @ step <= white @ white:
+                return found
+            step = step / 4
+        return y
+
+    def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
+        return self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
 
     def whitened(self, fit: Fit, record: Record) -> np.ndarray:
         """The whitened residual (n, n_y) on any record; zero where a sample is not usable."""
@@ -157,17 +180,6 @@ class Fitter:
         """Whitened sum of squares on the held-out records, and the number of usable samples."""
         total = sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)
         return total, int(sum(self.noise.usable(r.valid).sum() for r in self.held))
-
-
-def _alone(left: np.ndarray) -> np.ndarray:
-    """Samples (n, n_y) more than `SPIKE` robust deviations from the median of their neighbours; never over one percent."""
-    rough = left - median_filter(left, size=(7, 1), mode="nearest")
-    near = SPIKE * np.maximum(
-        1.4826 * np.median(np.abs(rough), axis=0), median_filter(np.abs(rough), size=(51, 1)) * 1.4826
-    )
-    found = np.abs(rough) > near
-    found[:, found.mean(axis=0) > MOST_SPIKES] = False
-    return found
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
@@ -195,6 +207,7 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
         H, g = H[np.ix_(open_, open_)], gradient[open_]
         step = np.zeros_like(x)
         step[open_] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]
+        step /= max(1.0, float(np.max(np.abs(step) / problem.most)))
         promised = -(g @ step[open_] + 0.5 * step[open_] @ H @ step[open_])
         if promised < NEGLIGIBLE:
             break
@@ -210,7 +223,10 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
 
 
 class _Problem:
-    """Residual and slopes of one structure, in numbers of order one."""
+    """Residual and slopes of one structure, in numbers of order one: `inner` ones.
+
+    A time constant may lie anywhere in decades, and is searched by its logarithm.
+    """
 
     def __init__(self, fitter: Fitter, structure: Structure) -> None:
         self.fitter, self.structure = fitter, structure
@@ -221,6 +237,28 @@ class _Problem:
         self.k = len(structure.unknowns)
         self.scale = np.concatenate([[u.size for u in structure.unknowns], *self.sizes]).astype(float)
         self.at: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.log = np.array(
+            [u.cause is not None and not u.amplitude and u.unit == "s" and u.low > 0 for u in structure.unknowns]
+            + [False] * self.n_starts,
+            dtype=bool,
+        )
+        self.most = np.where(self.log, LONGEST_STEP, np.inf)
+
+    def inner(self, values: np.ndarray) -> np.ndarray:
+        """Numbers of order one from SI."""
+        found = values / self.scale
+        found[self.log] = np.log(values[self.log])
+        return found
+
+    def outer(self, inner: np.ndarray) -> np.ndarray:
+        """SI from numbers of order one."""
+        found = inner * self.scale
+        found[self.log] = np.exp(inner[self.log])
+        return found
+
+    def by_inner(self, values: np.ndarray) -> np.ndarray:
+        """How SI numbers change with those of order one."""
+        return np.where(self.log, values, self.scale)
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -230,12 +268,13 @@ class _Problem:
         high = np.concatenate(
             [[u.high for u in self.structure.unknowns], np.full(self.n_starts, 1e3) * self.scale[self.k :]]
         )
-        return low / self.scale, high / self.scale
+        return self.inner(low), self.inner(high)
 
     def _evaluate(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.at is not None and np.array_equal(self.at[0], scaled):
             return self.at
-        values, k, noise = scaled * self.scale, self.k, self.fitter.noise
+        values, k, noise = self.outer(scaled), self.k, self.fitter.noise
+        by_inner = self.by_inner(values)
         rows, slopes, first = [], [], k
         for record, sizes in zip(self.records, self.sizes, strict=True):
             response = self.responses[record.sample_time, record.linear]
@@ -248,7 +287,7 @@ class _Problem:
             W = noise.whiten(np.clip(np.nan_to_num(Y), -FAR, FAR), record.valid).reshape(len(white), Y.shape[2])
             J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
             rows.append(white)
-            slopes.append(J * self.scale)
+            slopes.append(J * by_inner)
         self.n_readings = sum(map(len, rows))
         prior = [(i, u) for i, u in enumerate(self.structure.unknowns) if u.sd]
         rows.append(np.array([(values[i] - u.nominal) / u.sd for i, u in prior]))
@@ -268,12 +307,15 @@ class _Problem:
         """Residual and slopes."""
         return self._evaluate(scaled)[1:]
 
-    def result(self, values: np.ndarray) -> Fit:
-        _, rows, J = self._evaluate(values / self.scale)
+    def result(self, inner: np.ndarray) -> Fit:
+        """The fit at an optimum."""
+        _, rows, J = self._evaluate(inner)
+        values = self.outer(inner)
         starts = np.split(values[self.k :], np.cumsum([len(s) for s in self.sizes])[:-1])
         readings = rows[: self.n_readings]
         usable = sum(int(self.fitter.noise.usable(r.valid).sum()) for r in self.records)
         return Fit(
-            self.structure, values[: self.k], tuple(starts), float(readings @ readings), usable, rows, J / self.scale,
+            self.structure, values[: self.k], tuple(starts), float(readings @ readings), usable, rows,
+            J / self.by_inner(values),
             float(rows[self.n_readings :] @ rows[self.n_readings :]),
         )  # fmt: skip

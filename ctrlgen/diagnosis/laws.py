@@ -14,10 +14,13 @@ import numpy as np
 from scipy.linalg import expm
 
 from ctrlgen.chain import channels
+from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import Hypothesis, nominal_links
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.effect import Effect, Place
+
+Peaks = dict[tuple[Place, int], dict[str, float]]  # of the signal ("channel") and of the displacement ("travel") [SI]
 
 SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
 
@@ -34,6 +37,27 @@ class Column:
     size: float
     one_sided: int
     range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
+
+
+def peaks(fitter: Fitter, fit: Fit) -> Peaks:
+    """How far the signals at every place go in the records to fit."""
+    found: Peaks = {}
+    links = nominal_links(fit.structure.device)
+    responses = fit.structure.responses(fitter.recording, fitter.cache)
+    places = [(place, i) for place in (Place.DRIVE, Place.FORCE) for i in range(len(channels(links, place)))]
+    for record, start in zip(fitter.to_fit, fit.starts, strict=True):
+        response = responses[record.sample_time, record.linear]
+        m, n = response.model, len(record.time)
+        seen = [m.seen(place, i, None, {}) for place, i in places]
+        rows = m.closed(ca.vertcat(*(ca.vertcat(s.value, s.displacement) for s in seen)))
+        f = ca.Function("signals", [ca.vertcat(m.x, m.z), m.u, response.ambient, m.p], [rows])
+        S = response.motion(record, fit.theta, start if len(start) else None)[0]
+        values = f.map(n)(S.T, record.drive.T, response._ambients(record)[None, :], np.tile(fit.theta[:, None], (1, n)))
+        most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, 2)
+        for where, row in zip(places, most, strict=True):
+            old = found.get(where, {"channel": 0.0, "travel": 0.0})
+            found[where] = {"channel": max(old["channel"], row[0]), "travel": max(old["travel"], row[1])}
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +80,9 @@ class Laws:
 
     def __init__(
         self, response: Response, structure: Structure, hypotheses: list[Hypothesis], lines: tuple[float, ...],
-        probes: dict[tuple[Place, int], int],
+        probes: dict[tuple[Place, int], int], peaks: Peaks,
     ) -> None:  # fmt: skip
-        self.response = response
+        self.response, self.peaks = response, peaks
         self.terms: list[_Term] = []
         self._known: dict[tuple, int] = {}
         self.columns = [c for h in hypotheses for c in self._of(h, structure, lines, probes)]
@@ -79,7 +103,7 @@ class Laws:
         meant = amplitude.expected or (low - off, high - off)
         span = (meant[0] / size, meant[1] / size)
         entered = tuple(probes[law.place, i] for i, _ in at)
-        for shape in h.shapes(where, lines):
+        for shape in h.shapes(where, lines, self.peaks.get((law.place, at[0][0]))):
             terms = tuple(self._term(law(h.at, {}, h.of), i, other, shape, off, size) for i, other in at)
             yield Column(h, shape, entered, terms, size, side, span)
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
+from ctrlgen.lattice import lattice
 from ctrlgen.recording import Record, Recording
 
 LONGEST_ORDER = 8
@@ -23,7 +24,6 @@ LINES = 3  # at most, taken out of a rest
 NEAR_BINS = 15  # of the spectrum, over which noise is level
 OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
 LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
-OFTEN = 0.2  # distinct values a sample, below which a reading is seen to be in steps
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
@@ -68,10 +68,14 @@ class Noise:
     @property
     def floor(self) -> np.ndarray:
         """Standard deviation of the noise itself, colour included."""
-        impulse = np.zeros(4096)
-        impulse[0] = 1.0
-        shapes = [lfilter([1.0], np.concatenate([[1.0], -a]), impulse) for a in self.ar]
-        return np.array([sd * np.sqrt(np.sum(s**2)) for sd, s in zip(self.sd, shapes, strict=True)])
+        return np.array([coloured(sd, a) for sd, a in zip(self.sd, self.ar, strict=True)])
+
+
+def coloured(sd: float, a: np.ndarray) -> float:
+    """Standard deviation of autoregressive noise with innovations `sd` and coefficients `a`."""
+    impulse = np.zeros(4096)
+    impulse[0] = 1.0
+    return float(sd * np.sqrt(np.sum(lfilter([1.0], np.concatenate([[1.0], -a]), impulse) ** 2)))
 
 
 def estimate(recording: Recording, settling: float) -> Noise:
@@ -95,6 +99,7 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
             np.inf,
         )
     moving = [r for r in recording.records if r.role != "rest"]
+    rounding = lattice(np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])) / np.sqrt(12.0)
     samples = {
         "a record at rest": (1, [r.observed[r.valid[:, i], i] for r in recording.records if r.role == "rest"]),
         "repeated periods": (1, [e for r in moving for e in _repeats(r, i)]),
@@ -103,16 +108,14 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
     for source, (degree, parts) in samples.items():
         parts = _quiet([_without_lines(_flat(part, degree)) for part in parts if len(part) >= SHORTEST_REST])
         if parts:
-            sd, a = autoregression(parts)
-            sd = max(sd, _step_of(recording, i) / np.sqrt(12.0))
+            sd, a = _with_rounding(*autoregression(parts), rounding)
             n = sum(map(len, parts))
             return sd, a, True, f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}", float(n)
     if stated:
-        return stated, none, True, f"{name}: as stated, taken as white", STATED
+        sd, _ = _with_rounding(stated, none, rounding)
+        return sd, none, True, f"{name}: as stated, taken as white", STATED
     parts = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
-    sd = max(
-        _robust(np.concatenate(parts)) / np.sqrt(20.0), _step_of(recording, i) / np.sqrt(12.0), 1e-300
-    )  # 1 + 9 + 9 + 1: variance of third differences
+    sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), rounding, 1e-300)  # 1 + 9 + 9 + 1: third differences
     said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
     return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST
 
@@ -144,11 +147,10 @@ def _quiet(parts: list[np.ndarray]) -> list[np.ndarray]:
     return [part for part, p in zip(parts, power, strict=True) if p <= LOUD * np.median(power)]
 
 
-def _step_of(recording: Recording, i: int) -> float:
-    """The quantum of a reading, where values repeat so often that one is seen; else zero."""
-    values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
-    distinct = np.unique(values)
-    return float(np.diff(distinct).min()) if 1 < len(distinct) < OFTEN * len(values) else 0.0
+def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
+    """Noise seen at rest and readings in steps: at rest a coarse step hides the noise, on the move it is noise itself."""
+    floor = coloured(sd, a)
+    return (float(np.hypot(rounding, floor)), np.zeros(0)) if rounding > floor else (sd, a)
 
 
 def _robust(values: np.ndarray) -> float:
@@ -196,6 +198,8 @@ def autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
     """Innovation deviation and coefficients by Yule-Walker over all parts; the order by BIC."""
     n = sum(map(len, parts))
     lags = np.array([sum(float(p[: len(p) - k] @ p[k:]) for p in parts) / n for k in range(LONGEST_ORDER + 1)])
+    if lags[0] <= 0:  # a reading that does not move
+        return 0.0, np.zeros(0)
     best = (n * np.log(lags[0]), lags[0], np.zeros(0))
     for order in range(1, LONGEST_ORDER + 1):
         toeplitz = lags[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]

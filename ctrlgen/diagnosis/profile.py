@@ -127,10 +127,10 @@ class _Surface:
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
         self.problem = _Problem(fitter, fit.structure)
-        self.scale = self.problem.scale
-        self.at = np.concatenate([fit.theta, *fit.starts]) / self.scale
+        self.values = np.concatenate([fit.theta, *fit.starts])
+        self.at = self.problem.inner(self.values)
         self.low, self.high = self.problem.bounds
-        J = fit.J * self.scale
+        J = fit.J * self.problem.by_inner(self.values)
         self.H, self.best = J.T @ J, fit.objective
         states = max(len(s) for s in self.problem.sizes) + fit.J.shape[1]
         affordable = max(int(COST / (fit.n * states * fit.J.shape[1])), 4)
@@ -145,7 +145,9 @@ class _Surface:
         fitted once more where that is far above `expected`."""
         rest = np.arange(len(self.at)) != i
         x = self.at.copy()
-        x[i] = value / self.scale[i]
+        moved = self.values.copy()
+        moved[i] = value
+        x[i] = self.problem.inner(moved)[i]
         x[rest] -= np.linalg.lstsq(self.H[np.ix_(rest, rest)], self.H[rest, i] * (x[i] - self.at[i]), rcond=1e-12)[0]
         x[rest] = np.clip(x, self.low, self.high)[rest]
         rise = self._objective(x) - self.best

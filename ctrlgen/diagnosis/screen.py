@@ -18,7 +18,7 @@ from scipy.signal import find_peaks
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.laws import Column
+from ctrlgen.diagnosis.laws import Column, Peaks, peaks
 from ctrlgen.diagnosis.slopes import Slopes, Sums
 from ctrlgen.diagnosis.together import Suspect, Together
 
@@ -54,6 +54,7 @@ class Screen:
 
     def __init__(self, fitter: Fitter, hypotheses: list[Hypothesis], seed: int = 0) -> None:
         self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
+        self.peaks: Peaks | None = None
 
     def run(self, fit: Fit) -> Screened:
         """All hypotheses that the fit does not contain yet."""
@@ -63,8 +64,10 @@ class Screen:
         columns: list[Column] = []
         U, back = _directions(fit.J)
         first, lines = 0, self._lines(fit)
+        if self.peaks is None:
+            self.peaks = peaks(self.fitter, fit)
         for record, start in zip(self.fitter.to_fit, fit.starts or [None] * len(self.fitter.to_fit), strict=True):
-            slopes = Slopes(self.fitter, fit, record, open_, lines)
+            slopes = Slopes(self.fitter, fit, record, open_, lines, self.peaks)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)

@@ -1,8 +1,9 @@
 """Steps 7 and 8: fit the suspects jointly with the device, add the one that explains most, drop what is not needed, swap.
 
 Structures are compared by T = objective on the records to fit + BIC's price of their numbers + whitened squares on the
-held-out records, where nothing was fitted. A cause is added only if the record shows it beyond what chance does
-anywhere among all hypotheses, if it is material (a tenth of the noise), and if the held-out records gain.
+held-out records, where nothing was fitted, + twice the rarity of their causes: among equals the plainer one is named.
+A cause is added only if the record shows it beyond what chance does anywhere among all hypotheses, if it is material (a
+tenth of the noise), and if the held-out records gain.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
 
@@ -26,7 +27,9 @@ WORTHWHILE = (
 LEARNINGS = 8  # of the noise from what is left, at most
 TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
 TRIAL_STEPS = 8
+ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
+SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
 ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
@@ -80,18 +83,20 @@ class Searcher:
         structure: Structure,
         cause: Hypothesis | None = None,
         steps: int = TRIAL_STEPS,
+        nested: Fit | None = None,
     ) -> Trial:
-        """Fits one structure and judges it on the held-out records."""
+        """Fits one structure, which contains that of `nested`, and judges it on the held-out records."""
         key = frozenset(structure.causes)
         known, done = self.known.get(key, (None, 0))
         if known is not None and done >= steps:
             return replace(known, cause=cause)
-        fit = self.fitter.fit(structure, steps=steps)
+        fit = self.fitter.fit(structure, steps=steps, nested=nested)
         if known is not None and known.fit.objective <= fit.objective:
             self.known[key] = (known, steps)
             return replace(known, cause=cause)
         held, _ = self.fitter.held_out(fit)
         price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
+        price += 2 * _rarity(structure)
         found = Trial(fit, held, fit.objective + price + held, cause)
         self.known[key] = (found, steps)
         return found
@@ -107,12 +112,13 @@ class Searcher:
             if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind]:
                 break
             trials = self._try(current, self._conspicuous(current, screened))
-            trials = tuple(sorted((*trials, *self._together(current, screened, trials)), key=lambda t: t.total))
+            trials = (*trials, *self._together(current, screened, trials))
+            trials = tuple(sorted(self._ended(current, trials), key=lambda t: t.total))
             rounds.append(Round(screened, trials, current))
             better = [t for t in trials if self._justified(current, t)]
             if not better:
                 break
-            current = self._prune(self._swap(self._polished(better[0])))
+            current = self._prune(self._swap(self._polished(self._plainest(better))))
             if frozenset(current.fit.structure.causes) in visited:
                 break
             visited.add(frozenset(current.fit.structure.causes))
@@ -131,6 +137,25 @@ class Searcher:
     def _polished(self, trial: Trial) -> Trial:
         """The same fit driven to its end; trials stop early."""
         return self.trial(_cooled(trial.fit), trial.cause, steps=40)
+
+    def _slack(self, trial: Trial) -> float:
+        """The difference of T that says nothing where a structure leaves much over: what is left is not noise."""
+        return SLACK * max(trial.total - self.n_fit - self.n_held, 0.0)
+
+    def _plainest(self, better: list[Trial]) -> Trial:
+        """The best trial, or one of as few numbers that explains as much to the slack and is less rare."""
+        first = better[0]
+        numbers = len(first.fit.structure.unknowns)
+        alike = [
+            t for t in better if t.total < first.total + self._slack(first) and len(t.fit.structure.unknowns) <= numbers
+        ]
+        return min(alike, key=lambda t: (_rarity(t.fit.structure), t.total), default=first)
+
+    def _ended(self, current: Trial, trials: tuple[Trial, ...]) -> tuple[Trial, ...]:
+        """The trials, those driven to their end that leave least on the records to fit but are not justified so early."""
+        best = sorted((t for t in trials if self._meant(t)), key=lambda t: t.fit.objective)[:ENDED]
+        early = [t for t in best if t.fit.objective < current.fit.objective and not self._justified(current, t)]
+        return tuple(self._polished(t) if t in early else t for t in trials)
 
     def _measured(self, trial: Trial) -> Trial:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""
@@ -166,13 +191,13 @@ class Searcher:
         trials = []
         for s in suspects:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
-            trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis)
+            trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis, current.fit)
         return tuple(sorted(trials, key=lambda t: t.total))
 
-    def _attempt(self, structure: Structure, cause: Hypothesis) -> list[Trial]:
+    def _attempt(self, structure: Structure, cause: Hypothesis, nested: Fit) -> list[Trial]:
         """The trial; none where no device can be built with the numbers suspected."""
         try:
-            return [self.trial(structure, cause)]
+            return [self.trial(structure, cause, nested=nested)]
         except ValueError:
             return []
 
@@ -193,7 +218,7 @@ class Searcher:
                     used[s.hypothesis] = used.get(s.hypothesis, 0) + 1
                     structure = structure.with_cause(s.hypothesis, s.start)
                 self.step("trying " + ", ".join(f"{s.hypothesis.effect} at {s.hypothesis.location}" for s in suspects))
-                trials += self._attempt(structure, suspects[-1].hypothesis)
+                trials += self._attempt(structure, suspects[-1].hypothesis, current.fit)
                 tried += 1
             best = max([best, *(current.fit.objective - t.fit.objective for t in trials if self._meant(t))])
         return trials
@@ -229,7 +254,7 @@ class Searcher:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
         for k in range(len(current.fit.structure.causes) - 1):
             for rival in self._replacements(current, k):
-                if rival.total < current.total - RIVAL:
+                if rival.total < current.total - max(RIVAL, self._slack(current)):
                     current = rival
         return current
 
@@ -264,10 +289,15 @@ class Searcher:
         return tuple(t for t in self._replacements(current, k) if t.total < current.total + RIVAL)
 
 
+def _rarity(structure: Structure) -> float:
+    return sum(c.law.rarity for c in structure.causes if c.effect != PARAMETER)
+
+
 def _cooled(fit: Fit) -> Structure:
-    """The structure with its causes starting where the fit ended."""
+    """The structure with its causes and the device's own numbers starting where the fit ended."""
     s = fit.structure
-    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))))
+    own = {u.path: float(v) for u, v in zip(s.unknowns, fit.theta, strict=True) if u.cause is None}
+    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))), own)
 
 
 def _warm(fit: Fit, cause: Hypothesis, start: dict[str, float]) -> Structure:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links
-from ctrlgen.diagnosis.laws import Column, Laws
+from ctrlgen.diagnosis.laws import Column, Laws, Peaks
 from ctrlgen.diagnosis.mapped import evaluate
 from ctrlgen.diagnosis.probe import with_probes
 from ctrlgen.diagnosis.response import Response
@@ -47,7 +47,13 @@ class Slopes:
     """The slopes of the readings by every hypothesis' amplitude on one record."""
 
     def __init__(
-        self, fitter: Fitter, fit: Fit, record: Record, hypotheses: list[Hypothesis], lines: tuple[float, ...]
+        self,
+        fitter: Fitter,
+        fit: Fit,
+        record: Record,
+        hypotheses: list[Hypothesis],
+        lines: tuple[float, ...],
+        peaks: Peaks,
     ) -> None:
         self.fitter, self.record = fitter, record
         probed, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
@@ -64,7 +70,7 @@ class Slopes:
         self.p[len(known) + len(number_paths) :] = 0.0
         entered = {where: free.index(path) for where, path in probes.items()}
         others = [h for h in hypotheses if h.effect != PARAMETER]
-        self.laws = Laws(self.response, fit.structure, others, lines, entered)
+        self.laws = Laws(self.response, fit.structure, others, lines, entered, peaks)
         places = [free.index(h.path) for h in numbers]
         self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
         self.columns = list(self.laws.columns)

@@ -5,7 +5,7 @@ The nominal device is nested in every structure: an effect at its `off`, a numbe
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -48,11 +48,15 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """`device` as described, with `causes` and their starting values ({parameter: SI}, one mapping a cause)."""
+    """`device` as described, with `causes` and their starting values ({parameter: SI}, one mapping a cause).
+
+    `own`: where a fit begins of the device's uncertain numbers, by path [SI]; those not given begin as stated.
+    """
 
     device: Device
     causes: tuple[Hypothesis, ...] = ()
     starts: tuple[dict[str, float], ...] = ()
+    own: dict[str, float] = field(default_factory=dict)
 
     def with_cause(self, cause: Hypothesis, start: dict[str, float]) -> Structure:
         """The same with one cause more."""
@@ -149,7 +153,7 @@ class Structure:
         values = []
         for unknown in self.unknowns:
             if unknown.cause is None:
-                values.append(unknown.nominal)
+                values.append(min(max(self.own.get(unknown.path, unknown.nominal), unknown.low), unknown.high))
             else:
                 values.append(min(max(self.starts[unknown.cause][unknown.name], unknown.low), unknown.high))
         return np.array(values)

@@ -13,6 +13,7 @@ class AsymmetricHysteresis(Effect):
     """
 
     place = Place.FORCE
+    rarity = 2.3
     needs = frozenset({"force"})
     source = "P. R. Dahl, AIAA Journal 14 (1976) 1675; the warp is ours"
     params = (

@@ -6,17 +6,20 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class DeadZone(Effect):
-    """Delta u = -(sqrt((u + w)^2 + e^2) - sqrt((u - w)^2 + e^2))/2: nothing inside +-w, w less outside.
+    """Delta u = -(sqrt((u + w)^2 + e^2) - sqrt((u - w)^2 + e^2))/2, e = r w: nothing well inside +-w, w less outside.
 
-    e, 0.3 % of the typical drive, rounds the corners, so that the slope exists. Holds for w well above e.
+    r rounds the corners: 0.03 for contacts that open, one for an electronic crossover. Holds for w well below the largest drive.
     """
 
     place = Place.DRIVE
     needs = frozenset({"actuator"})
     source = "G. Tao, P. V. Kokotovic, IEEE Trans. Autom. Control 39 (1994) 59: plants with unknown dead-zones"
-    params = (Param("width", "channel", (0.0, 0.5), "half width", off=0.0),)
+    params = (
+        Param("width", "channel", (0.0, 0.5), "half width", off=0.0),
+        Param("rounding", "1", (0.01, 5.0), "of the corners, in widths", grid=(0.3,)),
+    )
 
     def term(self, s, p):
-        corner = (3e-3 * s.scale) ** 2
+        corner = (p.rounding * p.width) ** 2 + (1e-6 * s.scale) ** 2
         above, below = (ca.sqrt((s.value + side * p.width) ** 2 + corner) for side in (1, -1))
         return -(above - below) / 2

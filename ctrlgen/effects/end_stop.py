@@ -16,7 +16,14 @@ class EndStop(Effect):
     source = "definition: a spring beyond a gap, its corner rounded"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e3), "stiffness of the stop", off=0.0),
-        Param("gap", "travel", (-10.0, 10.0), "where it stands", grid=(-0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 1.5, 2.5)),
+        Param(
+            "gap",
+            "travel",
+            (-10.0, 10.0),
+            "where it stands",
+            grid=(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97),
+            level=True,
+        ),
     )
 
     def term(self, s, p):

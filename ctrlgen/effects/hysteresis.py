@@ -3,8 +3,9 @@
 import casadi as ca
 
 from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.turning import turned_at
 
-ELEMENTS = 4
+ELEMENTS = 8
 
 
 class Hysteresis(Effect):
@@ -20,9 +21,13 @@ class Hysteresis(Effect):
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
         Param("reach", "travel", (1e-3, 5.0), "travel at which all slip", grid=(0.03, 0.1, 0.3, 1.0, 2.0)),
-        Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones", grid=(0.0, 1.0)),
+        Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones", grid=(0.5,)),
     )
-    states = tuple(State(f"play{j}", "travel", 1.0, stepped=True) for j in range(1, ELEMENTS + 1))
+    states = (
+        *(State(f"play{j}", "travel", 1.0, stepped=True) for j in range(1, ELEMENTS + 1)),
+        State("d", "travel", 1.0, stepped=True),
+        State("v", "travel/s", 100.0, stepped=True),
+    )
 
     def term(self, s, p):
         weights = [float(j) ** -p.taper for j in range(1, ELEMENTS + 1)]
@@ -30,8 +35,11 @@ class Hysteresis(Effect):
         return -p.stiffness * sum(stretch) / sum(weights)
 
     def update(self, s, p):
-        new = {}
+        new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
+        turn = turned_at(s, s.d, s.v)
         for j in range(1, ELEMENTS + 1):
             name, radius = f"play{j}", p.reach * j / ELEMENTS
-            new[name] = ca.fmax(ca.fmin(getattr(s, name), s.displacement + radius), s.displacement - radius)
+            new[name] = getattr(s, name)
+            for d in (turn, s.displacement):
+                new[name] = ca.fmax(ca.fmin(new[name], d + radius), d - radius)
         return new

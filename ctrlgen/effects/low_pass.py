@@ -4,21 +4,23 @@ from ctrlgen.effect import Effect, Param, Place, State
 
 
 class LowPass(Effect):
-    """dw/dt = (y - w)/tau, Delta y = g (w - y): with g = 1 a first-order filter, below it a slow part only.
+    """tau dw/dt = v, tau dv/dt = y - w - 2 D v, Delta y = g (w - y): g = 1 a second-order filter, below it a slow part only.
 
-    Holds for one pole; the sampling must resolve tau.
+    D below one rings, D = 1/sqrt 2 is Butterworth's, a large D is one pole with time constant 2 D tau. Holds where
+    the sampling resolves tau.
     """
 
     place = Place.SENSOR
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
     params = (
         Param("share", "1", (-0.5, 1.5), "part of the reading that is filtered", off=0.0),
-        Param("tau", "s", (1e-4, 1e2), "time constant", grid=(1e-3, 5e-3, 0.025, 0.1, 0.5, 3.0)),
+        Param("tau", "s", (1e-4, 1e2), "one over the corner [rad/s]", grid=(1e-3, 8e-3, 0.06, 0.5)),
+        Param("damping", "1", (0.3, 20.0), "D", grid=(0.7, 4.0)),
     )
-    states = (State("w", "channel", 1.0),)
+    states = (State("w", "channel", 1.0), State("v", "channel", 1.0))
 
     def term(self, s, p):
         return p.share * (s.w - s.value)
 
     def rates(self, s, p):
-        return {"w": (s.value - s.w) / p.tau}
+        return {"w": s.v / p.tau, "v": (s.value - s.w - 2 * p.damping * s.v) / p.tau}

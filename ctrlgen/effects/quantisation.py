@@ -1,14 +1,17 @@
 """A converter, counter or encoder of coarse steps."""
 
 import casadi as ca
+import numpy as np
 
 from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.lattice import lattice
 
 
 class Quantisation(Effect):
     """Delta y = s (q floor(y/q + 1/2) - y), s = 1 for true rounding to steps q.
 
-    Holds for rounding to the nearest step. Linear in s; in q and y it jumps: search q, do not descend.
+    Holds for rounding to the nearest step. Linear in s; in q and y it jumps: search q, do not descend. Readings that
+    all lie on a lattice show q themselves; what it does to them is q/sqrt 12.
     """
 
     place = Place.SENSOR
@@ -20,3 +23,8 @@ class Quantisation(Effect):
 
     def term(self, s, p):
         return p.share * (p.quantum * ca.floor(s.value / p.quantum + 0.5) - s.value)
+
+    @classmethod
+    def read_off(cls, readings):
+        step = lattice(readings)
+        return ({"share": 1.0, "quantum": step}, step / np.sqrt(12.0)) if step else None

@@ -7,6 +7,7 @@ class Reversed(Effect):
     """Delta u = -2 g u: the other sign for g = 1. Below 1/2 a weak drive, which `drive_gain` says better."""
 
     place = Place.DRIVE
+    rarity = 2.3
     needs = frozenset({"actuator", "bipolar"})
     domain = "mechanism"
     source = "definition"

@@ -6,7 +6,7 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class Saturation(Effect):
-    """Delta u = g (c(u) - u), c(u) = (sqrt((u + L)^2 + e^2) - sqrt((u - L)^2 + e^2))/2, e = L/50: u, but at most L.
+    """Delta u = g (c(u) - u), c(u) = (sqrt((u + L)^2 + e^2) - sqrt((u - L)^2 + e^2))/2, e = L/200: u, but at most L.
 
     g = 1 clips. The corner is e wide, so that the slope exists; above L the drive can no longer be told from the force.
     """
@@ -15,13 +15,18 @@ class Saturation(Effect):
     needs = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): actuator faults; smooth form ours"
     params = (
-        Param("share", "1", (0.0, 1.0), "1 where nothing above the level is delivered", off=0.0),
+        Param("share", "1", (0.0, 1.5), "1 where nothing above the level is delivered", off=0.0),
         Param(
-            "level", "channel", (0.01, 1.0), "drive that is not exceeded", grid=(0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
+            "level",
+            "channel",
+            (0.01, 1.0),
+            "drive that is not exceeded",
+            grid=(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
+            level=True,
         ),
     )
 
     def term(self, s, p):
-        corner = (p.level / 50) ** 2
+        corner = (p.level / 200) ** 2
         above, below = (ca.sqrt((s.value + side * p.level) ** 2 + corner) for side in (1, -1))
         return p.share * ((above - below) / 2 - s.value)

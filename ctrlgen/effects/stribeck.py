@@ -12,6 +12,7 @@ class Stribeck(Effect):
     """
 
     place = Place.FORCE
+    rarity = 1.0  # dry friction that does not fall is the commoner
     needs = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083, Gaussian form of Stribeck's curve"
     params = (

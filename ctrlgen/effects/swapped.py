@@ -7,6 +7,7 @@ class Swapped(Effect):
     """Delta u_i = g (u_j - u_i) and Delta u_j = g (u_i - u_j): exchanged for g = 1; in between, crosstalk of the leads."""
 
     place = Place.DRIVE
+    rarity = 2.3
     pairs = True
     mutual = True
     needs = frozenset({"actuator"})

@@ -4,12 +4,18 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class TemperatureSensitivity(Effect):
-    """Delta y = c (T_room - T_room at rest). Holds for changes slow against the instrument's thermal time constant."""
+    """Delta y = c (T - T_0), T the rise of the surroundings, T_0 the rise at which home was set.
+
+    Holds for changes slow against the instrument's thermal time constant.
+    """
 
     place = Place.SENSOR
     needs = frozenset({"ambient"})
     source = "definition"
-    params = (Param("slope", "channel/K", (-10.0, 10.0), "reading per rise of the surroundings", off=0.0),)
+    params = (
+        Param("slope", "channel/K", (-10.0, 10.0), "reading per rise of the surroundings", off=0.0),
+        Param("reference", "K", (-30.0, 30.0), "rise at which the reading is right", grid=(0.0,)),
+    )
 
     def term(self, s, p):
-        return p.slope * s.ambient
+        return p.slope * (s.ambient - p.reference)

@@ -1,0 +1,27 @@
+"""Readings that stand alone: a fault of the sensor, which no mechanism could follow."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+SPIKE = 7.0
+MOST_SPIKES = 0.01
+WIDEST_SPIKE = 2  # samples
+BESIDE = 0.3  # of a spike: what its neighbours have at most
+
+
+def alone(left: np.ndarray) -> np.ndarray:
+    """Samples (n, n_y) more than `SPIKE` robust deviations from the median of their neighbours; never over one percent, nor wide ones."""
+    rough = left - median_filter(left, size=(7, 1), mode="nearest")
+    near = SPIKE * np.maximum(
+        1.4826 * np.median(np.abs(rough), axis=0), median_filter(np.abs(rough), size=(51, 1)) * 1.4826
+    )
+    found = np.abs(rough) > near
+    found[:, found.mean(axis=0) > MOST_SPIKES] = False
+    for column, size in zip(found.T, np.abs(rough).T, strict=True):
+        for run in np.split(np.flatnonzero(column), np.flatnonzero(np.diff(np.flatnonzero(column)) > 1) + 1):
+            beside = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)] if len(run) else []
+            if len(run) > WIDEST_SPIKE or (beside and max(beside) > BESIDE * size[run].max()):
+                column[run] = False  # a mass that is pushed moves before and after too
+    return found

@@ -1,0 +1,136 @@
+"""Causes with corners, memories and steps, on recordings simulated without ctrlgen, ten steps a sample."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, record
+
+from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.noise import estimate
+from ctrlgen.diagnosis.read_off import read_off
+from ctrlgen.diagnosis.screen import Screen
+from ctrlgen.diagnosis.search import Searcher
+from ctrlgen.diagnosis.spikes import alone
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.lattice import lattice
+from ctrlgen.recording import Recording
+
+FINE = 10
+BACKLASH = Hypothesis("backlash", "stage:axis", "axis")
+LATE = Hypothesis("log_creep", "stage:axis", "axis")
+LIMIT = Hypothesis("saturation", "actuator:axis", "axis")
+FADING = Hypothesis("degradation", "actuator:axis", "axis")
+
+
+def drives(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """One that turns every six samples, and one that rests, steps and turns."""
+    t = np.arange(n) * H
+    fit = 0.5 * np.sin(2 * np.pi * 83 * t) + 0.4 * np.sin(2 * np.pi * 23 * t)
+    return fit, np.where(t < 0.1, 0.0, 0.6 * np.sin(2 * np.pi * 61 * t) + 0.3 * np.sign(np.sin(2 * np.pi * 3.1 * t)))
+
+
+def fitter_of(change=lambda u: move(u), after=lambda y: y, n=1500, seed=4) -> Fitter:
+    """A rest, a record to fit and one to hold out; `change` (u -> position), `after` (noisy reading -> reading)."""
+    rng = np.random.default_rng(seed)
+    parts = [record(np.zeros(600), after(NOISE * rng.standard_normal(600)), "rest")]
+    for u, role in zip(drives(n), ("fit", "hold_out"), strict=True):
+        parts.append(record(u, after(change(u) + NOISE * rng.standard_normal(n)), role))
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
+    return Fitter(recording, estimate(recording, SETTLING))
+
+
+def fine(u: np.ndarray) -> np.ndarray:
+    """The position ten times a sample."""
+    from scipy.signal import cont2discrete
+
+    A, B = np.array([[0, 1], [-2e5 / M, -C / M]]), np.array([[0], [1 / M]])
+    Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / FINE)
+    x, out = np.zeros(2), []
+    for volts in np.repeat(u, FINE):
+        out.append(x[0])
+        x = Ad @ x + Bd[:, 0] * KF * volts
+    return np.array(out)
+
+
+def played(u: np.ndarray, gap: float = 6e-8) -> np.ndarray:
+    """The position behind a play, dragged along between the samples too."""
+    w, out = 0.0, []
+    for q in fine(u):
+        w = max(min(w, q + gap / 2), q - gap / 2)
+        out.append(w)
+    return np.array(out[::FINE])
+
+
+def test_play_is_followed_through_reversals_between_samples():
+    fitter = fitter_of(played)
+    fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 3e-8}))
+    assert fit.theta[-1] == pytest.approx(6e-8, rel=0.05)
+    assert fit.chi2 < 1.4 * fit.n  # the samples alone: 10 n
+    held, n = fitter.held_out(fit)  # rests first: inside the gap the slopes by the start say nothing of it
+    assert held < 1.4 * n
+
+
+def test_time_constants_are_found_decades_away():
+    def creeping(u):
+        y = move(u)
+        lags = (lfilter([0, 1 - np.exp(-H / tau)], [1, -np.exp(-H / tau)], y) for tau in np.logspace(-1.7, 1.3, 10))
+        return y + 0.003 * sum(lags)
+
+    fitter = fitter_of(creeping)
+    for tau in (0.01, 1.0):
+        fit = fitter.fit(Structure(AXIS).with_cause(LATE, {"gain": 1e-3, "tau": tau}))
+        assert fit.chi2 < 1.15 * fit.n
+        assert fit.theta[-1] == pytest.approx(0.03, rel=0.1)
+
+
+def test_a_limit_is_tried_below_the_largest_drive_of_the_records():
+    level = 0.8 * np.abs(drives(1500)[0]).max()
+    fitter = fitter_of(lambda u: move(np.clip(u, -level, level)))
+    nominal = fitter.fit(Structure(AXIS))
+    found = Searcher(fitter, Screen(fitter, [LIMIT, FADING]), lambda _: None).run(Structure(AXIS))
+    assert [c.effect for c in found.chosen.fit.structure.causes] == ["saturation"]
+    assert found.chosen.fit.values(0)["level"] == pytest.approx(level, rel=0.01)
+    assert found.chosen.fit.chi2 < 0.1 * nominal.chi2
+
+
+def test_readings_on_a_lattice_are_read_off_as_quantised():
+    step = 10 * NOISE
+    fitter = fitter_of(after=lambda y: step * np.round(y / step + 0.3))
+    assert fitter.noise.floor[0] == pytest.approx(step / np.sqrt(12), rel=0.25)
+    (found,) = read_off(fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS)))
+    assert (found.effect, found.location) == ("quantisation", "sensor:axis")
+    assert found.parameters["quantum"].value == pytest.approx(step * 1e6, rel=1e-6)
+
+
+def test_printed_digits_below_the_noise_are_no_finding():
+    fitter = fitter_of(after=lambda y: np.round(y, 10))
+    assert lattice(fitter.to_fit[0].observed[:, 0]) == pytest.approx(1e-10)
+    assert read_off(fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))) == ()
+
+
+def test_a_lattice_needs_every_reading_on_it():
+    rng = np.random.default_rng(0)
+    on = 0.3 + 0.07 * rng.integers(-500, 500, 400)
+    assert lattice(on) == pytest.approx(0.07)
+    assert lattice(on + 0.02 * rng.standard_normal(400)) < 1e-3
+    assert lattice(np.full(400, 2.0)) == 0.0
+
+
+def test_a_push_on_a_mass_is_no_spike():
+    left = 0.1 * np.random.default_rng(0).standard_normal((900, 1))
+    spikes, pushed = left.copy(), left.copy()
+    spikes[[100, 400, 401], 0] += 30
+    pushed[300:305, 0] += [8, 30, 40, 25, 9]
+    assert np.flatnonzero(alone(spikes)).tolist() == [100, 400, 401]
+    assert not alone(pushed).any()
+
+
+def test_a_start_that_is_far_off_is_begun_again_near_off():
+    fitter = fitter_of(played)
+    nominal = fitter.fit(Structure(AXIS))
+    late = Hypothesis("low_pass", "sensor:axis", "axis")
+    far = Structure(AXIS).with_cause(late, {"share": 1.5, "tau": 1.0, "damping": 0.3})
+    assert fitter.fit(far, nested=nominal, steps=8).objective <= nominal.objective * 1.001
