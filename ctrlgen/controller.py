@@ -24,13 +24,14 @@ TRIALS = 3  # of the way to a target that the drives cannot reach in one sample
 INSET = (
     1 - 2**-8
 )  # of the way to where straight drives would meet their limit: curved ones meet it a little earlier or later
+SWEEPS = 3  # over the displacements, toward the nearest pose: 0.5 % farther at most on the shipped devices, clipping 50 to 85 %
 NEGLIGIBLE = 1e-6  # of a limit: directions in which nothing comes near it
 
 
 class Status(IntFlag):
     """What the controller had to do. 0: everything as commanded."""
 
-    DISPLACEMENT = 1  # the target needs a displacement outside its range; the range's end was taken
+    DISPLACEMENT = 1  # the target needs a displacement outside its range; the nearest target inside was taken
     COMPOSITE = 2  # a limit on stress or rotation: the displacement was shrunk toward home
     STATE = 4  # the actuator state (temperature) was held at its limit
     DRIVE = 8  # the drive was held at its limit: the target comes later than commanded
@@ -98,6 +99,30 @@ class Controller:
         m = self.nominal
         bent = ca.depends_on(ca.jacobian(m.signals["displacement"].expr, m.z), m.z)
         return MEMORY_SHRINKS if bent or m.x.numel() > m.n_states else 1
+
+    @cached_property
+    def nearest(self) -> ca.Function:
+        """beyond -> the displacement in its range whose followed signal is nearest to that of a displacement beyond it.
+
+        Minimises |W (z - beyond)|^2 over the box, W the slope of the followed signal at home in its typical sizes, by
+        `SWEEPS` of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) from the clipped
+        displacement; to first order in the displacement, and exact where one displacement moves one channel.
+        """
+        m, signal = self.nominal, self.nominal.signals[self.follow]
+        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(signal.expr, m.z)])(m.rest, 0 * m.z_scale).full()
+        W = slope / np.array(signal.scale)[:, None]
+        H = W.T @ W
+        P = ca.sparsify(ca.DM(H / np.diag(H)[:, None]))
+        low, high = m.z_bounds
+        beyond = ca.SX.sym("beyond", m.z.numel())
+        z = ca.fmin(ca.fmax(beyond, low), high)
+        slopes = ca.mtimes(P, z - beyond)
+        for _ in range(SWEEPS if not P.sparsity().is_diag() else 0):
+            for i in range(m.z.numel()):
+                moved = ca.fmin(ca.fmax(z[i] - slopes[i], low[i]), high[i])
+                slopes += P[:, i] * (moved - z[i])
+                z[i] = moved
+        return ca.Function("nearest", [beyond], [z], ["beyond"], ["z"], {"cse": True})
 
     @cached_property
     def gauge(self) -> ca.Function | None:
@@ -193,8 +218,11 @@ class Controller:
                 return Step(
                     Status.INPUT, z, x[:n], self.safe_drive, (x_next, _row(k.settle(x_next, z, self.safe_drive)))
                 )
-            wanted, hit = _clamp(wanted, z_low, z_high, z_slack)
-            status |= Status.DISPLACEMENT if hit else Status(0)
+            beyond = wanted
+            wanted, hit = _clamp(beyond, z_low, z_high, z_slack)
+            if hit:
+                wanted = _row(self.nearest(beyond))
+                status |= Status.DISPLACEMENT
         held, hit = acting(wanted)
         if hit:
             status |= Status.STATE

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICE
+from scipy.optimize import lsq_linear
 
 from ctrlgen import Controller, Status, build_model, simulate
 from ctrlgen.devices import Device
@@ -151,6 +152,28 @@ def test_temperatures_that_the_stroke_implies_are_not_limited_online(controller)
     table["actuator"]["temperature_limit"]["value"] = "120 degC"
     cooler = build_model(validate(Device.library["mems_hexapod"], table, "cooler"))
     assert Controller(cooler, "pose", H).state_can_be_limited
+
+
+def test_beyond_the_range_the_nearest_target_inside_is_taken(model, controller, rng):
+    """In typical sizes of the pose, against an exact bounded least-squares solver; clipping each displacement is far worse."""
+    low, high = model.z_bounds
+    slope = ca.Function("W", [model.x, model.z], [ca.jacobian(model.signals["pose"].expr, model.z)])(
+        model.rest, np.zeros(6)
+    )
+    W = slope.full() / np.array(model.signals["pose"].scale)[:, None]
+    ratios, clipped = [], []
+    for beyond in rng.uniform(low - high, 2 * high, size=(200, 6)):
+        exact = lsq_linear(W * high, W @ beyond, (low / high, 1.0)).x * high
+        off = np.linalg.norm(W @ (exact - beyond))
+        found = controller.nearest(beyond).full().ravel()
+        assert np.all((found >= low) & (found <= high))
+        ratios.append(np.linalg.norm(W @ (found - beyond)) / off)
+        clipped.append(np.linalg.norm(W @ (np.clip(beyond, low, high) - beyond)) / off)
+    assert max(ratios) < 1.005 and np.median(clipped) > 1.1
+    step = controller.step(controller.rest(), np.array([0, 0, 0, 1e-5, 0, -2e-6]), settle=True)
+    assert step.status == Status.DISPLACEMENT
+    inside = rng.uniform(0, 3e-5, 6)
+    assert np.array_equal(controller.nearest(inside).full().ravel(), inside)
 
 
 def test_limits_that_the_stroke_implies_are_not_computed_online(controller):

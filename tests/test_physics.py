@@ -592,6 +592,15 @@ def test_wire_stress_is_convex_in_the_displacement(p: SimpleNamespace, loads: he
     assert (middle <= w * left + (1 - w) * right + 1e-13 * p.hexapod.stress_limit).all()  # rounding of the stress
 
 
+def test_the_wires_ends_inside_a_strut_are_never_stressed_more_than_both_outer_ones(
+    p: SimpleNamespace, loads: hexapod.WireLoads
+) -> None:
+    """So the device's limit is on the outer ends alone."""
+    d = np.random.default_rng(5).uniform(-55 * MICRO, 55 * MICRO, (6, 2000))
+    stress = array(stress_function(p, loads).map(2000)(d)).reshape(6, 4, 2000)
+    assert (stress[:, 1:3].max(axis=1) <= stress[:, [0, 3]].max(axis=1) * (1 + 1e-12)).all()
+
+
 def test_wire_stress_grows_in_proportion_to_the_displacement(p: SimpleNamespace, loads: hexapod.WireLoads) -> None:
     rng, n = np.random.default_rng(4), 200
     d, t = rng.uniform(-55 * MICRO, 55 * MICRO, (6, n)), 10.0 ** rng.uniform(-6, 0, n)

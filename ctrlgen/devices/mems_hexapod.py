@@ -171,8 +171,9 @@ class MemsHexapod(Device):
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
             d, carried = signal.displacement, signal.carried  # with and without what effects add on the way
-            ends = ("base_bottom", "base_top", "platform_bottom", "platform_top")
-            wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ends)
+            # The moment is linear along a strut, so its magnitude is convex: largest at one of the strut's own ends.
+            wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ("base_bottom", "platform_top"))
+            outermost = [4 * i + end for i in range(6) for end in (0, 3)]
             return [
                 Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, drive_limit),
                 Limit(
@@ -186,7 +187,7 @@ class MemsHexapod(Device):
                     None, self.stage.notch_rotation_limit.si,
                 ),
                 Limit(
-                    "wire_stress", "wire flexure stress", wires, "MPa", hexapod.wire_stress(carried, loads, h),
+                    "wire_stress", "wire flexure stress", wires, "MPa", hexapod.wire_stress(carried, loads, h)[outermost],
                     None, self.hexapod.stress_limit.si,
                 ),
             ]  # fmt: skip

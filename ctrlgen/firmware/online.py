@@ -53,6 +53,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             modes.append({"name": name, "z": z, "uses_state": uses_state, **parts})
     balance = printed(controller.static.settle, "balance_displacement")
     ratio = printed(controller.composite_ratio, "composite_ratio") if controller.guarded_limits else None
+    nearest = printed(controller.nearest, "nearest_displacement")
     gauge = printed(controller.gauge, "composite_bound") if controller.gauge else None
     slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     z_slack, s_slack, u_slack = slack.slacks
@@ -64,6 +65,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     once_more = sum(last[part].operations for part in ("state", "drive") if part in last)
     worst_cost = (
         step_cost
+        + nearest.operations
         + (2 if controller.state_can_be_limited else 1) * balance.operations
         + (controller.shrinks * ratio.operations if ratio else 0)
         + (last["advance"].operations if "advance" in last and not advance else 0)
@@ -82,7 +84,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
-        "root": root_text(real) if "root" in called else None, "library": sorted(called - {"root"}), "gauge": gauge,
+        "root": root_text(real) if "root" in called else None, "library": sorted(called - {"root"}), "gauge": gauge, "nearest": nearest,
         "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
         "balance": balance, "trials": TRIALS, "inset": INSET, "shrinks": controller.shrinks,
         "ratio_uses_state": bool(ratio) and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,

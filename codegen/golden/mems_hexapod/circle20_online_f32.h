@@ -16,7 +16,7 @@
  *   notch rotation <= 5 deg
  *   wire flexure stress <= 550 MPa
  *
- * Arithmetic operations of the physics per call: 315 within limits, 3572 at most
+ * Arithmetic operations of the physics per call: 315 within limits, 3535 at most
  * (comparisons and the bookkeeping of limits not counted). Arithmetic: float.
  * Physics: S1: Mech. Mach. Theory 80 (2014) 246-264, doi 10.1016/j.mechmachtheory.2014.05.004
  * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4, scenario 6b3b4ab03afed2d5 (sha256). Do not edit.
@@ -29,7 +29,7 @@ extern "C" {
 #endif
 
 /* Status: 0, or a sum of these. The drive is admissible in every case. */
-#define CIRCLE20_ONLINE_F32_DISPLACEMENT 1 /* beyond the displacement range: its end was taken */
+#define CIRCLE20_ONLINE_F32_DISPLACEMENT 1 /* beyond the displacement range: the nearest target inside was taken */
 #define CIRCLE20_ONLINE_F32_COMPOSITE 2    /* wire flexure stress: displacement shrunk toward home */
 #define CIRCLE20_ONLINE_F32_DRIVE 8        /* heater power at its limit: as far toward the target as it reaches in one sample */
 #define CIRCLE20_ONLINE_F32_INPUT 16       /* NaN, infinite, absurd or missing input: drives at zero, or nearest to it */
