@@ -185,7 +185,7 @@ def test_the_same_input_gives_the_same_bytes_of_everything(packages, circle, tmp
 @pytest.mark.parametrize(
     ("piece", "pattern", "replacement"),
     [
-        ("online", r" HIGH\[6\] = \{ 5\.5e-05f", " HIGH[6] = { 5.6e-05f"),
+        ("online", r"5\.5e-05f", "5.6e-05f"),  # the stroke, wherever it stands
         ("online", r"int status = 0;", "int status = 64;"),
         ("player", r"(CONTROL\[\d+\]\[6\] = \{\n    \{ 0\.0\d)(\d)", r"\g<1>0"),
     ],
@@ -195,8 +195,8 @@ def test_the_selftest_finds_a_wrong_constant(packages, compiler, tmp_path, piece
     folder = tmp_path / "c"
     shutil.copytree(c.path, folder)
     spoiled = folder / f"{getattr(c, piece)[Real.FLOAT]}.c"
-    text, count = re.subn(pattern, replacement, spoiled.read_text(), count=1)
-    assert count == 1 and text != spoiled.read_text()
+    text, count = re.subn(pattern, replacement, spoiled.read_text())
+    assert count and text != spoiled.read_text()
     spoiled.write_text(text)
     sources = [folder / source.name for source in c.sources(Real.FLOAT)]
     runner = folder / "test" / c.runner(Real.FLOAT).name
