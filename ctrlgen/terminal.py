@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 
 from ctrlgen import job, report
+from ctrlgen.build_record import counts
 from ctrlgen.errors import CtrlgenError
 from ctrlgen.measures import in_unit
 from ctrlgen.recording import Recording
@@ -22,6 +23,7 @@ from ctrlgen.units import from_si, show
 
 if TYPE_CHECKING:
     from ctrlgen.batch import Row
+    from ctrlgen.build_record import Build
     from ctrlgen.diagnosis.bootstrap import Bootstrap
     from ctrlgen.diagnosis.diagnosis import Diagnosis
     from ctrlgen.reproduce.row import Row as Reproduced
@@ -90,6 +92,41 @@ def print_comparison(outcome: job.Outcome) -> None:
     out.print(table)
     good = sum(row.passed for row in comparison.rows)
     out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+
+
+def print_build(build: Build) -> None:
+    """One line per target and one per check, then what failed and what did not run."""
+    good = sum(row.passed for row in build.comparison.rows)
+    out.print(
+        f"{good} of {len(build.comparison.rows)} comparisons within tolerance, {', '.join(build.comparison.compilers)}"
+    )
+    if build.in_loop.runs:
+        names = (
+            ("within limits", "right"),
+            ("worst", "right"),
+            ("player", "right"),
+            ("stack", "right"),
+            ("code", "right"),
+        )
+        table = table_of(("instructions a sample", "left"), *names, ("tables", "right"))
+        for run in build.in_loop.runs:
+            cost = ("-" if count is None else str(count) for count in counts(run).values())
+            within, worst, _, player = cost
+            sizes = (f"{size} B" for size in (run.stack, run.code, run.tables))
+            verdict = "[green]equal bits[/green]" if run.passed else "[red]FAILED[/red]"
+            table.add_row(
+                f"{run.core} {run.real.value}, {run.compiler.split()[0]}", within, worst, player, *sizes, verdict
+            )
+        out.print(table)
+    colours = {"passed": "green", "failed": "red", "not run": "yellow"}
+    table = table_of(("check", "left"), ("", "left"))
+    for check in build.checks:
+        table.add_row(escape(check.tool), f"[{colours[check.state]}]{check.state}[/{colours[check.state]}]")
+    out.print(table)
+    for what, remedy in build.not_run:
+        out.print(f"not run: {what}: {remedy}", style="yellow", markup=False, soft_wrap=True)
+    for line in build.failures:
+        out.print(f"failed: {line}", style="red", markup=False, soft_wrap=True)
 
 
 def table_of(*columns: tuple[str, Literal["left", "right"]]) -> Table:

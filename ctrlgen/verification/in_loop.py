@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile, cross_compilers
@@ -53,6 +54,12 @@ class TargetRun:
     ulp: int
     where: str
 
+    def worst(self, kind: str, *, within: bool = False) -> int | None:
+        """Most instructions of one call of `kind` ('step', 'settle', 'player'), or of those within all limits; None without one."""
+        costs = [cost for cost in self.costs if cost.what.startswith(kind)]
+        counts = [cost.worst_within if within else cost.worst for cost in costs]
+        return max((count for count in counts if count is not None), default=None)
+
     @property
     def passed(self) -> bool:
         """Whether every number is this computer's, and nothing is kept in writable memory of its own."""
@@ -60,28 +67,48 @@ class TargetRun:
 
 
 @dataclass(frozen=True)
+class Stopped:
+    """A run that did not come to its end, in the words of what stopped it: a refused program, a fault, a call that hangs."""
+
+    core: str
+    compiler: str
+    real: Real
+    words: str
+
+
+@dataclass(frozen=True)
 class InLoop:
-    """All runs, and what did not run with the reason or the remedy."""
+    """All runs, those that were stopped, and what did not run: (tool, remedy)."""
 
     runs: tuple[TargetRun, ...]
-    not_run: tuple[str, ...]
+    stopped: tuple[Stopped, ...]
+    not_run: tuple[tuple[str, str], ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything that ran did so to its end with this computer's numbers."""
+        return not self.stopped and all(run.passed for run in self.runs)
 
 
 def run_in_loop(folder: CFolder, reference: Reference, progress: Callable[[str], None] = lambda _: None) -> InLoop:
-    """Every core, arithmetic and cross compiler that is there. Raises ToolError where C is refused or a call does not return."""
+    """Every core, arithmetic and cross compiler that is there. Raises ToolError where this computer's own compiler refuses the C."""
     if not available():
-        return InLoop((), (f"no emulation: {MISSING}",))
+        return InLoop((), (), (("emulated cores", MISSING),))
     compilers = cross_compilers()
-    missing = tuple(f"{name}: {INSTALL[name]}" for name in INSTALL if name not in compilers)
-    runs = []
+    missing = tuple((name, INSTALL[name]) for name in INSTALL if name not in compilers)
+    runs: list[TargetRun] = []
+    stopped: list[Stopped] = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
         hosts = {real: Host(folder, reference, real, Path(name)) for real in Real}
         for core in CORES:
             for compiler, version in compilers.items():
                 for real in core.reals:
                     progress(f"{core.name}, {compiler}, {real.value}")
-                    runs.append(_run(folder, reference, hosts[real], core, compiler, version, Path(name)))
-    return InLoop(tuple(runs), missing)
+                    try:
+                        runs.append(_run(folder, reference, hosts[real], core, compiler, version, Path(name)))
+                    except ToolError as error:
+                        stopped.append(Stopped(core.name, version, real, str(error)))
+    return InLoop(tuple(runs), tuple(stopped), missing)
 
 
 def _run(
