@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.build_record import BUDGET_CORE, BUDGETS, Build, counts
+from ctrlgen.build_record import BUDGET_CORE, BUDGETS, Build
 from ctrlgen.figures import COLOURS, STYLE, plt, svg
 from ctrlgen.firmware import compression
 from ctrlgen.units import same_dimension
@@ -16,7 +16,7 @@ from ctrlgen.verification.in_loop import TargetRun
 SHOWN = {"um": ("nm", comparison.LENGTH, compression.LENGTH), "rad": ("nrad", comparison.ANGLE, compression.ANGLE)}
 SCALES = {"nm": 1e9, "nrad": 1e9}
 DECADES = 18  # below the tolerance that a logarithmic axis still shows: double's roundings
-KINDS = {"within": "within limits", "worst": "worst", "player": "player"}
+KINDS = {"scenario": "along the scenario", "worst": "at worst", "player": "player"}
 
 
 def draw_all(build: Build) -> dict[str, str]:
@@ -68,10 +68,15 @@ def _share_decades(axes: Axes, errors: list[np.ndarray]) -> None:
 
 def draw_instructions(build: Build) -> Figure:
     """Bars: instructions of a sample on each target, beside the budgets where they are stated for such a device."""
-    rows = [(run, kind, count) for run in build.in_loop.runs for kind, count in counts(run).items() if count]
+    rows = [
+        (run, kind, count)
+        for run in build.in_loop.runs
+        for kind, count in run.instructions.items()
+        if kind in KINDS and count
+    ]
     names = list(dict.fromkeys(target_name(run) for run, _, _ in rows))
     kinds = [kind for kind in KINDS if any(k == kind for _, k, _ in rows)]
-    figure, axes = plt.subplots(1, len(kinds), figsize=(8.2, 0.9 + 0.34 * len(names)), sharey=True, squeeze=False)
+    figure, axes = plt.subplots(1, len(kinds), figsize=(8.6, 1.1 + 0.34 * len(names)), sharey=True, squeeze=False)
     for panel, kind in zip(axes[0], kinds, strict=True):
         budget = BUDGETS[kind] if build.budgeted else None
         values = {target_name(run): count for run, k, count in rows if k == kind}
@@ -85,9 +90,11 @@ def draw_instructions(build: Build) -> Figure:
                 values[name] - 0.02 * widest, k, str(values[name]), va="center", ha="right", fontsize=8, color="white"
             )
         if budget is not None:
-            panel.axvline(budget, color="#222222", lw=1, ls="--")
+            meant = [k for k, name in enumerate(names) if name.startswith(f"{BUDGET_CORE} float")]
+            for k in meant:
+                panel.plot([budget, budget], [k - 0.5, k + 0.5], color="#222222", lw=1.2, ls="--")
         panel.set_xlim(0, 1.12 * widest)
-        goal = f", goal {budget}" if budget is not None else ""
+        goal = f"\ndashed: goal, {budget}" if budget is not None else ""
         panel.set_title(f"{KINDS[kind]}{goal}", fontsize=9)
         panel.set_xlabel("instructions a sample")
         panel.grid(axis="y", visible=False)

@@ -15,7 +15,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 
 from ctrlgen import job, report
-from ctrlgen.build_record import counts
 from ctrlgen.errors import CtrlgenError
 from ctrlgen.measures import in_unit
 from ctrlgen.recording import Recording
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
+SHOWN_COSTS = ("scenario", "worst", "player")
 CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
 
 
@@ -101,22 +101,19 @@ def print_build(build: Build) -> None:
         f"{good} of {len(build.comparison.rows)} comparisons within tolerance, {', '.join(build.comparison.compilers)}"
     )
     if build.in_loop.runs:
-        names = (
-            ("within limits", "right"),
-            ("worst", "right"),
-            ("player", "right"),
+        columns = (
+            *((kind, "right") for kind in SHOWN_COSTS),
             ("stack", "right"),
             ("code", "right"),
+            ("tables", "right"),
         )
-        table = table_of(("instructions a sample", "left"), *names, ("tables", "right"))
+        table = table_of(("instructions a sample", "left"), *columns)
         for run in build.in_loop.runs:
-            cost = ("-" if count is None else str(count) for count in counts(run).values())
-            within, worst, _, player = cost
+            most = run.instructions
+            counts = ("-" if most[kind] is None else str(most[kind]) for kind in SHOWN_COSTS)
             sizes = (f"{size} B" for size in (run.stack, run.code, run.tables))
             verdict = "[green]equal bits[/green]" if run.passed else "[red]FAILED[/red]"
-            table.add_row(
-                f"{run.core} {run.real.value}, {run.compiler.split()[0]}", within, worst, player, *sizes, verdict
-            )
+            table.add_row(f"{run.core} {run.real.value}, {run.compiler.split()[0]}", *counts, *sizes, verdict)
         out.print(table)
     colours = {"passed": "green", "failed": "red", "not run": "yellow"}
     table = table_of(("check", "left"), ("", "left"))

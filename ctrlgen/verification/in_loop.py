@@ -54,11 +54,24 @@ class TargetRun:
     ulp: int
     where: str
 
-    def worst(self, kind: str, *, within: bool = False) -> int | None:
-        """Most instructions of one call of `kind` ('step', 'settle', 'player'), or of those within all limits; None without one."""
+    def worst(self, kind: str, *, status_0: bool = False) -> int | None:
+        """Most instructions of one call whose `what` begins with `kind`, or of those answered with status 0; None without one."""
         costs = [cost for cost in self.costs if cost.what.startswith(kind)]
-        counts = [cost.worst_within if within else cost.worst for cost in costs]
+        counts = [cost.worst_within if status_0 else cost.worst for cost in costs]
         return max((count for count in counts if count is not None), default=None)
+
+    @property
+    def instructions(self) -> dict[str, int | None]:
+        """Most instructions of one call: along the scenario; answered with status 0; at all; to settle; of the player.
+
+        A target within all limits costs more where a limit of several channels, such as a stress, is near: the cheap bound
+        that the scenario stays below does not tell, and the limit itself is worked out.
+        """
+        kind = "step" if self.worst("step") is not None else "settle"
+        return {
+            "scenario": self.worst(f"{kind}, along"), "status_0": self.worst(kind, status_0=True), "worst": self.worst(kind),
+            "settle": self.worst("settle"), "player": self.worst("player"),
+        }  # fmt: skip
 
     @property
     def passed(self) -> bool:
@@ -96,6 +109,8 @@ def run_in_loop(folder: CFolder, reference: Reference, progress: Callable[[str],
         return InLoop((), (), (("emulated cores", MISSING),))
     compilers = cross_compilers()
     missing = tuple((name, INSTALL[name]) for name in INSTALL if name not in compilers)
+    if not compilers:
+        return InLoop((), (), missing)
     runs: list[TargetRun] = []
     stopped: list[Stopped] = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
@@ -164,6 +179,9 @@ def _sequences(
         for what, targets in (("step, random targets", random), ("step, hostile targets", ref.hostile)):
             machine.write(state, np.concatenate(rest), real)
             yield what, answers("step", targets), host.followed(targets, rest)
+    else:  # nothing but equilibria
+        machine.call(f"{online}_init", state)
+        yield "settle, along the scenario", answers("settle", ref.command), host.settled(ref.command)
     machine.call(f"{online}_init", state)
     yield "settle, random targets", answers("settle", random), host.settled(random)
     if "player" in machines:

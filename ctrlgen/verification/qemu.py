@@ -40,7 +40,7 @@ def check_on_boards(folder: CFolder, progress: Callable[[str], None] = lambda _:
 
 def _run(folder: CFolder, core: Core, real: Real, compiler: str, scratch: Path) -> Check:
     subject = ((folder.selftest[real], real),)
-    tool, version = f"{TOOL} -M {core.board} ({core.name})", version_of(TOOL) or ""
+    tool, version = f"{TOOL} -M {core.board} ({core.name}, {real.value})", version_of(TOOL) or ""
     for name in ("board.c", "board.ld"):
         write(name, {"selftest": folder.selftest[real]}, scratch / name)
     program = scratch / f"{core.board}_{real.suffix}.elf"
