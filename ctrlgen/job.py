@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from ctrlgen import figures, report
+from ctrlgen.build_page import write_build
+from ctrlgen.build_record import Build
 from ctrlgen.devices import Device
 from ctrlgen.errors import Fault, InputError, SolverError
 from ctrlgen.files import whole_folder, write_text
@@ -23,11 +25,18 @@ from ctrlgen.scenario import Scenario, load_scenario
 from ctrlgen.solution import Solution, solve
 from ctrlgen.units import from_si
 from ctrlgen.verification.comparison import Comparison, compare
+from ctrlgen.verification.hostile import check_hostile
+from ctrlgen.verification.in_loop import run_in_loop
+from ctrlgen.verification.qemu import check_on_boards
+from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.rules import check_rules
 from ctrlgen.verification.toolchains import find_compilers
+from ctrlgen.verification.tracking import tracking_errors
 from ctrlgen.workspace import Ball, Workspace
 
 Progress = Callable[[str], None]
 STAGES = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
+VERIFY_STAGES = 27  # in `verify`, every tool there: `run`'s, the reference, errors, six emulated, three boards, four analyzers, two hostile
 
 
 @dataclass(frozen=True)
@@ -77,6 +86,38 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
         progress("report")
         report.write_report(draft, solution, comparison, expected, c, drawn)
         return Outcome(solution, c, comparison, expected)
+
+
+def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet, quick: bool = False) -> Build:
+    """Solve, generate, compare, run on emulated targets, analyse, call with hostile inputs; one page into the folder `out`.
+
+    Left there: build.html, build.json, c/. `quick` leaves out cppcheck and the fuzzer, which take most of the time; they
+    are then listed as not run. Raises InputError, Unreachable, SolverError, ToolError (no C compiler, or one that refuses the
+    C); whatever else fails is in `failures` of what is returned, and what did not run in `not_run`.
+    """
+    find_compilers()
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        expected = expectations(solution)
+        progress("C sources")
+        c = generate(solution.scenario, solution.model, draft / "c", solution, figures.draw_all(solution))
+        progress("reference")
+        reference = Reference(solution)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"), reference)
+        progress("error along the trajectory")
+        errors = tracking_errors(c, reference)
+        in_loop = run_in_loop(c, reference, lambda target: progress(f"emulated: {target}"))
+        checks = (
+            *check_on_boards(c, lambda board: progress(f"board: {board}")),
+            *check_rules(c, lambda tool: progress(f"rules: {tool}"), quick=quick),
+            *check_hostile(
+                c, solution.scenario, solution.model, lambda tool: progress(f"hostile: {tool}"), quick=quick
+            ),
+        )
+        progress("page")
+        build = Build(solution, c, expected, comparison, in_loop, checks, errors)
+        write_build(draft, build)
+        return replace(build, c=replace(c, path=Path(out) / "c"))
 
 
 def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:

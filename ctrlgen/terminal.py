@@ -22,12 +22,14 @@ from ctrlgen.units import from_si, show
 
 if TYPE_CHECKING:
     from ctrlgen.batch import Row
+    from ctrlgen.build_record import Build
     from ctrlgen.diagnosis.bootstrap import Bootstrap
     from ctrlgen.diagnosis.diagnosis import Diagnosis
     from ctrlgen.reproduce.row import Row as Reproduced
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
+SHOWN_COSTS = ("scenario", "worst", "player")
 CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
 
 
@@ -90,6 +92,38 @@ def print_comparison(outcome: job.Outcome) -> None:
     out.print(table)
     good = sum(row.passed for row in comparison.rows)
     out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+
+
+def print_build(build: Build) -> None:
+    """One line per target and one per check, then what failed and what did not run."""
+    good = sum(row.passed for row in build.comparison.rows)
+    out.print(
+        f"{good} of {len(build.comparison.rows)} comparisons within tolerance, {', '.join(build.comparison.compilers)}"
+    )
+    if build.in_loop.runs:
+        columns = (
+            *((kind, "right") for kind in SHOWN_COSTS),
+            ("stack", "right"),
+            ("code", "right"),
+            ("tables", "right"),
+        )
+        table = table_of(("instructions a sample", "left"), *columns)
+        for run in build.in_loop.runs:
+            most = run.instructions
+            counts = ("-" if most[kind] is None else str(most[kind]) for kind in SHOWN_COSTS)
+            sizes = (f"{size} B" for size in (run.stack, run.code, run.tables))
+            verdict = "[green]equal bits[/green]" if run.passed else "[red]FAILED[/red]"
+            table.add_row(f"{run.core} {run.real.value}, {run.compiler.split()[0]}", *counts, *sizes, verdict)
+        out.print(table)
+    colours = {"passed": "green", "failed": "red", "not run": "yellow"}
+    table = table_of(("check", "left"), ("", "left"))
+    for check in build.checks:
+        table.add_row(escape(check.tool), f"[{colours[check.state]}]{check.state}[/{colours[check.state]}]")
+    out.print(table)
+    for what, remedy in build.not_run:
+        out.print(f"not run: {what}: {remedy}", style="yellow", markup=False, soft_wrap=True)
+    for line in build.failures:
+        out.print(f"failed: {line}", style="red", markup=False, soft_wrap=True)
 
 
 def table_of(*columns: tuple[str, Literal["left", "right"]]) -> Table:

@@ -14,7 +14,19 @@ from pathlib import Path
 import pytest
 from conftest import DEVICE, SCENARIOS
 
-COMMANDS = ("run", "solve", "generate", "compare", "fmu", "check", "bode", "workspace", "reproduce", "diagnose")
+COMMANDS = (
+    "run",
+    "solve",
+    "generate",
+    "compare",
+    "verify",
+    "fmu",
+    "check",
+    "bode",
+    "workspace",
+    "reproduce",
+    "diagnose",
+)
 
 
 def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -15,6 +15,7 @@ from conftest import SCENARIOS, effect_device
 
 from ctrlgen import Controller, InputError, Status, build_model, load_scenario, simulate
 from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.fmu import write_fmus
 from ctrlgen.firmware.plant import plant_of, write_plant
 from ctrlgen.verification.toolchains import FLAGS
@@ -483,6 +484,7 @@ def test_nothing_required_by_misra_is_reported_for_a_plant(kind, circle, tmp_pat
     done = subprocess.run(command, capture_output=True, text=True)
     found = {line.split()[0] for line in done.stderr.splitlines()}
     assert "misra-c2012-8.9" in found  # an advisory that the tables earn: the rules were read
+    found = {rule for rule in found if not permits(rule.removeprefix("misra-c2012-"), f"{name}.c")}
     assert found <= ADVISORY, (found - ADVISORY, done.stderr[:2000])
 
 

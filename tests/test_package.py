@@ -187,7 +187,7 @@ def test_the_same_input_gives_the_same_bytes_of_everything(packages, circle, tmp
     [
         ("online", r"5\.5e-05f", "5.6e-05f"),  # the stroke, wherever it stands
         ("online", r"int status = 0;", "int status = 64;"),
-        ("player", r"(CONTROL\[\d+\]\[6\] = \{\n    \{ 0\.0\d)(\d)", r"\g<1>0"),
+        ("player", r"(CONTROL\[\d+\]\[6\] = \{\n        \{ 0\.0\d)(\d)", r"\g<1>0"),
     ],
 )
 def test_the_selftest_finds_a_wrong_constant(packages, compiler, tmp_path, piece, pattern, replacement):

@@ -20,7 +20,7 @@ from ctrlgen.firmware.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.folder import CFolder, generate, write_harness
 from ctrlgen.firmware.misra import ADVISORY, MANDATORY, rule_class
 from ctrlgen.verification.check import Check
-from ctrlgen.verification.comparison import _run
+from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile
 from ctrlgen.verification.rules import ANALYZERS, _analyzed, check_rules
 
@@ -80,7 +80,7 @@ def reported(check: Check) -> set[tuple[str, str]]:
 def test_the_generated_c_breaks_no_rule(checks, tool):
     check = ran(checks[tool])
     assert check.passed, [str(f) for f in check.findings if not f.permitted]
-    assert check.version and len(check.subjects) == 4
+    assert check.version and len(check.subjects) == 8  # controller, its vectors, their test and its program, twice
 
 
 def test_the_list_of_deviations_is_what_is_reported_no_more_no_less(folder, checks):
@@ -289,7 +289,7 @@ def test_from_a_state_of_garbage_c_and_python_answer_alike_and_admissibly(
         for row in target:
             steps.append(controller.step(state, row))
             state = steps[-1].state
-    answer = _run(program, "follow", target, 2 * n + model.n_states, (x, z))
+    answer = run_host(program, "follow", target, 2 * n + model.n_states, (x, z))
     low, high = model.u_bounds
     for row, step in zip(answer, steps, strict=True):
         assert not step.status & Status.INPUT and int(row[0]) == step.status

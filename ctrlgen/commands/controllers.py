@@ -1,4 +1,4 @@
-"""Scenarios and their C: run, solve, generate, compare, fmu."""
+"""Scenarios and their C: run, solve, generate, compare, verify, fmu."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ctrlgen.commands.app import OutFolder, ScenarioPath, app
 from ctrlgen.scenario import load_scenario
 from ctrlgen.terminal import (
     out,
+    print_build,
     print_comparison,
     print_solution,
     progress,
@@ -73,6 +74,31 @@ def compare(scenario: ScenarioPath) -> None:
         outcome = job.compare_only(scenario, advance)
     print_comparison(outcome)
     _exit(outcome)
+
+
+@app.command()
+def verify(
+    scenario: ScenarioPath,
+    out_folder: OutFolder,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Leave out cppcheck and the fuzzer; both are then listed as not run.")
+    ] = False,
+) -> None:
+    """All that is known of a scenario's C on one page: limits, cost on each target, equivalence, rules, provenance.
+
+    Solves, generates, compares with every compiler, runs the C on emulated Cortex-M4F and M7 and boards, analyses it and calls
+    it with hostile inputs. Leaves in --out: build.html (open this first), build.json (every number), and c/. The exit status
+    is 1 when anything failed. A tool that is missing fails nothing and passes nothing: what it would have checked is listed as
+    not run, with the command that installs it.
+
+    Example:  ctrlgen verify scenarios/circle20 --out out/verify
+    """
+    with progress(job.VERIFY_STAGES) as advance:
+        build = job.verify(scenario, out_folder, advance, quick)
+    print_build(build)
+    out.print(f"[bold]page[/bold]  {escape(str(out_folder / 'build.html'))}", soft_wrap=True)
+    if not build.passed:
+        raise typer.Exit(1)
 
 
 @app.command()

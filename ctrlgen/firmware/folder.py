@@ -85,7 +85,7 @@ def generate(
             for kind in ("h", "c"):
                 written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
         written.append(write("test.c", contexts[real], out / "test" / f"test_{scenario.name}_{real.suffix}.c"))
-    of_c = [path.name for path in written]
+    of_c = {path.name: path.read_text(encoding="utf-8") for path in written}
     written.append(write("DEVIATIONS.md", {"cppcheck": CPPCHECK, **deviations_context(of_c)}, out / "DEVIATIONS.md"))
     write_package(out, scenario, contexts, figures or {}, written)
     cost = contexts[Real.FLOAT]["cost"]

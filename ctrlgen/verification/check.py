@@ -12,6 +12,8 @@ from ctrlgen.firmware.cprint import Real
 
 PATIENCE = 900.0  # s, after which a tool is taken to hang
 
+LEFT_OUT = "left out by --quick; run without it"
+
 State = Literal["passed", "failed", "not run"]
 
 

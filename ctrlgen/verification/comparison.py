@@ -29,6 +29,7 @@ from ctrlgen.units import from_si, same_dimension
 from ctrlgen.verification.host import build_host, run_host
 from ctrlgen.verification.reference import Reference
 from ctrlgen.verification.toolchains import COMPILERS, find_compilers
+from ctrlgen.verification.tracking import reached
 
 # What a difference may be, and why.
 LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometre; a tenth, below any sensor here
@@ -75,15 +76,23 @@ class Comparison:
         return bool(self.rows) and all(row.passed for row in self.rows)
 
 
-def compare(folder: CFolder, solution: Solution, progress: Callable[[str], None] = lambda _: None) -> Comparison:
-    """Builds and runs `folder` with every compiler present. Raises ToolError when a build or a run fails."""
+def compare(
+    folder: CFolder,
+    solution: Solution,
+    progress: Callable[[str], None] = lambda _: None,
+    reference: Reference | None = None,
+) -> Comparison:
+    """Builds and runs `folder` with every compiler present; `reference` where it is there already.
+
+    Raises ToolError when a build or a run fails.
+    """
     compilers = find_compilers()
     builds = [(compiler, real) for compiler in compilers for real in Real]
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch, ThreadPoolExecutor(max_workers=2) as pool:
         for real in Real:
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
         programs = [pool.submit(build_host, compiler, real, folder, Path(scratch)) for compiler, real in builds]
-        reference = Reference(solution)  # while the compilers work
+        reference = reference or Reference(solution)  # while the compilers work
         rows: list[Row] = []
         for (compiler, real), program in zip(builds, programs, strict=True):
             rows += _rows(f"{compiler} {real.value}", real, program.result(), reference, folder.compression.get(real))
@@ -143,12 +152,12 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
         channels = [i for i, u in enumerate(m.signals[ref.scenario.file.follow].units) if same_dimension(u, unit)]
         plain = np.flatnonzero(ref.settled[: len(ref.random) // 2, 0] == 0)
         if channels and plain.size:
-            reached = _equilibria(ref, settled[plain])
+            at_rest = _equilibria(ref, settled[plain])
             span = slice(channels[0], channels[-1] + 1)
             add(
                 "random targets, online C -> model - target",
                 ref.scenario.file.follow,
-                reached - ref.random[plain],
+                at_rest - ref.random[plain],
                 limit,
                 span,
             )
@@ -170,18 +179,12 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
 
     role = ref.scenario.file.follow
     for what, drives in _drive_sets(program, ref, online):
-        if moving:
-            first = ref.solution.trace
-            reached = simulate(m, drives, ref.scenario.sample_time, first.x[0], first.z[0]).signals[role]
-        else:
-            z, state = followed[:, 1 + n : 1 + 2 * n], followed[:, 1 + 2 * n :]
-            x = np.hstack([state, ref.solution.trace.x[:, m.n_states :]])
-            reached = trace(m, np.zeros(len(z)), x, z, drives).signals[role]
+        off = reached(ref, drives, followed) - ref.path
         angle, length = (ANGLE[real], LENGTH[real]) if what == "online C" else (compressed.ANGLE, compressed.LENGTH)
         for unit, limit in (("rad", angle), ("um", length)):
             channels = [i for i, u in enumerate(m.signals[role].units) if same_dimension(u, unit)]
             if channels:
-                add(f"{what} -> model - command", role, reached - ref.path, limit, slice(channels[0], channels[-1] + 1))
+                add(f"{what} -> model - command", role, off, limit, slice(channels[0], channels[-1] + 1))
     if compression is not None:
         # against the curve evaluated by NumPy: its roundings, for a compiler that fuses a product and a sum
         near = ROUNDINGS * float(np.finfo(np.float32 if real is Real.FLOAT else float).eps) * np.abs(solved).max()

@@ -47,7 +47,7 @@ class Machine:
             self.symbols = {s.name: s["st_value"] for s in elf.get_section_by_name(".symtab").iter_symbols()}
             sections = [(s.name, s["sh_size"], s["sh_flags"], s["sh_type"]) for s in elf.iter_sections()]
             for segment in elf.iter_segments():
-                if segment["p_type"] == "PT_LOAD":
+                if segment["p_type"] == "PT_LOAD" and segment["p_memsz"]:
                     self._load(segment["p_vaddr"], segment.data().ljust(segment["p_memsz"], b"\0"))
         loaded = [(name, size, flags) for name, size, flags, kind in sections if flags & 2 and kind != "SHT_NOBITS"]
         self.code = sum(size for _, size, flags in loaded if flags & 4)  # with the constants between instructions

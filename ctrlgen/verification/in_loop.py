@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile, cross_compilers
@@ -53,6 +54,25 @@ class TargetRun:
     ulp: int
     where: str
 
+    def worst(self, kind: str, *, status_0: bool = False) -> int | None:
+        """Most instructions of one call whose `what` begins with `kind`, or of those answered with status 0; None without one."""
+        costs = [cost for cost in self.costs if cost.what.startswith(kind)]
+        counts = [cost.worst_within if status_0 else cost.worst for cost in costs]
+        return max((count for count in counts if count is not None), default=None)
+
+    @property
+    def instructions(self) -> dict[str, int | None]:
+        """Most instructions of one call: along the scenario; answered with status 0; at all; to settle; of the player.
+
+        A target within all limits costs more where a limit of several channels, such as a stress, is near: the cheap bound
+        that the scenario stays below does not tell, and the limit itself is worked out.
+        """
+        kind = "step" if self.worst("step") is not None else "settle"
+        return {
+            "scenario": self.worst(f"{kind}, along"), "status_0": self.worst(kind, status_0=True), "worst": self.worst(kind),
+            "settle": self.worst("settle"), "player": self.worst("player"),
+        }  # fmt: skip
+
     @property
     def passed(self) -> bool:
         """Whether every number is this computer's, and nothing is kept in writable memory of its own."""
@@ -60,28 +80,50 @@ class TargetRun:
 
 
 @dataclass(frozen=True)
+class Stopped:
+    """A run that did not come to its end, in the words of what stopped it: a refused program, a fault, a call that hangs."""
+
+    core: str
+    compiler: str
+    real: Real
+    words: str
+
+
+@dataclass(frozen=True)
 class InLoop:
-    """All runs, and what did not run with the reason or the remedy."""
+    """All runs, those that were stopped, and what did not run: (tool, remedy)."""
 
     runs: tuple[TargetRun, ...]
-    not_run: tuple[str, ...]
+    stopped: tuple[Stopped, ...]
+    not_run: tuple[tuple[str, str], ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything that ran did so to its end with this computer's numbers."""
+        return not self.stopped and all(run.passed for run in self.runs)
 
 
 def run_in_loop(folder: CFolder, reference: Reference, progress: Callable[[str], None] = lambda _: None) -> InLoop:
-    """Every core, arithmetic and cross compiler that is there. Raises ToolError where C is refused or a call does not return."""
+    """Every core, arithmetic and cross compiler that is there. Raises ToolError where this computer's own compiler refuses the C."""
     if not available():
-        return InLoop((), (f"no emulation: {MISSING}",))
+        return InLoop((), (), (("emulated cores", MISSING),))
     compilers = cross_compilers()
-    missing = tuple(f"{name}: {INSTALL[name]}" for name in INSTALL if name not in compilers)
-    runs = []
+    missing = tuple((name, INSTALL[name]) for name in INSTALL if name not in compilers)
+    if not compilers:
+        return InLoop((), (), missing)
+    runs: list[TargetRun] = []
+    stopped: list[Stopped] = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
         hosts = {real: Host(folder, reference, real, Path(name)) for real in Real}
         for core in CORES:
             for compiler, version in compilers.items():
                 for real in core.reals:
                     progress(f"{core.name}, {compiler}, {real.value}")
-                    runs.append(_run(folder, reference, hosts[real], core, compiler, version, Path(name)))
-    return InLoop(tuple(runs), missing)
+                    try:
+                        runs.append(_run(folder, reference, hosts[real], core, compiler, version, Path(name)))
+                    except ToolError as error:
+                        stopped.append(Stopped(core.name, version, real, str(error)))
+    return InLoop(tuple(runs), tuple(stopped), missing)
 
 
 def _run(
@@ -137,6 +179,9 @@ def _sequences(
         for what, targets in (("step, random targets", random), ("step, hostile targets", ref.hostile)):
             machine.write(state, np.concatenate(rest), real)
             yield what, answers("step", targets), host.followed(targets, rest)
+    else:  # nothing but equilibria
+        machine.call(f"{online}_init", state)
+        yield "settle, along the scenario", answers("settle", ref.command), host.settled(ref.command)
     machine.call(f"{online}_init", state)
     yield "settle, random targets", answers("settle", random), host.settled(random)
     if "player" in machines:

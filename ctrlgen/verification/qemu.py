@@ -40,16 +40,16 @@ def check_on_boards(folder: CFolder, progress: Callable[[str], None] = lambda _:
 
 def _run(folder: CFolder, core: Core, real: Real, compiler: str, scratch: Path) -> Check:
     subject = ((folder.selftest[real], real),)
-    tool, version = f"{TOOL} -M {core.board} ({core.name})", version_of(TOOL) or ""
+    tool, version = f"{TOOL} -M {core.board} ({core.name}, {real.value})", version_of(TOOL) or ""
     for name in ("board.c", "board.ld"):
         write(name, {"selftest": folder.selftest[real]}, scratch / name)
     program = scratch / f"{core.board}_{real.suffix}.elf"
     sources = [*folder.sources(real), scratch / "board.c"]
-    cross_compile(compiler, core, sources, folder.path, "reset", program, ("-T", str(scratch / "board.ld"), "-lc"))
     try:
-        done = run_tool([TOOL, "-M", core.board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
-    except OSError as error:
-        raise ToolError(f"{TOOL} does not start: {error}") from error
+        cross_compile(compiler, core, sources, folder.path, "reset", program, ("-T", str(scratch / "board.ld"), "-lc"))
+    except ToolError as error:
+        return judged(tool, version, subject, [Finding(sources[0].name, 1, "build", "error", str(error))])
+    done = run_tool([TOOL, "-M", core.board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
     said = SAID.search(done.stdout)
     if said and said[1] == "0" and done.returncode == 0:
         return judged(tool, version, subject, (), f"{said[2]} of {said[2]} reference vectors agree")
