@@ -6,12 +6,14 @@ within what is stated of them. Every parameter of every cause is fitted jointly 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ctrlgen.diagnosis.noise import Noise, autoregression
+from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.recording import Record, Recording
@@ -152,9 +154,9 @@ class Fitter:
         if len(start) == 0:
             return response.outputs(record, fit.theta)
         sizes = _start_sizes(response)
-        y, slopes = response.sensitivities(record, fit.theta, start)  # close to linear in what a record starts with
+        y, slopes = response.sensitivities(record, fit.theta, start, by_free=False)  # close to linear in the start
         white = self._white(record, y)
-        J = self.noise.whiten(slopes[:, :, len(fit.theta) :], record.valid).reshape(len(white), len(start)) * sizes
+        J = self.noise.whiten(slopes, record.valid).reshape(len(white), len(start)) * sizes
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
             return y
         with_prior = np.vstack([J, np.eye(len(start))])
@@ -212,9 +214,10 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
         if promised < NEGLIGIBLE:
             break
         tried = np.clip(x + step, low, high)
-        r_tried, J_tried = problem.evaluate(tried)
+        r_tried = problem.residual(tried)
         if r_tried @ r_tried < r @ r:
-            x, r, J, damping = tried, r_tried, J_tried, max(damping / 10, 1e-9)
+            x, damping = tried, max(damping / 10, 1e-9)
+            r, J = problem.evaluate(x)
         else:
             damping = max(damping * 30, 1e-4)
             if damping > 1e8:
@@ -236,6 +239,7 @@ class _Problem:
         self.n_starts = sum(map(len, self.sizes))
         self.k = len(structure.unknowns)
         self.scale = np.concatenate([[u.size for u in structure.unknowns], *self.sizes]).astype(float)
+        self.prior = [(i, u) for i, u in enumerate(structure.unknowns) if u.sd]
         self.at: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.log = np.array(
             [u.cause is not None and not u.amplitude and u.unit == "s" and u.low > 0 for u in structure.unknowns]
@@ -270,52 +274,64 @@ class _Problem:
         )
         return self.inner(low), self.inner(high)
 
-    def _evaluate(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        if self.at is not None and np.array_equal(self.at[0], scaled):
-            return self.at
-        values, k, noise = self.outer(scaled), self.k, self.fitter.noise
-        by_inner = self.by_inner(values)
-        rows, slopes, first = [], [], k
+    def _records(self, values: np.ndarray) -> Iterator[tuple[Record, Response, np.ndarray, slice]]:
+        """Each record with its response, what it starts with, and the places of that in the `values`."""
+        first = self.k
         for record, sizes in zip(self.records, self.sizes, strict=True):
-            response = self.responses[record.sample_time, record.linear]
             own = slice(first, first + len(sizes))
             first += len(sizes)
-            y, Y = response.sensitivities(record, values[:k], values[own])
-            left = np.where(record.valid, record.observed - y, 0.0)
-            white = noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid).ravel()
-            J = np.zeros((len(white), len(scaled)))
-            W = noise.whiten(np.clip(np.nan_to_num(Y), -FAR, FAR), record.valid).reshape(len(white), Y.shape[2])
-            J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
-            rows.append(white)
-            slopes.append(J * by_inner)
-        self.n_readings = sum(map(len, rows))
-        prior = [(i, u) for i, u in enumerate(self.structure.unknowns) if u.sd]
-        rows.append(np.array([(values[i] - u.nominal) / u.sd for i, u in prior]))
-        P = np.zeros((len(prior), len(scaled)))
-        for row, (i, u) in enumerate(prior):
-            P[row, i] = self.scale[i] / u.sd
-        slopes += [P, np.eye(len(scaled))[k:]]
-        rows.append(scaled[k:])
-        self.at = (
-            scaled.copy(),
-            _finite(np.concatenate(rows)),
-            np.nan_to_num(np.vstack(slopes), posinf=0.0, neginf=0.0),
-        )
-        return self.at
+            yield record, self.responses[record.sample_time, record.linear], values[own], own
+
+    def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
+        left = np.where(record.valid, record.observed - y, 0.0)
+        return self.fitter.noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid).ravel()
+
+    def _joined(self, rows: list[np.ndarray], scaled: np.ndarray) -> np.ndarray:
+        """The records' rows and those of the prior."""
+        values = self.outer(scaled)
+        off = [(values[i] - u.nominal) / u.sd for i, u in self.prior]
+        return _finite(np.concatenate([*rows, off, scaled[self.k :]]))
+
+    def residual(self, scaled: np.ndarray) -> np.ndarray:
+        """The residual alone: a fraction of the work that its slopes take."""
+        values = self.outer(scaled)
+        motions = self._records(values)
+        rows = [self._white(record, one.outputs(record, values[: self.k], start)) for record, one, start, _ in motions]
+        return self._joined(rows, scaled)
 
     def evaluate(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual and slopes."""
-        return self._evaluate(scaled)[1:]
+        if self.at is not None and np.array_equal(self.at[0], scaled):
+            return self.at[1:]
+        values, k = self.outer(scaled), self.k
+        by_inner = self.by_inner(values)
+        rows, slopes = [], []
+        for record, response, start, own in self._records(values):
+            y, Y = response.sensitivities(record, values[:k], start)
+            rows.append(self._white(record, y))
+            J = np.zeros((len(rows[-1]), len(scaled)))
+            W = self.fitter.noise.whiten(np.clip(np.nan_to_num(Y), -FAR, FAR), record.valid)
+            W = W.reshape(len(J), Y.shape[2])
+            J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
+            slopes.append(J * by_inner)
+        P = np.zeros((len(self.prior), len(scaled)))
+        for row, (i, u) in enumerate(self.prior):
+            P[row, i] = self.scale[i] / u.sd
+        slopes += [P, np.eye(len(scaled))[k:]]
+        J = np.nan_to_num(np.vstack(slopes), posinf=0.0, neginf=0.0)
+        self.at = scaled.copy(), self._joined(rows, scaled), J
+        return self.at[1:]
 
     def result(self, inner: np.ndarray) -> Fit:
         """The fit at an optimum."""
-        _, rows, J = self._evaluate(inner)
+        rows, J = self.evaluate(inner)
         values = self.outer(inner)
+        n_readings = sum(r.observed.size for r in self.records)
         starts = np.split(values[self.k :], np.cumsum([len(s) for s in self.sizes])[:-1])
-        readings = rows[: self.n_readings]
+        readings = rows[:n_readings]
         usable = sum(int(self.fitter.noise.usable(r.valid).sum()) for r in self.records)
         return Fit(
             self.structure, values[: self.k], tuple(starts), float(readings @ readings), usable, rows,
             J / self.by_inner(values),
-            float(rows[self.n_readings :] @ rows[self.n_readings :]),
+            float(rows[n_readings:] @ rows[n_readings:]),
         )  # fmt: skip

@@ -4,8 +4,6 @@ State S = (x, z), drive u, ambient e, free parameters p:
 
     S+ = F(S, u, u+, e, p),  y = H(S, u, e, p),
     D+ = F_S D + F_p,        dy/dp = H_S D + H_p,   D = dS/dp.
-
-What depends on p alone (a Jacobian of struts, say) is computed once for a record, not once a sample.
 """
 
 from __future__ import annotations
@@ -17,14 +15,14 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.carried import carried
+from ctrlgen.diagnosis.equations import Equations, equations
 from ctrlgen.diagnosis.mapped import Recursion, evaluate
 from ctrlgen.model import Model, build_model
-from ctrlgen.motion import balanced, next_sample
+from ctrlgen.motion import balanced
 from ctrlgen.recording import Record
 
 START_NEWTON_STEPS = 12  # from home to the first displacement; later ones start from the sample before
-POSE_NEWTON_STEPS = 8
-WORTH = 500  # operations on parameters alone, from which on they are done once a record
 
 
 class Response:
@@ -37,6 +35,7 @@ class Response:
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
         self.model: Model = build_model(device, free, self.ambient, look_back)
+        self._carried: dict[bool, Recursion] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
 
     @cached_property
@@ -57,34 +56,21 @@ class Response:
         return ca.vertcat(*rows)
 
     @cached_property
-    def _kernel(self) -> tuple[ca.Function, ca.Function]:
-        """(p -> constants, their Jacobian) and (S, u, u+, e, constants -> S+, y, F_S, F_c, H_S, H_c)."""
-        m = self.model
-        S, e = ca.vertcat(m.x, m.z), self.ambient
-        steps = POSE_NEWTON_STEPS if not np.isfinite(self.sample_time) else 4
-        after = next_sample(m, self.sample_time, self.linear, steps)
-        following = ca.vertcat(after.x, after.z)
-        if np.isfinite(self.sample_time):
-            y = self._observed
-        else:  # a settled pose is read after it has settled
-            y = ca.substitute(self._observed, ca.vertcat(m.x, m.z, m.u), ca.vertcat(after.x, after.z, after.u_next))
-        c, value = m.p, m.p
-        rows, symbols, parametric = ca.extract_parametric([following, y], m.p, {"extract_trivial": True})
-        if ca.Function("work", [m.p], parametric).n_instructions() > WORTH:
-            (following, y), c, value = rows, ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
-        constants = ca.Function("constants", [m.p], [value, ca.jacobian(value, m.p)])
-        slopes = [ca.jacobian(a, b) for a in (following, y) for b in (S, c)]
-        sample = ca.Function(
-            "sample", [S, m.u, after.u_next, e, c], [following, y, *slopes], {"cse": True}
-        )  # fmt: skip
-        return constants, sample
+    def _equations(self) -> Equations:
+        return equations(self.model, self._observed, self.sample_time, self.linear)
+
+    @cached_property
+    def _sloped(self) -> ca.Function:
+        """`given` of the equations -> F_S, F_c, H_S, H_c."""
+        q = self._equations
+        slopes = [ca.jacobian(a, b) for a in (q.following, q.y) for b in (q.given[0], q.given[4])]
+        return ca.Function("sloped", q.given, slopes, {"cse": True})
 
     def linearised(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
         """Along any motion, for the `chosen` m of the free numbers, at `p`."""
-        constants, sample = self._kernel
-        c, by_p = constants(p)
+        c, by_p = self._equations.constants(p)
         given = self._symbols[:4]
-        _, _, F_S, F_c, H_S, H_c = sample(*given, c)
+        F_S, F_c, H_S, H_c = self._sloped(*given, c)
         by_f = by_p[:, list(chosen)]
         return Linearised(ca.Function("linearised", given, [F_S, F_c @ by_f, H_S, H_c @ by_f]))
 
@@ -109,48 +95,47 @@ class Response:
 
     def motion(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y), SI."""
-        c = np.tile(self._kernel[0](p)[0].full().T, (len(record.time), 1))
+        c = np.tile(self._equations.constants(p)[0].full().T, (len(record.time), 1))
         return self._moving.run(self._start(record, p, start), *self._inputs(record), c)
 
     def sensitivities(
-        self, record: Record, p: np.ndarray, start: np.ndarray | None = None
+        self, record: Record, p: np.ndarray, start: np.ndarray | None = None, by_free: bool = True
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Readings (n, n_y) and their derivatives (n, n_y, n_p + len(initial)) by `free`, then by what the record starts with."""
-        constants, _ = self._kernel
-        c, by_p = constants(p)
-        k, n_i, n_y, n = len(self.free), len(self.initial), len(self.channels), len(record.time)
-        D_0 = np.zeros((self.n_s, k + n_i))
-        D_0[list(self.initial), k + np.arange(n_i)] = 1.0
-        begin = np.concatenate([self._start(record, p, start), D_0.ravel(order="F")])
+        """Readings (n, n_y) and their derivatives (n, n_y, m) by `free`, where wanted, then by what the record starts with."""
+        c, by_p = self._equations.constants(p)
+        k, n_i, n_y, n = len(self.free) * by_free, len(self.initial), len(self.channels), len(record.time)
+        T_0 = np.zeros((k + n_i, self.n_s))
+        T_0[k + np.arange(n_i), list(self.initial)] = 1.0
+        begin = np.concatenate([self._start(record, p, start), T_0.ravel(order="F")])
         slow = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(by_p.nonzeros())))
-        values = self._sensitive.run(begin, *self._inputs(record), *slow)[1]
-        return values[:, :n_y], values[:, n_y:].reshape(n, k + n_i, n_y).transpose(0, 2, 1)
+        values = self._carrying(by_free).run(begin, *self._inputs(record), *slow)[1]
+        return values[:, :n_y], values[:, n_y:].reshape(n, n_y, k + n_i)
 
     @cached_property
     def _moving(self) -> Recursion:
         """The sample map."""
-        S, *others = self._symbols
-        values = [ca.densify(value) for value in self._kernel[1](S, *others)[:2]]
-        return Recursion(ca.Function("one", [S, *others], values))
+        q = self._equations
+        return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)], {"cse": True}))
 
-    @cached_property
-    def _sensitive(self) -> Recursion:
+    def _carrying(self, by_free: bool) -> Recursion:
         """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
-        k, n_i = len(self.free), len(self.initial)
-        by_p = ca.SX.sym("by_p", self._kernel[0].sparsity_out(1))
-        seed = ca.horzcat(by_p, ca.SX(by_p.shape[0], n_i))
-        S, *others = (ca.SX.sym(f"s{i}", s.numel()) for i, s in enumerate(self._symbols))  # an empty one has no name
-        D = ca.SX.sym("D", self.n_s, k + n_i)
-        following, y, F_S, F_c, H_S, H_c = self._kernel[1](S, *others)
-        results = (following, F_S @ D + F_c @ seed), (y, H_S @ D + H_c @ seed)
-        given = [ca.vertcat(S, ca.vec(D)), *others, ca.vertcat(ca.SX(0, 1), *by_p.nonzeros())]
-        values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in results]
-        return Recursion(ca.Function("one", given, values, {"cse": True}))
+        if by_free not in self._carried:
+            n_i, pattern = len(self.initial), self._equations.constants.sparsity_out(1)
+            by_p = ca.MX.sym("by_p", pattern.nnz())
+            seed = ca.MX(n_i, pattern.size1())
+            if by_free:
+                seed = ca.vertcat(ca.MX(pattern, by_p).T, seed)
+            state, others = ca.MX.sym("state", self.n_s * (1 + seed.shape[0])), self._symbols[1:]
+            S, T = state[: self.n_s], ca.reshape(state[self.n_s :], seed.shape[0], self.n_s)
+            after, T, y, Y = carried(self._equations, T, seed, [S, *others])
+            values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((after, T), (y, Y))]
+            self._carried[by_free] = Recursion(ca.Function("one", [state, *others, by_p], values))
+        return self._carried[by_free]
 
     @cached_property
     def _symbols(self) -> list[ca.MX]:
         """S, u, u+, ambient, constants."""
-        n_u, n_c = self.model.u.numel(), self._kernel[0].size1_out(0)
+        n_u, n_c = self.model.u.numel(), self._equations.constants.size1_out(0)
         return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
 
     def _start(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:

@@ -1,0 +1,106 @@
+"""The slopes carried from step to step against those of the whole sample, and what a fit asks of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import SCENARIOS
+
+from ctrlgen import load_device, motion
+from ctrlgen.diagnosis import equations
+from ctrlgen.diagnosis.fit import levenberg_marquardt
+from ctrlgen.diagnosis.hypotheses import hypotheses, nominal_links
+from ctrlgen.diagnosis.response import Response
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.recording import Record
+
+H, N = 1e-3, 300
+AXIS = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
+LOOP = '\n[loop]\nposition_gain = "60 1/s"\nvelocity_gain = "20 V/(m/s)"\nintegral_gain = "5e4 V/(m*s)"\n'
+SHAPES = {
+    "creep": {"gain": 0.05, "tau": 0.1}, "bouc_wen": {"stiffness": 1e4, "reach": 3e-5, "loop": 0.9},
+    "resonance": {"stiffness": 2e4, "frequency": 160.0, "damping": 0.1}, "coulomb": {"force": 0.5, "smoothing": 1e-3},
+}  # fmt: skip
+
+
+def response(text, effects, linear, folder) -> tuple[Response, np.ndarray]:
+    """Of a device with some effects, all their parameters free, and where these start."""
+    (folder / "device.toml").write_text(text)
+    device, channel = load_device(folder / "device.toml"), "reading.axis"
+    structure = Structure(device)
+    for h in hypotheses(device, nominal_links(device), (channel,), H, False):
+        if h.effect in effects:
+            structure = structure.with_cause(h, SHAPES[h.effect])
+    assert len(structure.causes) == len(effects)
+    free = [unknown.path for unknown in structure.unknowns]
+    return Response(structure.described, free, (channel,), H, linear), structure.start
+
+
+def record(amplitude) -> Record:
+    t = H * np.arange(N)
+    u = amplitude * (np.sin(2 * np.pi * 7 * t) + 0.3 * np.sin(2 * np.pi * 31 * t + 1))
+    return Record("fit", "fit", t, H, u[:, None], np.zeros((N, 1)), False, None, np.ones((N, 1), bool))
+
+
+def differentiated(r: Response, moved: Record, p: np.ndarray) -> np.ndarray:
+    """dy/dp and dy/dstart (n, n_y, m): D+ = F_S D + F_p, with the slopes of whole samples."""
+    after, _ = r.motion(moved, p)
+    before = np.vstack([r.begin(moved, p), after[:-1]])
+    F_S, F_p, H_S, H_p = r.linearised(p, range(len(p))).along(before, *r._inputs(moved))
+    starts = len(r.initial)
+    D, Y = np.zeros((r.n_s, len(p) + starts)), []
+    D[list(r.initial), len(p) + np.arange(starts)] = 1.0
+    nothing = [np.zeros((n, starts)) for n in (r.n_s, len(r.channels))]
+    for k in range(N):
+        Y.append(H_S[k] @ D + np.hstack([H_p[k], nothing[1]]))
+        D = F_S[k] @ D + np.hstack([F_p[k], nothing[0]])
+    return np.array(Y)
+
+
+def agree(found: np.ndarray, wanted: np.ndarray) -> None:
+    size = np.abs(wanted).max(axis=(0, 1))
+    assert np.all(size > 0)
+    assert np.all(np.abs(found - wanted).max(axis=(0, 1)) < 1e-10 * size)
+
+
+@pytest.mark.parametrize("worth", [equations.WORTH, -1], ids=["parameters", "constants"])
+@pytest.mark.parametrize("linear", [False, True], ids=["held", "linear"])
+@pytest.mark.parametrize("steps", [1, 3])
+@pytest.mark.parametrize("text, size", [(AXIS, 1.0), (AXIS + LOOP, 4e-5)], ids=["open", "loop"])
+def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, text, size, steps, linear, worth):
+    monkeypatch.setattr(motion, "substeps", lambda A, sample_time: steps)
+    monkeypatch.setattr(equations, "WORTH", worth)
+    r, p = response(text, ("creep", "bouc_wen", "resonance", "coulomb"), linear, tmp_path)
+    assert r._equations.model.held.numel() == ("loop" in text)
+    moved = record(size)
+    y, Y = r.sensitivities(moved, p)
+    agree(Y, differentiated(r, moved, p))
+    assert np.allclose(y, r.outputs(moved, p), rtol=0, atol=1e-12 * np.abs(y).max())
+    alone = r.sensitivities(moved, p, by_free=False)[1]
+    agree(alone, Y[:, :, len(p) :])
+
+
+class Counted:
+    """A cubic whose slope nearly vanishes where the fit starts, so that its first steps go too far; keeps what is asked."""
+
+    bounds, most = (np.array([-9.0]), np.array([9.0])), np.array([np.inf])
+
+    def __init__(self):
+        self.residuals, self.slopes = [], []
+
+    def residual(self, x):
+        self.residuals.append(float(x[0]))
+        return np.array([x[0] ** 3 - 20.0 * x[0] + 30.0])
+
+    def evaluate(self, x):
+        self.slopes.append(float(x[0]))
+        return np.array([x[0] ** 3 - 20.0 * x[0] + 30.0]), np.array([[3 * x[0] ** 2 - 20.0]])
+
+
+def test_slopes_are_worked_out_where_a_step_is_accepted_only():
+    problem = Counted()
+    found = levenberg_marquardt(problem, np.array([2.5]), 40)
+    sizes = [abs(x**3 - 20 * x + 30) for x in problem.slopes]
+    assert sizes == sorted(sizes, reverse=True) and problem.slopes[-1] == found[0]
+    assert len(problem.residuals) > len(problem.slopes)  # some were rejected
+    assert set(problem.slopes[1:]) <= set(problem.residuals)
