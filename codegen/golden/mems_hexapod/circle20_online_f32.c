@@ -1856,20 +1856,18 @@ static int shrink(const circle20_online_f32_state *state, float wanted[6])
     composite_bound(wanted, bound);
     if (!(bound[0] <= 1.0f)) {
         float worst[1];
-        {
-            composite_ratio(wanted, worst);
-            if (worst[0] > 1.0f) {
-                int i;
-                if (worst[0] > 1.000004f) {
-                    hit = 2;
-                } else if (hit == 0) {
-                    hit = 1;
-                } else {
-                    /* shrunk before */
-                }
-                for (i = 0; i < 6; i++) {
-                    wanted[i] = wanted[i] / worst[0];
-                }
+        composite_ratio(wanted, worst);
+        if (worst[0] > 1.0f) {
+            int i;
+            if (worst[0] > 1.000004f) {
+                hit = 2;
+            } else if (hit == 0) {
+                hit = 1;
+            } else {
+                /* shrunk before */
+            }
+            for (i = 0; i < 6; i++) {
+                wanted[i] = wanted[i] / worst[0];
             }
         }
     }
@@ -2006,8 +2004,8 @@ static int step_approach(const circle20_online_f32_state *state, const float ori
 void circle20_online_f32_init(circle20_online_f32_state *state)
 {
     static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
-    int i;
     if (state != NULL) {
+        int i;
         for (i = 0; i < 6; i++) {
             state->x[i] = X_REST[i];
         }
