@@ -23,7 +23,8 @@ from ctrlgen.chain import available, channels
 from ctrlgen.devices import Device
 from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.files import validate
-from ctrlgen.firmware.cprint import Real, print_function, root_text
+from ctrlgen.firmware.cprint import Real, print_function
+from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.units import from_si, same_dimension
 from ctrlgen.verification.toolchains import FLAGS
 
@@ -326,8 +327,8 @@ def compiled(compiler, tmp_path_factory):
     folder = tmp_path_factory.mktemp("laws")
     kernels = {name: print_function(function, name, Real.DOUBLE) for name, function in functions.items()}
     text = (
-        "#include <math.h>\n#include <stdint.h>\n"
-        + root_text(Real.DOUBLE)
+        "#include <stdint.h>\n"
+        + elementary_text(frozenset().union(*(k.calls for k in kernels.values())), Real.DOUBLE)
         + "".join(k.text.removeprefix("static ") for k in kernels.values())
     )
     (folder / "laws.c").write_text(text)
@@ -339,7 +340,6 @@ def compiled(compiler, tmp_path_factory):
         "-shared",
         "-fPIC",
         str(folder / "laws.c"),
-        "-lm",
         "-o",
         str(folder / "laws.so"),
     ]

@@ -373,9 +373,7 @@ int main(void)
 }}
 """)
     sources = [str(folder / "main.c"), str(folder / f"{name}.c")]
-    built = subprocess.run(
-        [compiler, *FLAGS, *sources, "-lm", "-o", str(folder / "main")], capture_output=True, text=True
-    )
+    built = subprocess.run([compiler, *FLAGS, *sources, "-o", str(folder / "main")], capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
     done = subprocess.run([folder / "main"], capture_output=True, text=True)
     assert done.returncode == 0, done

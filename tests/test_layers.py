@@ -22,7 +22,7 @@ LAYERS = [
     "motion", "simulation inverse", "readings intervals", "controller linearisation",
     "paths", "scenario", "workspace", "programme", "shortfall", "solution",
     "firmware firmware.cprint firmware.templates firmware.misra firmware.deviations firmware.spline firmware.fourier",
-    "firmware.compression",
+    "firmware.compression firmware.elementary",
     "firmware.online firmware.player firmware.plant firmware.fmi_calls", "firmware.vectors firmware.package", "firmware.folder",
     "verification verification.toolchains verification.reference verification.check", "verification.host verification.cores",
     "verification.emulation", "firmware.fmu",

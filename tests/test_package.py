@@ -30,7 +30,7 @@ def test_all_controllers_of_two_scenarios_link_into_one_program_and_pass_their_t
     (tmp_path / "main.c").write_text(everything(packages))
     include = [f"-I{c.path}" for c in packages.values()]
     linked = [o for made in objects.values() for o in made]
-    run(compiler, "-std=c99", *STRICT, *include, tmp_path / "main.c", *linked, "-lm", "-o", tmp_path / "main")
+    run(compiler, "-std=c99", *STRICT, *include, tmp_path / "main.c", *linked, "-o", tmp_path / "main")
     run(tmp_path / "main")
 
 
@@ -38,7 +38,7 @@ def test_the_same_from_cpp(packages, objects, cpp, tmp_path):
     (tmp_path / "main.cpp").write_text(everything(packages))
     include = [f"-I{c.path}" for c in packages.values()]
     linked = [o for made in objects.values() for o in made]
-    run(cpp, "-std=c++17", *STRICT, *include, tmp_path / "main.cpp", *linked, "-lm", "-o", tmp_path / "main")
+    run(cpp, "-std=c++17", *STRICT, *include, tmp_path / "main.cpp", *linked, "-o", tmp_path / "main")
     run(tmp_path / "main")
 
 
@@ -81,7 +81,7 @@ def test_the_readmes_example_compiles_and_runs(packages, unsolved, compiler, tmp
         assert len(example.splitlines()) <= 25
         (tmp_path / "example.c").write_text(example)
         source = c.path / f"{c.online[Real.FLOAT]}.c"
-        words = (compiler, "-std=c99", *STRICT, f"-I{c.path}", tmp_path / "example.c", source, "-lm")
+        words = (compiler, "-std=c99", *STRICT, f"-I{c.path}", tmp_path / "example.c", source)
         run(*words, "-o", tmp_path / "example")
         assert len(re.findall(r"drive\[\d\] = [\d.e-]+ W", run(tmp_path / "example"))) == 6
 
@@ -200,6 +200,6 @@ def test_the_selftest_finds_a_wrong_constant(packages, compiler, tmp_path, piece
     spoiled.write_text(text)
     sources = [folder / source.name for source in c.sources(Real.FLOAT)]
     runner = folder / "test" / c.runner(Real.FLOAT).name
-    run(compiler, "-std=c99", *STRICT, f"-I{folder}", runner, *sources, "-lm", "-o", tmp_path / "t")
+    run(compiler, "-std=c99", *STRICT, f"-I{folder}", runner, *sources, "-o", tmp_path / "t")
     done = subprocess.run([tmp_path / "t"], capture_output=True, text=True)
     assert done.returncode == 1 and "the first that disagrees: vector" in done.stdout

@@ -5,7 +5,9 @@ printer writes every constant and every call in the chosen type, stores all outp
 that an output may be the same array as an input), and passes only the arguments that are read.
 
 Square roots need no library: where the range of the argument is known (`intervals`) and narrow, they are a straight
-line and a few of Heron's steps, y <- (y + a/y)/2, elsewhere a call of `ROOT`.
+line and a few of Heron's steps, y <- (y + a/y)/2, elsewhere a call of `root`. Powers with a
+constant whole or half exponent are products and roots. The other functions are called by the names that `elementary` has
+them under.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.errors import CtrlgenError
-from ctrlgen.intervals import Interval, intervals, product_of, quotient_of
+from ctrlgen.intervals import EVERYTHING, Interval, intervals, product_of, quotient_of
 
 
 class Real(Enum):
@@ -62,54 +64,21 @@ class Real(Enum):
             text += ".0"
         return text + ("f" if self is Real.FLOAT else "")
 
-    def call(self, function: str) -> str:
-        """Name of a <math.h> function in this type."""
-        return function + ("f" if self is Real.FLOAT else "")
-
 
 WIDER = 0.01  # than the range: the ends are met up to rounding, and so the start is never far off
-MOST_STEPS = {Real.DOUBLE: 4, Real.FLOAT: 3}  # of Heron from a line; beyond, ROOT is as cheap
+MOST_STEPS = {Real.DOUBLE: 4, Real.FLOAT: 3}  # of Heron from a line; beyond, `root` is as cheap
+MOST_FACTORS = 64  # exponents of powers that are multiplied out
 TRUSTED = 1e15  # sizes of products between one over this and this are far from both ends of a float
 PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
-_OPERATOR = re.compile(r" (?:[-+*/<>?]|<=|==|!=|&&|\|\|) |\(-[a-z]|root\(")
-
-# 1/sqrt from half the exponent (the constants minimise the largest relative error, 3.4 %; a step y (1.5 - a y^2/2)
-# takes an error e to 1.5 e^2), then one step for the root itself. C99 lets a union be read as its other member.
-_ROOT = {
-    Real.FLOAT: ("uint32_t", "0x5F3759DFU", 2),
-    Real.DOUBLE: ("uint64_t", "0x5FE6EB50C7B537A9ULL", 3),
-}
-
-
-def root_text(real: Real) -> str:
-    """The C of `root`: the square root, 0 for what is not above 0, without a library."""
-    word, magic, steps = _ROOT[real]
-    half, more, zero = real.literal(0.5), real.literal(1.5), real.literal(0.0)
-    newton = "\n".join(f"    y = y * ({more} - ((h * y) * y));" for _ in range(steps))
-    return f"""/* Square root by Newton steps; 0 for 0, for negative numbers and for what is not a number. */
-static {real.value} root({real.value} a)
-{{
-    union {{ {real.value} number; {word} bits; }} guess;
-    const {real.value} h = {half} * a;
-    {real.value} y;
-    {real.value} s;
-    guess.number = a;
-    guess.bits = {magic} - (guess.bits >> 1U);
-    y = guess.number;
-{newton}
-    s = a * y;
-    s = s + (({half} * y) * (a - (s * s)));
-    return (a > {zero}) ? s : {zero};
-}}
-"""
-
+_OPERATOR = re.compile(r" (?:[-+*/<>?]|<=|==|!=|&&|\|\|) |\(-[a-z]|[a-z]\w*\(")
 
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-_CALLS = {
-    ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_TANH: "tanh", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
-    ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_ATAN2: "atan2", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil",
+_CALLS = {  # of `elementary`
+    ca.OP_EXP: "exponential", ca.OP_LOG: "logarithm", ca.OP_SIN: "sine", ca.OP_COS: "cosine", ca.OP_TAN: "tangent",
+    ca.OP_ASIN: "arcsine", ca.OP_ACOS: "arccosine", ca.OP_ATAN: "arctangent", ca.OP_ATAN2: "direction",
+    ca.OP_TANH: "hyperbolic_tangent", ca.OP_SINH: "hyperbolic_sine", ca.OP_COSH: "hyperbolic_cosine",
+    ca.OP_POW: "power", ca.OP_CONSTPOW: "power", ca.OP_FLOOR: "whole_below", ca.OP_CEIL: "whole_above",
 }  # fmt: skip
 
 
@@ -224,11 +193,13 @@ class _Printer:
             op, a = (ca.OP_SUB if op == ca.OP_ADD else ca.OP_ADD), [a[0], a[1].scaled(-1.0)]
         if op == ca.OP_ADD and a[0].factor < 0 and not a[0].number:
             op, a = ca.OP_SUB, [a[1], a[0].scaled(-1.0)]
+        if op in (ca.OP_POW, ca.OP_CONSTPOW) and a[1].number and _by_products(a[1].factor):
+            return self._power(k, self._named(f"{k}_b", self._scaled(a[0]), _range_of(a[0])), a[1].factor)
         operands = [self._operand(v) for v in a]
         if op == ca.OP_SQRT:
             return self._root(k, operands[0], a[0])
         if op in _CALLS:
-            self.calls.add(self.real.call(_CALLS[op]))
+            self.calls.add(_CALLS[op])
         return self._named(k, _expression(op, operands, self.real), self.between[k])
 
     def _product(self, k: int, op: int, a: _Value, b: _Value) -> _Value:
@@ -247,8 +218,7 @@ class _Printer:
         within = _range_of(a)
         plan = _heron(within, self.real)
         if plan is None:
-            self.calls.add("root")
-            return self._named(k, f"root({operand})", self.between[k])
+            return self._named(k, self._root_call(operand), self.between[k])
         if a.factor != 1.0:
             operand = self._named(f"{k}_a", operand, within).text
         (start, slope), steps = plan
@@ -257,6 +227,29 @@ class _Printer:
             expression = f"{self._literal(0.5)} * ({y.text} + ({operand} / {y.text}))"
             y = self._named(f"{k}_{step}" if step < steps else k, expression, self.between[k])
         return y
+
+    def _root_call(self, operand: str) -> str:
+        self.calls.add("root")
+        return f"root({operand})"
+
+    def _power(self, k: int, base: _Value, exponent: float) -> _Value:
+        """base^exponent by squaring, with one root where the exponent is not whole."""
+        factors, square, left, step = list[str](), base.text, int(abs(exponent)), 0
+        if abs(exponent) % 1.0:
+            factors.append(self._named(f"{k}_r", self._root_call(base.text), EVERYTHING).text)
+        while left:
+            if left % 2:
+                factors.append(square)
+            left //= 2
+            if left:
+                step += 1
+                square = self._named(f"{k}_{step}", f"{square} * {square}", EVERYTHING).text
+        while len(factors) > 1:
+            step += 1
+            factors = [self._named(f"{k}_{step}", f"{factors[0]} * {factors[1]}", EVERYTHING).text, *factors[2:]]
+        one = self._literal(1.0)
+        result = (factors or [one])[0]
+        return self._named(k, f"{one} / {result}" if exponent < 0 else result, self.between[k])
 
     def _settled(self, value: _Value, k: int) -> _Value:
         """Multiplied out where several need it, so that it is done once."""
@@ -336,6 +329,11 @@ def _dense(sparsity: ca.Sparsity, nonzero: int) -> int:
     return int(sparsity.row()[nonzero])
 
 
+def _by_products(exponent: float) -> bool:
+    """Whether a power is cheaper, and as exact, by multiplications."""
+    return (2 * exponent).is_integer() and abs(exponent) <= MOST_FACTORS
+
+
 def _signed(literal: str) -> str:
     return f"({literal})" if literal.startswith("-") else literal
 
@@ -348,7 +346,7 @@ def _expression(op: int, a: list[str], real: Real) -> str:
     if op in _COMPARE:
         return f"({a[0]} {_COMPARE[op]} {a[1]}) ? {one} : {zero}"
     if op in _CALLS:
-        return f"{real.call(_CALLS[op])}({', '.join(a)})"
+        return f"{_CALLS[op]}({', '.join(a)})"
     forms = {
         ca.OP_ASSIGN: "{0}", ca.OP_NEG: "-{0}", ca.OP_SQ: "{0} * {0}", ca.OP_TWICE: f"{two} * {{0}}", ca.OP_INV: f"{one} / {{0}}",
         ca.OP_FMIN: "({0} < {1}) ? {0} : {1}", ca.OP_FMAX: "({0} > {1}) ? {0} : {1}", ca.OP_FABS: f"({{0}} < {zero}) ? -{{0}} : {{0}}",

@@ -40,7 +40,7 @@ DEVIATIONS = (
     ),
     Deviation(
         "19.2", ("*_online_f??.c", "*_plant_f??.c"),
-        "the union in root(), by which the exponent of a number is halved",
+        "the unions in root(), exponential() and logarithm(), by which the exponent of a number is halved, set or read",
         "C99 defines what is read from another member; it spares a library call, and both members have the same bytes.",
         "union",
     ),

@@ -251,7 +251,7 @@ def _write_unit(
         binary = folder / f"{identifier}{ending}"
         words = ["-shared", "-fvisibility=hidden", *([] if ending == ".dll" else ["-fPIC"])]
         words += ["-s"] if ending == ".so" else []  # names of scratch folders would tell one build from the next
-        compile_c(compiler, folder, [*words, *(str(folder / source) for source in sources), "-lm", "-o", str(binary)])
+        compile_c(compiler, folder, [*words, *(str(folder / source) for source in sources), "-o", str(binary)])
         files[f"binaries/{name}/{binary.name}"] = binary.read_bytes()
     write_bytes(out / f"{identifier}.fmu", _zipped(files))
     return f"{identifier}.fmu"

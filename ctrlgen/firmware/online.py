@@ -9,7 +9,8 @@ import numpy as np
 
 from ctrlgen._version import __version__
 from ctrlgen.controller import INSET, SLACK, TRIALS, Controller
-from ctrlgen.firmware.cprint import Kernel, Real, print_function, root_text
+from ctrlgen.firmware.cprint import Kernel, Real, print_function
+from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
 from ctrlgen.scenario import Scenario
 from ctrlgen.units import base_unit, show
@@ -84,7 +85,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
-        "root": root_text(real) if "root" in called else None, "library": sorted(called - {"root"}), "gauge": gauge, "nearest": nearest,
+        "elementary": elementary_text(called, real), "gauge": gauge, "nearest": nearest,
         "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
         "balance": balance, "trials": TRIALS, "inset": INSET, "shrinks": controller.shrinks,
         "ratio_uses_state": bool(ratio) and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,

@@ -20,7 +20,8 @@ import numpy as np
 from ctrlgen._version import __version__
 from ctrlgen.devices import Signal
 from ctrlgen.errors import Fault, InputError
-from ctrlgen.firmware.cprint import Kernel, Real, print_function, root_text
+from ctrlgen.firmware.cprint import Kernel, Real, print_function
+from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.model import Model, build_model
 from ctrlgen.motion import balanced, next_sample
@@ -113,7 +114,7 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
         "x_names": [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)],
         "signals": list(zip(plant.signals, map(int, starts), strict=False)), "width": int(starts[-1]),
         "inertial": plant.inertial, "kernels": kernels, "axes": m.axes,
-        "library": sorted(called - {"root"}), "root": root_text(real) if "root" in called else None,
+        "elementary": elementary_text(called, real),
         "rest": m.rest, "z_scale": m.z_scale, "x_near": ARRIVED[real] * m.x_scale, "z_near": ARRIVED[real] * m.z_scale,
         "newton": NEWTON_MOST, "rounds": ROUNDS,
     }  # fmt: skip

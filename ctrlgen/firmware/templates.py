@@ -16,16 +16,18 @@ def codegen_folder() -> Path:
     return beside if beside.is_dir() else Path(__file__).resolve().parents[1] / "_codegen"
 
 
-def write(template: str, context: dict[str, Any], path: Path) -> Path:
-    """`template` of `codegen/templates/` with `context`, at `path`, which is returned.
-
-    A name that the template asks for and does not get is an error.
-    """
+def render(template: str, context: dict[str, Any]) -> str:
+    """`template` of `codegen/templates/` with `context`. A name that the template asks for and does not get is an error."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
-    write_text(path, environment.get_template(f"{template}.j2").render(context))
+    return environment.get_template(f"{template}.j2").render(context)
+
+
+def write(template: str, context: dict[str, Any], path: Path) -> Path:
+    """`render`, written to `path`, which is returned."""
+    write_text(path, render(template, context))
     return path
 
 

@@ -22,7 +22,7 @@ def build_host(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Pat
     objects = [scratch / f"{compiler}_{source.stem}.o" for source in sources]
     for source, target in zip(sources, objects, strict=True):
         compile_c(compiler, folder.path, ["-c", str(source), "-o", str(target)])
-    linked = [*map(str, objects), "-lm", "-o"]
+    linked = [*map(str, objects), "-o"]
     compile_c(compiler, folder.path, [str(scratch / f"harness_{real.suffix}.c"), *linked, str(program)])
     compile_c(compiler, folder.path, [str(folder.runner(real)), *linked, f"{program}_test"])
     return program

@@ -93,7 +93,7 @@ def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
 
 def _build(compiler: str, flags: Sequence[str], sources: Sequence[Path], include: Path, program: Path) -> str:
     """What the compiler said when it failed; empty when `program` is there."""
-    done = run_tool([compiler, *BUILD, *flags, "-I", str(include), *map(str, sources), "-lm", "-o", str(program)])
+    done = run_tool([compiler, *BUILD, *flags, "-I", str(include), *map(str, sources), "-o", str(program)])
     return "" if done.returncode == 0 else (done.stderr or done.stdout).strip()[-500:] or f"status {done.returncode}"
 
 
