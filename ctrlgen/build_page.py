@@ -11,8 +11,8 @@ from ctrlgen.files import write_text
 from ctrlgen.report import render, worst_rows
 
 CAPTIONS = {
-    "error_length": "Distance of the model, driven by the generated C on this computer, from the command along the trajectory. "
-    "The player's curve is compressed as far as its tolerance allows.",
+    "error_length": "Distance of the model, driven by the generated C on this computer, from the command along the "
+    "trajectory, which starts where IPOPT's solution does. The player's curve is compressed as far as its tolerance allows.",
     "error_angle": "The same for rotations. A curve is broken where the error is exactly zero.",
     "instructions": "Executed instructions of the costliest call: along the scenario; over random and hostile targets; of the player. "
     "Cycles are not emulated.",

@@ -75,8 +75,8 @@ class Build:
 
     @property
     def budgeted(self) -> bool:
-        """Whether the device has as many drives as the budgets are stated for."""
-        return len(self.solution.model.axes) == BUDGET_DRIVES
+        """Whether the budgets are stated for such a device: so many drives, a sample after the other."""
+        return len(self.solution.model.axes) == BUDGET_DRIVES and self.solution.scenario.sample_time is not None
 
 
 def run_name(run: TargetRun | Stopped) -> str:

@@ -81,7 +81,10 @@ def verify(
     scenario: ScenarioPath,
     out_folder: OutFolder,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Leave out cppcheck and the fuzzer; both are then listed as not run.")
+        bool,
+        typer.Option(
+            "--quick", help="Leave out cppcheck and the fuzzer, over half of the time; both are then listed as not run."
+        ),
     ] = False,
 ) -> None:
     """All that is known of a scenario's C on one page: limits, cost on each target, equivalence, rules, provenance.
