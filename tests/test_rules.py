@@ -21,7 +21,7 @@ from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.folder import CFolder, generate, write_harness
 from ctrlgen.firmware.misra import ADVISORY, MANDATORY, rule_class
 from ctrlgen.verification.check import Check
-from ctrlgen.verification.comparison import _run
+from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile
 from ctrlgen.verification.rules import ANALYZERS, _analyzed, check_rules
 
@@ -294,7 +294,7 @@ def test_from_a_state_of_garbage_c_and_python_answer_alike_and_admissibly(
         for row in target:
             steps.append(controller.step(state, row))
             state = steps[-1].state
-    answer = _run(program, "follow", target, 2 * n + model.n_states, (x, z))
+    answer = run_host(program, "follow", target, 2 * n + model.n_states, (x, z))
     low, high = model.u_bounds
     for row, step in zip(answer, steps, strict=True):
         assert not step.status & Status.INPUT and int(row[0]) == step.status

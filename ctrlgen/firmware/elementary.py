@@ -68,7 +68,8 @@ def _context(real: Real) -> dict[str, Any]:
         "ln2": _parts(ln2, fraction + 1, last.bit_length().bit_length(), 2),
         "per_quarter": float(1 / half_pi), "quarter": _parts(half_pi, fraction + 1, exact, 3 if real is Real.DOUBLE else 4),
         "half_pi": _parts(half_pi, fraction + 1, 0, 2), "turn_exact": TURNS[real], "turn_end": TURN_END[real],
-        "atan_half": _parts(_arctan_half(), fraction + 1, 0, 2), "asin_near": ASIN_NEAR, "atan_low": math.sqrt(2) - 1, "atan_high": math.sqrt(2) + 1, "tanh_near": TANH_NEAR, "sinh_near": SINH_NEAR,
+        "atan_half": _parts(_arctan_half(), fraction + 1, 0, 2), "asin_near": ASIN_NEAR,
+        "atan_low": math.sqrt(2) - 1, "atan_high": math.sqrt(2) + 1, "tanh_near": TANH_NEAR, "sinh_near": SINH_NEAR,
         "all_whole": 2.0**fraction, "horner": partial(_horner, real),
     }  # fmt: skip
 
