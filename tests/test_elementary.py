@@ -227,7 +227,7 @@ def test_polynomials_against_decimal_arithmetic():
 
 
 def test_constants_do_not_depend_on_the_mathematics_library(monkeypatch):
-    """A cosine and a root that are wrong in the last digit move no printed digit."""
+    """A cosine that is wrong in the last digit moves no printed digit."""
     text = {real: elementary_text([*ONE, *TWO], real) for real in Real}
     for cached in (elementary._context, polynomial, elementary._terms):
         cached.cache_clear()

@@ -2,9 +2,10 @@
 
 Each argument is brought into a short range (halves of ln 2, quarter turns, the reciprocal, the root), where a polynomial
 does. A polynomial is what interpolates the function's Taylor series in Chebyshev's points, of the lowest degree that errs
-by a small part of a rounding; all of it in rational numbers, so that the printed digits are the same on every machine.
+by a small part of a rounding; all of it in integers of many bits, so that the printed digits are the same on every machine.
 
-Not a number gives not a number (but 0 for `root`); every other argument gives a finite number. What each function gives
+Not a number gives not a number (but 0 for `root`), every finite argument a finite number. Subnormal numbers have no root to
+rely on (but a finite one), and infinity has none. What each function gives
 where C's own would be infinite or undefined stands above it in the C.
 """
 
