@@ -2,9 +2,10 @@
 
 Each argument is brought into a short range (halves of ln 2, quarter turns, the reciprocal, the root), where a polynomial
 does. A polynomial is what interpolates the function's Taylor series in Chebyshev's points, of the lowest degree that errs
-by a small part of a rounding; all of it in rational numbers, so that the printed digits are the same on every machine.
+by a small part of a rounding; all of it in integers of many bits, so that the printed digits are the same on every machine.
 
-Not a number gives not a number (but 0 for `root`); every other argument gives a finite number. What each function gives
+Not a number gives not a number (but 0 for `root`), every finite argument a finite number. Subnormal numbers have no root to
+rely on (but a finite one), and infinity has none. What each function gives
 where C's own would be infinite or undefined stands above it in the C.
 """
 
@@ -68,7 +69,8 @@ def _context(real: Real) -> dict[str, Any]:
         "ln2": _parts(ln2, fraction + 1, last.bit_length().bit_length(), 2),
         "per_quarter": float(1 / half_pi), "quarter": _parts(half_pi, fraction + 1, exact, 3 if real is Real.DOUBLE else 4),
         "half_pi": _parts(half_pi, fraction + 1, 0, 2), "turn_exact": TURNS[real], "turn_end": TURN_END[real],
-        "atan_half": _parts(_arctan_half(), fraction + 1, 0, 2), "asin_near": ASIN_NEAR, "atan_low": math.sqrt(2) - 1, "atan_high": math.sqrt(2) + 1, "tanh_near": TANH_NEAR, "sinh_near": SINH_NEAR,
+        "atan_half": _parts(_arctan_half(), fraction + 1, 0, 2), "asin_near": ASIN_NEAR,
+        "atan_low": math.sqrt(2) - 1, "atan_high": math.sqrt(2) + 1, "tanh_near": TANH_NEAR, "sinh_near": SINH_NEAR,
         "all_whole": 2.0**fraction, "horner": partial(_horner, real),
     }  # fmt: skip
 
