@@ -371,9 +371,8 @@ def test_c_equals_python(effect, compiled, rng):
             "m": rng.uniform(-1, 1, len(effect.states)), "s": rng.uniform(-1, 1, function.size1_in(1)),
             "p": np.array(law.numbers(shape[rng.integers(len(shape))], size(effect, law.where, rng))),
         }  # fmt: skip
-        assert (
-            worst_difference(function, kernel, c, given) < 1e-12
-        )  # a root is off by a rounding; laws subtract near numbers
+        # A root is off by a rounding, and far from its limit a law is the difference of near numbers.
+        assert worst_difference(function, kernel, c, given) < 1e-11
     if effect not in CONTROLLED:
         return
     m = controller_with(effect).nominal
