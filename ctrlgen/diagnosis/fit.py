@@ -24,7 +24,6 @@ LITTLE = 1.3  # times the noise: what leaves more is not noise
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
-DECADES = 100.0  # between the bounds of a shape that is searched by its logarithm
 LONGEST_STEP = 1.5  # of a logarithm
 HALVINGS = 6  # of a record's start that does not keep what its slopes promise
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
@@ -229,7 +228,7 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
 class _Problem:
     """Residual and slopes of one structure, in numbers of order one: `inner` ones.
 
-    A shape that may lie anywhere in decades, as a time constant, is searched by its logarithm.
+    Times and speeds that shape a cause may lie anywhere in decades, and are searched by their logarithms.
     """
 
     def __init__(self, fitter: Fitter, structure: Structure) -> None:
@@ -243,7 +242,10 @@ class _Problem:
         self.prior = [(i, u) for i, u in enumerate(structure.unknowns) if u.sd]
         self.at: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.log = np.array(
-            [u.cause is not None and not u.amplitude and 0 < u.low < u.high / DECADES for u in structure.unknowns]
+            [
+                u.cause is not None and not u.amplitude and (u.unit == "s" or u.unit.endswith("/s")) and u.low > 0
+                for u in structure.unknowns
+            ]
             + [False] * self.n_starts,
             dtype=bool,
         )
