@@ -23,7 +23,7 @@ from ctrlgen.verification.in_loop import InLoop, Stopped, TargetRun
 BUDGET_CORE, BUDGET_DRIVES = "Cortex-M4F", 6  # what the budgets are stated for
 BUDGETS = {"scenario": 700, "worst": 6000, "player": BUDGET}  # instructions of one sample; goals, not conditions
 STATUS_WORDS = {
-    Status.DISPLACEMENT: "displacement beyond its range: the end was taken",
+    Status.DISPLACEMENT: "displacement beyond its range: the nearest target inside was taken",
     Status.COMPOSITE: "a limit of several channels, such as a stress: displacement shrunk toward home",
     Status.STATE: "actuator state held at its limit",
     Status.DRIVE: "drive at its limit: as far toward the target as it reaches in one sample",
