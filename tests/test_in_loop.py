@@ -97,7 +97,7 @@ def test_writable_memory_is_seen(machine):
 
 
 def test_a_call_that_does_not_return_is_stopped_and_named(machine, monkeypatch):
-    monkeypatch.setattr(emulation, "LONGEST", 100_000)
+    monkeypatch.setattr(emulation, "MOST", 100_000)
     with pytest.raises(ToolError, match="spin did not return within"):
         machine.call("spin")
 
@@ -247,7 +247,7 @@ def test_a_double_constant_in_float_code_costs_more_and_changes_bits(small, comp
 
 def test_a_call_that_hangs_on_the_target_is_stopped_and_reported(small, compiler, monkeypatch, tmp_path):
     only(monkeypatch)
-    monkeypatch.setattr(emulation, "LONGEST", 200_000)
+    monkeypatch.setattr(emulation, "MOST", 100_000)
     reference, c = small
     bad = spoil_on_target(
         c, tmp_path / "c", r"    int hit = 0;", '    int hit = 0;\n    for (;;) { __asm__ volatile(""); }'

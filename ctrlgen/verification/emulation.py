@@ -19,7 +19,7 @@ RAM, RAM_SIZE = 0x20000000, 0x40000
 RETURN = 0x0F000000  # where a call returns to
 STACK = RAM + RAM_SIZE // 2  # grows downward from here; data stands above
 PATTERN = 0xA5  # of stack that nothing has touched
-LONGEST = 10_000_000  # us that a call may take on this computer
+MOST = 20_000_000  # instructions of a call that may still return; a longer one hangs
 FPU_ON = 0xF << 20  # coprocessors 10 and 11 in CPACR
 MISSING = "pip install unicorn pyelftools"
 
@@ -81,6 +81,8 @@ class Machine:
                 count += 1
             self._lengths[address, size] = count
         self._executed += self._lengths[address, size]
+        if self._executed > MOST:
+            self._uc.emu_stop()
 
     def reserve(self, count: int, real: Real) -> int:
         """Address of `count` numbers in RAM."""
@@ -104,12 +106,14 @@ class Machine:
         self._uc.reg_write(arm.UC_ARM_REG_SP, STACK)
         self._uc.reg_write(arm.UC_ARM_REG_LR, RETURN | 1)
         try:
-            self._uc.emu_start(self.symbols[function] | 1, RETURN, timeout=LONGEST)
+            self._uc.emu_start(self.symbols[function] | 1, RETURN)
         except self._error as error:
             place = self._uc.reg_read(arm.UC_ARM_REG_PC)
             raise ToolError(f"the emulated core stopped in {function} at {place:#x}: {error}") from error
         if self._uc.reg_read(arm.UC_ARM_REG_PC) != RETURN:
-            raise ToolError(f"{function} did not return within {LONGEST // 1000000} s on the emulated core")
+            raise ToolError(
+                f"{function} did not return within {MOST // 1000000} million instructions on the emulated core"
+            )
         returned = self._uc.reg_read(arm.UC_ARM_REG_R0)
         return returned - (1 << 32) if returned >> 31 else returned, self._executed
 
