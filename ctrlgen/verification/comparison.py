@@ -17,7 +17,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller import Status
+from ctrlgen.controller import INSET, Status
 from ctrlgen.firmware import compression as compressed
 from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
@@ -115,14 +115,17 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
         unit = {"um": "nm", "degC": "K", "urad": "rad"}.get(unit, unit)
         rows.append(_row(build, what, signal.label, unit, np.asarray(difference)[:, channels], limit))
 
-    slacks = dict(
-        zip(("displacement", "state", "drive"), (np.max(v, initial=0.0) for v in ref.controller.slacks), strict=True)
-    )
+    left = (1 - INSET) ** 2  # of the range: what the third trial toward a limit still moves
+    states = (m.x_bounds[0][: m.n_states], m.x_bounds[1][: m.n_states])
+    ties_of = {
+        role: left * float(np.max(high - low, initial=0.0))
+        for role, (low, high) in {"displacement": m.z_bounds, "state": states, "drive": m.u_bounds}.items()
+    }
 
     def against_casadi(
         what: str, answer: np.ndarray, reference: np.ndarray, wider: float = 1.0, ties: bool = False
     ) -> None:
-        """`ties`: a drive within the slack of its limit may be taken for admissible or not; what follows differs by the slack."""
+        """`ties`: a drive within the slack of its limit may be taken for admissible or not, and the last trial lost or not."""
         rows.append(_row(build, what, "status", "1", answer[:, :1] - reference[:, :1], 0.0))
         if real is Real.FLOAT:  # where a limited drive is bisected, float may turn the other way, as good an answer
             plain = (reference[:, 0].astype(int) & Status.DRIVE) == 0
@@ -133,7 +136,7 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
             if role == "displacement" and real is Real.FLOAT:
                 limit = max(limit, LENGTH[real])
             limit *= wider if real is Real.FLOAT else 1.0
-            limit = max(limit, slacks[role]) if ties else limit
+            limit = max(limit, ties_of[role]) if ties else limit
             add(what, role, answer[:, columns] - reference[:, columns], limit)
 
     moving = ref.scenario.sample_time is not None
