@@ -122,22 +122,29 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
         for role, (low, high) in {"displacement": m.z_bounds, "state": states, "drive": m.u_bounds}.items()
     }
 
+    def strict(role: str, size: float, wider: float) -> float:
+        if real is Real.DOUBLE:
+            return RELATIVE * size
+        limit = _float_limit(m, role, size, ref)
+        return wider * (max(limit, LENGTH[real]) if role == "displacement" else limit)
+
     def against_casadi(
         what: str, answer: np.ndarray, reference: np.ndarray, wider: float = 1.0, ties: bool = False
     ) -> None:
-        """`ties`: a drive within the slack of its limit may be taken for admissible or not, and the last trial lost or not."""
+        """`ties`: a drive within the slack of its limit may be taken for admissible or not, and the last trial lost or not:
+        from such a sample on, if the first to differ is one, the difference may be what that trial moves."""
         rows.append(_row(build, what, "status", "1", answer[:, :1] - reference[:, :1], 0.0))
         if real is Real.FLOAT:  # where a limited drive is bisected, float may turn the other way, as good an answer
             plain = (reference[:, 0].astype(int) & Status.DRIVE) == 0
             answer, reference = answer[plain], reference[plain]
-        for role, columns in signals:
-            size = np.abs(reference[:, columns]).max() or m.signals[role].scale[0]
-            limit = RELATIVE * size if real is Real.DOUBLE else _float_limit(m, role, size, ref)
-            if role == "displacement" and real is Real.FLOAT:
-                limit = max(limit, LENGTH[real])
-            limit *= wider if real is Real.FLOAT else 1.0
-            limit = max(limit, ties_of[role]) if ties else limit
-            add(what, role, answer[:, columns] - reference[:, columns], limit)
+        off = {role: answer[:, columns] - reference[:, columns] for role, columns in signals}
+        sizes = {role: np.abs(reference[:, columns]).max() or m.signals[role].scale[0] for role, columns in signals}
+        limits = {role: strict(role, size, wider) for role, size in sizes.items()}
+        differs = np.any([np.abs(off[role]).max(axis=1) > limit for role, limit in limits.items()], axis=0)
+        if ties and differs.any() and int(reference[np.argmax(differs), 0]) & Status.DRIVE:
+            limits = {role: max(limit, ties_of[role]) for role, limit in limits.items()}
+        for role, limit in limits.items():
+            add(what, role, off[role], limit)
 
     moving = ref.scenario.sample_time is not None
     followed = (
