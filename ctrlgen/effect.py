@@ -267,6 +267,7 @@ class Effect:
 
 def _outside(param: Param, given: Quantity, bounds: list[float], unit: str) -> list[str]:
     low, high = bounds
-    if low <= given.si <= high:
+    rounding = 1e-12 * max(abs(low), abs(high))  # of a change of units
+    if low - rounding <= given.si <= high + rounding:
         return []
     return [f"{param.name} = {given.text} is outside {show(low, unit)} ... {show(high, unit)}"]

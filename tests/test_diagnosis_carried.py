@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import SCENARIOS
 
-from ctrlgen import load_device, motion
+from ctrlgen import exponential, load_device
 from ctrlgen.diagnosis import equations
 from ctrlgen.diagnosis.fit import levenberg_marquardt
 from ctrlgen.diagnosis.hypotheses import hypotheses, nominal_links
@@ -67,10 +67,15 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
 @pytest.mark.parametrize("linear", [False, True], ids=["held", "linear"])
 @pytest.mark.parametrize("steps", [1, 3])
 @pytest.mark.parametrize("text, size", [(AXIS, 1.0), (AXIS + LOOP, 4e-5)], ids=["open", "loop"])
-def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, text, size, steps, linear, worth):
-    monkeypatch.setattr(motion, "substeps", lambda A, sample_time: steps)
+@pytest.mark.parametrize("effects", [("creep", "bouc_wen", "resonance", "coulomb"), ("creep", "bouc_wen", "resonance")])
+def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, effects, text, size, steps, linear, worth):
+    monkeypatch.setattr(exponential, "substeps", lambda *_: steps)
+    monkeypatch.setattr(
+        exponential, "SOLVING", 14
+    )  # to the end: where N is solved for, slopes of steps on the way are others
     monkeypatch.setattr(equations, "WORTH", worth)
-    r, p = response(text, ("creep", "bouc_wen", "resonance", "coulomb"), linear, tmp_path)
+    r, p = response(text, effects, linear, tmp_path)
+    assert isinstance(r._equations.steps, exponential.Sticking) == ("coulomb" in effects)
     assert r._equations.model.held.numel() == ("loop" in text)
     moved = record(size)
     y, Y = r.sensitivities(moved, p)

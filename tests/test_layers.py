@@ -19,7 +19,7 @@ LAYERS = [
     "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis devices.user", "devices",
     "calibration pose_errors",
     "chain", "model", "marking conditioning recording_formats recording_file", "gate", "recording",
-    "motion", "simulation inverse", "readings intervals", "controller linearisation",
+    "exponential", "motion", "simulation inverse", "readings intervals", "controller linearisation",
     "paths", "scenario", "workspace", "programme", "shortfall", "solution",
     "firmware firmware.cprint firmware.templates firmware.misra firmware.deviations firmware.spline firmware.fourier",
     "firmware.compression firmware.elementary",

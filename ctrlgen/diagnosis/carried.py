@@ -1,20 +1,24 @@
 """One sample of a model with the derivatives of its state and readings carried along.
 
 Tangents T (m, n_s) hold dS/dp of m numbers, one a row, so that CasADi's product with a sparse matrix runs along columns.
-A model with inertia takes many steps a sample: T goes from step to step, which needs only the constant matrices of the
-steps and the slopes of what is not linear at the points where it was evaluated, instead of differentiating all the steps
-at once.
+A model with inertia takes many steps a sample: T goes from step to step. An explicit step needs only its constant
+matrices and the slopes of what is not linear at the points where it was evaluated, instead of being differentiated whole.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import casadi as ca
 
 from ctrlgen.diagnosis.equations import Equations
+from ctrlgen.exponential import Exponential, Sticking
 
-POINTS = 4  # of a step
+POINTS = 4  # of an explicit step
+Step = Callable[
+    [ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]
+]  # T, seed, (y, u, u at the end, held, ambient, c) -> y, T
 
 
 def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
@@ -25,7 +29,7 @@ def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca
     def slope(*slopes: ca.MX) -> ca.MX:
         return sum((V @ slope for V, slope in zip((T, seed), slopes, strict=False)))
 
-    if q.steps is None or q.steps.count == 1:
+    if q.steps is None or (isinstance(q.steps, Exponential) and q.steps.count == 1):
         one = ca.Function("one", q.given, [q.following, q.y, *_slopes([q.following, q.y], by)], {"cse": True})
         following, y, *slopes = one(*given)
         return following, slope(*slopes[: len(by)]), y, slope(*slopes[len(by) :])
@@ -48,13 +52,41 @@ def _slopes(values: list[ca.SX], by: list[ca.SX]) -> list[ca.SX]:
 
 def _steps(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX) -> tuple[ca.MX, ca.MX]:
     """y and T after all steps of a sample; `seed` by what keeps its value meanwhile: `held`, then the constants."""
-    steps = q.steps
     y, u, u_next, e, c = given
-    along = _along(q, seed.size2() > held.numel())
+    free = seed.size2() > held.numel()
+    on = _implicitly(q, free) if isinstance(q.steps, Sticking) else _explicitly(q, free)
+    for begin, end in pairwise(q.steps.drives(u, u_next, q.linear)):
+        y, T = on(T, seed, [y, begin, end, held, e, c])
+    return y, T
+
+
+def _implicitly(q: Equations, free: bool) -> Step:
+    """A step through points Y = base + M n with n = N(Y): dn = (1 - N_Y M)^-1 (N_Y dbase + N_c dc)."""
+    steps, along = q.steps, _along(q, free)
+    E_c, E, P, W, V = (M.T for M in (steps.E_c, steps.E, steps.P, steps.W, steps.V))
+
+    def on(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
+        y, *slopes = along(*given)
+
+        def of_n(base: ca.MX, M: ca.DM, by_y: ca.MX, by_kept: ca.MX) -> ca.MX:
+            return (base @ by_y + seed @ by_kept) @ ca.inv(ca.DM.eye(M.size1()) - M @ by_y)
+
+        first = of_n(T @ E_c, P, slopes[0], slopes[2])
+        base = T @ E + first @ W
+        return y, base + of_n(base, V, slopes[1], slopes[3]) @ V
+
+    return on
+
+
+def _explicitly(q: Equations, free: bool) -> Step:
+    """A step from point to point."""
+    steps = q.steps
+    along = _along(q, free)
     read = sorted({row for i in range(1, 1 + POINTS) for row in along.sparsity_out(i).row()})  # the states N depends on
     half, Q, R = (_columns(M.T, read) for M in (steps.half, steps.Q, steps.R))
-    for begin, end in pairwise(steps.drives(u, u_next, q.linear)):
-        y, *slopes = along(y, begin, end, held, e, c)
+
+    def on(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
+        y, *slopes = along(*given)
         by_y, enters = slopes[:POINTS], [ca.densify(seed @ slope) for slope in slopes[POINTS:]]
         halfway, whole = T @ half, T @ steps.E.T
         first = ca.mac(T, by_y[0], enters[0])
@@ -64,22 +96,28 @@ def _steps(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX)
         T = whole
         for value, W in zip((first, second, third, fourth), steps.W, strict=True):
             T = ca.mac(value, W.T, T)
-    return y, T
+        return y, T
+
+    return on
 
 
 def _along(q: Equations, free: bool) -> ca.Function:
-    """(y, u, u at the end, held, ambient, c) -> y one step on, then the transposed slopes of N at the four points by y,
+    """(y, u, u at the end, held, ambient, c) -> y one step on, then the transposed slopes of N at its points by y,
     then those by what keeps its value through a sample: held and, where they are `free`, the constants."""
+    N, arguments, kept = _rest(q, free)
+    y, u, end, *own = arguments
+    slopes = ca.Function("slopes", [y, u, *own], _slopes([N(y, u, *own)], [y, kept]))
+    after, points = q.steps.points(lambda y, u: N(y, u, *own), y, u, end)
+    by_y, by_kept = zip(*(slopes(*point, *own) for point in points), strict=True)
+    return ca.Function("along", arguments, [after, *by_y, *by_kept], {"cse": True})
+
+
+def _rest(q: Equations, free: bool) -> tuple[ca.Function, list[ca.SX], ca.SX]:
+    """N (y, u, held, ambient, c); symbols y, u, u at the end, held, ambient, c; those of what keeps its value."""
     y, u, _, e, c = q.given
     own = [q.model.held, e, c]
-    kept = ca.vertcat(q.model.held, c) if free else q.model.held
-    N = q.steps.rest(q.model)
-    value = ca.Function("N", [y, u, *own], [N])
-    slopes = ca.Function("slopes", [y, u, *own], _slopes([N], [y, kept]))
-    end = ca.SX.sym("end", u.numel())
-    after, points = q.steps.step(lambda y, u: value(y, u, *own), y, u, end)
-    by_y, by_kept = zip(*(slopes(*point, *own) for point in points), strict=True)
-    return ca.Function("along", [y, u, end, *own], [after, *by_y, *by_kept], {"cse": True})
+    N = ca.Function("N", [y, u, *own], [q.steps.rest(q.model)])
+    return N, [y, u, ca.SX.sym("end", u.numel()), *own], ca.vertcat(q.model.held, c) if free else q.model.held
 
 
 def _columns(M: ca.DM, wanted: list[int]) -> ca.DM:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from ctrlgen.exponential import Steps, steps_of
 from ctrlgen.model import Model
-from ctrlgen.motion import Exponential, Sample, next_sample
+from ctrlgen.motion import Sample, next_sample
 
 POSE_NEWTON_STEPS, NEWTON_STEPS = 8, 4
 WORTH = 500  # operations on parameters alone, from which on they are done once a record
@@ -25,7 +26,7 @@ class Equations:
 
     constants: ca.Function
     model: Model
-    steps: Exponential | None
+    steps: Steps | None
     linear: bool
     following: ca.SX
     y: ca.SX
@@ -56,7 +57,7 @@ def equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> Equat
     else:
         following, y = moving
     given = [ca.vertcat(model.x, model.z), model.u, after.u_next, model.ambient_symbol, c]
-    steps = Exponential(model, sample_time) if model.inertial else None
+    steps = steps_of(model, sample_time) if model.inertial else None
     return Equations(constants, model, steps, linear, following, y, given)
 
 

@@ -1,0 +1,196 @@
+"""Steps of y' = A y + N(y, u), the motion of a stage with inertia: e^(A h) exactly, with A the nominal slope, N approximately.
+
+Where N depends on the velocities in a straight line, or not at all, explicit steps of fourth order. Where it bends with them
+(dry friction), its slope where the contact sticks is thousands of times that where it slides: explicit steps chatter there, so
+that these are implicit in the velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+from scipy.linalg import expm
+
+from ctrlgen.model import Model
+
+SUBSTEP = 0.8  # step times the fastest nominal eigenvalue; what is not linear is then right to 1e-3 of itself
+FASTEST = 5.0  # eigenvalue times sample time beyond which a lag is over within a sample, and exact
+REVERSING = 0.2  # the same where a reversal takes no time: what friction does is then right to 2 % of itself
+MOST_SUBSTEPS = 16
+SOLVING = 2  # iterations for a velocity: from standstill they come from one side and quadratically
+Rest = Callable[[ca.SX, ca.SX], ca.SX]  # y, u -> N, its rows `acting`
+
+
+def steps_of(model: Model, sample_time: float) -> Exponential:
+    """The steps that suit the model."""
+    bent = bent_velocities(model)
+    return Sticking(model, sample_time, bent) if bent else Exponential(model, sample_time)
+
+
+def bent_velocities(model: Model) -> list[int]:
+    """The axes on which the accelerating force is not linear in the axis' own velocity."""
+    pull = model.sampled_rates[model.x.numel() - model.v.numel() :]
+    slopes = (ca.jacobian(pull[i], model.v[i]) for i in range(model.v.numel()))
+    return [i for i, slope in enumerate(slopes) if ca.depends_on(slope, model.v[i])]
+
+
+class Steps:
+    """What both kinds have: `count` a sample, of h [s]; A; the rows `acting` of y that N alone has; E = e^(A h)."""
+
+    def __init__(self, model: Model, sample_time: float, A: np.ndarray, longest: float) -> None:
+        self.count = substeps(A, sample_time, longest)
+        self.h = sample_time / self.count
+        self.A = _sparse(A)
+        rest = self._rest(model)
+        self.acting = [i for i in range(len(A)) if not rest[i].is_zero()]
+        self.phis = _phis(A * self.h)
+        self.E = _sparse(self.phis[0])
+
+    def rest(self, model: Model) -> ca.SX:
+        """N, its rows `acting`."""
+        return self._rest(model)[self.acting]
+
+    def _rest(self, model: Model) -> ca.SX:
+        return ca.vertcat(model.sampled_rates, model.v) - self.A @ ca.vertcat(model.x, model.z)
+
+    def drives(self, u: ca.SX, u_next: ca.SX, linear: bool) -> list[ca.SX]:
+        """The drive at the beginning of each step of a sample, and at its end."""
+        return [u + k / self.count * (u_next - u) if linear else u for k in range(self.count + 1)]
+
+    def _acting(self, M: np.ndarray) -> ca.DM:
+        return _sparse(M[:, self.acting])
+
+
+class Exponential(Steps):
+    """Explicit steps, N to fourth order.
+
+    S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430, eqs. (26)-(29): a step is from y to E y + sum_i W_i N_i,
+    through the points half y + Q N_1, half y + Q N_2 and E y + R N_1 + 2 Q N_3.
+    """
+
+    def __init__(self, model: Model, sample_time: float) -> None:
+        super().__init__(model, sample_time, home_slope(model), SUBSTEP)
+        h, whole = self.h, self.phis
+        half, phi, *_ = _phis(self.A.full() * h / 2)
+        Q = h / 2 * phi
+        self.half, self.Q, self.R = _sparse(half), self._acting(Q), self._acting(half @ Q - Q)
+        middle = h * (2 * whole[2] - 4 * whole[3])
+        ends = h * (whole[1] - 3 * whole[2] + 4 * whole[3]), h * (4 * whole[3] - whole[2])
+        self.W = [self._acting(M) for M in (ends[0], middle, middle, ends[1])]
+
+    def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
+        """y one step on, the drive going from `u` to `u_end`."""
+        return self.points(N, y, u, u_end)[0]
+
+    def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
+        """y one step on, and the four (y, u) where N was evaluated."""
+        middle = (u + u_end) / 2
+        half, whole = self.half @ y, self.E @ y
+        first = N(y, u)
+        a = half + self.Q @ first
+        second = N(a, middle)
+        b = half + self.Q @ second
+        third = N(b, middle)
+        c = whole + self.R @ first + 2 * (self.Q @ third)
+        values = first, second, third, N(c, u_end)
+        after = whole + sum(W @ value for W, value in zip(self.W, values, strict=True))
+        return after, [(y, u), (a, middle), (b, middle), (c, u_end)]
+
+
+class Sticking(Steps):
+    """Steps implicit in the velocities of the axes `bent`; N to second order, also across a reversal that takes no time.
+
+    With c = 1/3: Y = E_c y + P N(Y) and y+ = E y + W N(Y) + V N(y+), E_c = e^(A c h), P = c h phi_1(A c h); W and V
+    integrate the straight line through N(Y) at c and N(y+) at 1 (the nodes of Radau IIA). What stands stays: N(y+) is
+    whatever keeps it at rest.
+    """
+
+    NODE = 1 / 3
+
+    def __init__(self, model: Model, sample_time: float, bent: list[int]) -> None:
+        stuck, sliding = home_slope(model), home_slope(model, 1.0)
+        super().__init__(model, sample_time, np.where(np.abs(sliding) < np.abs(stuck), sliding, stuck), REVERSING)
+        h, c, (_, phi_1, phi_2, _) = self.h, self.NODE, self.phis
+        E_c, phi_c, *_ = _phis(self.A.full() * c * h)
+        self.E_c, self.P = _sparse(E_c), self._acting(c * h * phi_c)
+        self.W = self._acting(h * (phi_1 - phi_2) / (1 - c))
+        self.V = self._acting(h * (phi_2 - c * phi_1) / (1 - c))
+        first = model.x.numel() - model.v.numel()
+        self.places = [first + i for i in bent]  # in y
+        self.own = [self.acting.index(i) for i in self.places]  # in N
+
+    def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
+        """y one step on, the drive going from `u` to `u_end`."""
+        return self.points(N, y, u, u_end)[0]
+
+    def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
+        """y one step on, and the two (y, u) where N = N(y, u) was solved for."""
+        u_c = u + self.NODE * (u_end - u)
+        Y, n = self._solved(N, self.E_c @ y, self.P, u_c, N(y, u))
+        after, _ = self._solved(N, self.E @ y + self.W @ n, self.V, u_end, n)
+        return after, [(Y, u_c), (after, u_end)]
+
+    def _solved(self, N: Rest, base: ca.SX, M: ca.DM, u: ca.SX, n: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Y = base + M n and n = N(Y, u), from a guess of n.
+
+        Newton's method for each velocity, from where the guess goes, or from standstill where it does not go the way that
+        a standstill would be left: friction bends toward its full force, so that no iterate from there overshoots. What
+        else N depends on follows along.
+        """
+        n, weight = n[:], ca.diag(M[self.places, self.own])
+        sliding = (base + M @ n)[self.places]
+        still = base + M @ n
+        still[self.places] = 0
+        n[self.own] = N(still, u)[self.own]
+        way = ca.sign((base + M @ n)[self.places])
+        v = ca.fmax(way * sliding, 0) * way
+        n[self.own] += (v - (base + M @ n)[self.places]) / weight
+        for _ in range(SOLVING):
+            Y = base + M @ n
+            v = Y[self.places]
+            n, slope = self._sloped(N, Y, u)
+            off = (base + M @ n)[self.places] - v
+            after = ca.fmax(way * (v + off / (1 - weight * slope)), 0) * way
+            n[self.own] += (after - v - off) / weight
+        return base + M @ n, n
+
+    def _sloped(self, N: Rest, Y: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """N at Y, and how much each bent row changes with its own velocity."""
+        at = ca.SX.sym("Y", Y.numel())
+        value = N(at, u)
+        slope = ca.vertcat(*(ca.jacobian(value[i], at[k]) for i, k in zip(self.own, self.places, strict=True)))
+        return tuple(ca.substitute([value, slope], [at], [Y]))
+
+
+def _sparse(M: np.ndarray) -> ca.DM:
+    return ca.sparsify(ca.DM(np.where(np.abs(M) < 1e-300, 0.0, M)))
+
+
+def home_slope(model: Model, moving: float = 0.0) -> np.ndarray:
+    """df/dy of the nominal model near home, the drive held, where a law with a corner at home is on one side of it; at
+    standstill or `moving` at so many typical speeds."""
+    state = ca.vertcat(model.x, model.z)
+    A = ca.jacobian(ca.vertcat(model.sampled_rates, model.v), state)
+    at = ca.Function("A", [state, model.held, model.u, model.p, model.ambient_symbol], [A])
+    here = np.concatenate([model.rest, 1e-3 * model.z_scale])
+    first = model.x.numel() - model.v.numel()
+    here[first : model.x.numel()] += moving * model.x_scale[first:]
+    return at(here, 0, 0, model.p_nominal, 0).full()
+
+
+def substeps(A: np.ndarray, sample_time: float, longest: float) -> int:
+    """Steps a sample, each at most `longest` of the time in which the fastest nominal motion changes by itself."""
+    fastest = np.abs(np.linalg.eigvals(A)).max(initial=0.0)
+    return int(np.clip(np.ceil(sample_time * min(fastest, FASTEST / sample_time) / longest), 1, MOST_SUBSTEPS))
+
+
+def _phis(M: np.ndarray) -> list[np.ndarray]:
+    """e^M, phi_1, phi_2, phi_3 with phi_k(M) = sum_j M^j/(j + k)!: the first row of blocks of one larger exponential."""
+    n = len(M)
+    large = np.zeros((4 * n, 4 * n))
+    large[:n, :n] = M
+    for k in range(3):
+        large[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
+    return np.split(expm(large)[:n], 4, axis=1)
