@@ -37,6 +37,7 @@ class Chain:
         self.held = self.held_value = ca.SX(0, 1)
         self.rates: ca.SX | None = None
         self.carried = self.z
+        self.own_force = ca.SX(len(links.axes), 1)
         self.members: list[_Member] = []
         self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
         for k, effect in enumerate(device.effect):
@@ -145,6 +146,7 @@ class Chain:
             p_nominal=p_nominal,
             ambient=self.ambient,
             stepped={i: closed(value) for i, value in following.items()},
+            sticking=self._sticking(),
             held=self.held,
             held_value=self.held_value,
             sampled_rates=sampled,
@@ -213,9 +215,9 @@ class Chain:
             pushed, self.rates = links.moving(drive, x, z, self.v)
         else:
             pushed = links.force(drive, x, z)
-        balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z)
-        if links.drag:
-            balance -= links.drag(self.v)
+        drag = links.drag(self.v) if links.drag else ca.SX(n, 1)
+        self.own_force = pushed - drag
+        balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z) - drag
         signals = {"drive": links.drive}
         if links.command_signal is not None:
             label, unit, column, size = links.command_signal
@@ -228,6 +230,15 @@ class Chain:
             signals["state"] = links.state
         signals |= self._mechanical(pushed, displacement, pose, reading)
         return signals, balance, arriving, heat, produced
+
+    def _sticking(self) -> tuple[int, ...]:
+        """Axes with inertia on which an effect sticks, or whose own force bends with their velocity."""
+        slopes = (
+            [ca.jacobian(self.own_force[i], v) for i, v in enumerate(ca.vertsplit(self.v))] if self.v.numel() else []
+        )
+        bent = {i for i, slope in enumerate(slopes) if ca.depends_on(slope, self.v[i])}
+        stuck = {m.index for m in self.members if m.effect.sticks and m.effect.place is Place.FORCE}
+        return tuple(sorted((bent | stuck) if slopes else ()))
 
     def _imposed(self, x: ca.SX) -> tuple[dict[str, Signal], ca.SX, ca.SX, ca.SX, ca.SX]:
         """The same where the motion is given and the force that takes is read."""

@@ -146,9 +146,12 @@ class Effect:
     partner_unit: ClassVar[str | None] = None
     several: ClassVar[bool] = False  # may act more than once at one place, as harmonics do
     active: ClassVar[bool] = False  # may put energy into the stage
+    sticks: ClassVar[bool] = False  # its force at standstill is what holds the stage there: steps must be implicit
     rarity: ClassVar[float] = (
         0.0  # ln of how many times rarer it is than a wrong gain: decides among causes that explain alike
     )
+    rough: ClassVar[float] = 0.0  # of itself: how far the form of the law, fitted, may be from nature
+    family: ClassVar[str | None] = None  # forms of one physics, of which a place has one
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 
     def __init__(self, at: str, values: dict[str, Quantity], of: str | None = None) -> None:

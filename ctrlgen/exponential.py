@@ -1,8 +1,7 @@
 """Steps of y' = A y + N(y, u), the motion of a stage with inertia: e^(A h) exactly, with A the nominal slope, N approximately.
 
-Where N depends on the velocities in a straight line, or not at all, explicit steps of fourth order. Where it bends with them
-(dry friction), its slope where the contact sticks is thousands of times that where it slides: explicit steps chatter there, so
-that these are implicit in the velocities.
+Explicit steps of fourth order, except with dry friction: its slope where the contact sticks is thousands of times that where
+it slides, so that explicit steps chatter, and these are implicit in the velocities.
 """
 
 from __future__ import annotations
@@ -25,15 +24,7 @@ Rest = Callable[[ca.SX, ca.SX], ca.SX]  # y, u -> N, its rows `acting`
 
 def steps_of(model: Model, sample_time: float) -> Exponential:
     """The steps that suit the model."""
-    bent = bent_velocities(model)
-    return Sticking(model, sample_time, bent) if bent else Exponential(model, sample_time)
-
-
-def bent_velocities(model: Model) -> list[int]:
-    """The axes on which the accelerating force is not linear in the axis' own velocity."""
-    pull = model.sampled_rates[model.x.numel() - model.v.numel() :]
-    slopes = (ca.jacobian(pull[i], model.v[i]) for i in range(model.v.numel()))
-    return [i for i, slope in enumerate(slopes) if ca.depends_on(slope, model.v[i])]
+    return Sticking(model, sample_time) if model.sticking else Exponential(model, sample_time)
 
 
 class Steps:
@@ -100,7 +91,7 @@ class Exponential(Steps):
 
 
 class Sticking(Steps):
-    """Steps implicit in the velocities of the axes `bent`; N to second order, also across a reversal that takes no time.
+    """Steps implicit in the velocities of the axes that stick; N to second order, also across a reversal that takes no time.
 
     With c = 1/3: Y = E_c y + P N(Y) and y+ = E y + W N(Y) + V N(y+), E_c = e^(A c h), P = c h phi_1(A c h); W and V
     integrate the straight line through N(Y) at c and N(y+) at 1 (the nodes of Radau IIA). What stands stays: N(y+) is
@@ -109,7 +100,7 @@ class Sticking(Steps):
 
     NODE = 1 / 3
 
-    def __init__(self, model: Model, sample_time: float, bent: list[int]) -> None:
+    def __init__(self, model: Model, sample_time: float) -> None:
         stuck, sliding = home_slope(model), home_slope(model, 1.0)
         super().__init__(model, sample_time, np.where(np.abs(sliding) < np.abs(stuck), sliding, stuck), REVERSING)
         h, c, (_, phi_1, phi_2, _) = self.h, self.NODE, self.phis
@@ -118,7 +109,7 @@ class Sticking(Steps):
         self.W = self._acting(h * (phi_1 - phi_2) / (1 - c))
         self.V = self._acting(h * (phi_2 - c * phi_1) / (1 - c))
         first = model.x.numel() - model.v.numel()
-        self.places = [first + i for i in bent]  # in y
+        self.places = [first + i for i in model.sticking]  # in y
         self.own = [self.acting.index(i) for i in self.places]  # in N
 
     def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
@@ -157,7 +148,7 @@ class Sticking(Steps):
         return base + M @ n, n
 
     def _sloped(self, N: Rest, Y: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """N at Y, and how much each bent row changes with its own velocity."""
+        """N at Y, and how much each sticking row changes with its own velocity."""
         at = ca.SX.sym("Y", Y.numel())
         value = N(at, u)
         slope = ca.vertcat(*(ca.jacobian(value[i], at[k]) for i, k in zip(self.own, self.places, strict=True)))

@@ -36,7 +36,8 @@ class Model:
     (temperatures), then come the effects' memories, then the velocities `v` (n_axes,; none without inertia: z' = v).
     `rates_of_heat` dx/dt (n_x,) in terms of the `heat` that `heat_of_drive` (u) produces, and `balance` 0 = g(x, z, u)
     (n_axes,). `stepped` gives, for states that change once a sample, the new value by their place in x; `clocks` are
-    the places of those that count time. `ambient` is the rise of the surroundings [K], zero unless it was asked for.
+    the places of those that count time. `sticking`: axes with inertia where dry friction may hold. `ambient` is the rise
+    of the surroundings [K], zero unless it was asked for.
     With a loop the drive is computed at every sample and `held`: its symbol, its `held_value`, and the rates in its terms.
     `seen` (place, channel, partner, states) is what an effect's law would read there.
     `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
@@ -55,6 +56,7 @@ class Model:
     ambient: ca.SX
     stepped: dict[int, ca.SX]
     clocks: tuple[int, ...]
+    sticking: tuple[int, ...]
     held: ca.SX
     held_value: ca.SX
     sampled_rates: ca.SX

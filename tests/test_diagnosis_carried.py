@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from conftest import SCENARIOS
@@ -43,17 +44,33 @@ def record(amplitude) -> Record:
 
 
 def differentiated(r: Response, moved: Record, p: np.ndarray) -> np.ndarray:
-    """dy/dp and dy/dstart (n, n_y, m): D+ = F_S D + F_p, with the slopes of whole samples."""
+    """dy/dp and dy/dstart (n, n_y, m): D+ = F_S D + F_p, with whole samples differentiated by CasADi."""
+    q = r._equations
+    by = [q.given[0], q.given[4]]
+    slopes = ca.Function("slopes", q.given, [ca.jacobian(value, s) for value in (q.following, q.y) for s in by])
     after, _ = r.motion(moved, p)
     before = np.vstack([r.begin(moved, p), after[:-1]])
-    F_S, F_p, H_S, H_p = r.linearised(p, range(len(p))).along(before, *r._inputs(moved))
+    c, c_p = q.constants(p)
     starts = len(r.initial)
     D, Y = np.zeros((r.n_s, len(p) + starts)), []
     D[list(r.initial), len(p) + np.arange(starts)] = 1.0
-    nothing = [np.zeros((n, starts)) for n in (r.n_s, len(r.channels))]
+    entering = np.hstack([c_p.full(), np.zeros((len(c.full()), starts))])
+    for S, u, u_next, e in zip(before, *r._inputs(moved), strict=True):
+        F_S, F_c, H_S, H_c = (value.full() for value in slopes(S, u, u_next, e, c))
+        Y.append(H_S @ D + H_c @ entering)
+        D = F_S @ D + F_c @ entering
+    return np.array(Y)
+
+
+def linearised(r: Response, moved: Record, p: np.ndarray) -> np.ndarray:
+    """dy/dp (n, n_y, m) from the motion linearised sample by sample."""
+    after, _ = r.motion(moved, p)
+    before = np.vstack([r.begin(moved, p), after[:-1]])
+    F_S, F_p, H_S, H_p = r.linearised(p, range(len(p))).along(before, *r._inputs(moved))
+    D, Y = np.zeros((r.n_s, len(p))), []
     for k in range(N):
-        Y.append(H_S[k] @ D + np.hstack([H_p[k], nothing[1]]))
-        D = F_S[k] @ D + np.hstack([F_p[k], nothing[0]])
+        Y.append(H_S[k] @ D + H_p[k])
+        D = F_S[k] @ D + F_p[k]
     return np.array(Y)
 
 
@@ -80,6 +97,7 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
     moved = record(size)
     y, Y = r.sensitivities(moved, p)
     agree(Y, differentiated(r, moved, p))
+    agree(linearised(r, moved, p), Y[:, :, : len(p)])
     assert np.allclose(y, r.outputs(moved, p), rtol=0, atol=1e-12 * np.abs(y).max())
     alone = r.sensitivities(moved, p, by_free=False)[1]
     agree(alone, Y[:, :, len(p) :])

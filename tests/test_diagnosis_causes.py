@@ -7,12 +7,12 @@ import pytest
 from scipy.signal import lfilter
 from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, record
 
-from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.noise import estimate
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.screen import Screen
-from ctrlgen.diagnosis.search import Searcher
+from ctrlgen.diagnosis.search import Searcher, Trial
 from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.lattice import lattice
@@ -134,3 +134,32 @@ def test_a_start_that_is_far_off_is_begun_again_near_off():
     late = Hypothesis("low_pass", "sensor:axis", "axis")
     far = Structure(AXIS).with_cause(late, {"share": 1.5, "tau": 1.0, "damping": 0.3})
     assert fitter.fit(far, nested=nominal, steps=8).objective <= nominal.objective * 1.001
+
+
+@pytest.mark.parametrize(
+    "first, lost, sure, doubtful",
+    [
+        ("hysteresis", 0.2, 50.0, True),  # a law of hysteresis leaves a fiftieth of itself, 0.4 of 1000 squares
+        ("hysteresis", 0.6, 50.0, False),
+        ("drive_gain", 0.2, 50.0, False),  # a gain leaves nothing
+        ("drive_gain", 9.0, 1.5, True),  # may be nothing, and takes away less than a hundredth
+        ("drive_gain", 11.0, 1.5, False),
+    ],
+)
+def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, first, lost, sure, doubtful):
+    at = "actuator:axis" if first == "drive_gain" else "stage:axis"
+    begin = {"gain": 0.1} if first == "drive_gain" else {"stiffness": 1e4, "reach": 3e-5, "taper": 0.5}
+    structure = Structure(AXIS).with_cause(Hypothesis(first, at, "axis"), begin)
+    structure = structure.with_cause(LATE, {"gain": 1.0, "tau": 1.0})
+    theta = structure.start
+    fit = Fit(structure, theta, (), 0.0, 1500, np.zeros(0), sure * np.eye(len(theta)), 0.0)
+    searcher = Searcher(fitter_of(), Screen(fitter_of(), [LIMIT]), lambda _: None)
+    monkeypatch.setattr(searcher, "trial", lambda *_, **__: Trial(fit, 1000.0, 0.0))
+    assert searcher._doubtful(Trial(fit, lost, 0.0), Trial(fit, 0.0, 0.0), 1) == doubtful
+
+
+def test_a_place_has_one_form_of_hysteresis():
+    first, second = (Hypothesis(e, "stage:axis", "axis") for e in ("hysteresis", "bouc_wen"))
+    elsewhere = Hypothesis("bouc_wen", "stage:other", "other")
+    assert second.beside([first]) is None and first.beside([second]) is None
+    assert second.beside([elsewhere, LATE]) is second

@@ -68,6 +68,7 @@ def test_dry_friction_is_right_to_hundredths_of_itself_sliding_and_sticking(tmp_
 
 
 def test_what_bends_gently_is_of_second_order(tmp_path, monkeypatch):
+    """Reversals that take longer than a step."""
     drive, speed, off = DRIVES["several frequencies"], 0.1, []
     wanted = stepped(lambda z, v: -2.0 * tanh(v / speed), drive, 100)
     effect = "kind = 'coulomb'\nforce = '2 N'\nsmoothing = '0.1 m/s'"

@@ -13,7 +13,7 @@ from itertools import pairwise
 import casadi as ca
 
 from ctrlgen.diagnosis.equations import Equations
-from ctrlgen.exponential import Exponential, Sticking
+from ctrlgen.exponential import Sticking
 
 POINTS = 4  # of an explicit step
 Step = Callable[
@@ -29,7 +29,7 @@ def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca
     def slope(*slopes: ca.MX) -> ca.MX:
         return sum((V @ slope for V, slope in zip((T, seed), slopes, strict=False)))
 
-    if q.steps is None or (isinstance(q.steps, Exponential) and q.steps.count == 1):
+    if not several(q):
         one = ca.Function("one", q.given, [q.following, q.y, *_slopes([q.following, q.y], by)], {"cse": True})
         following, y, *slopes = one(*given)
         return following, slope(*slopes[: len(by)]), y, slope(*slopes[len(by) :])
@@ -43,6 +43,11 @@ def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca
         places = list(m.stepped)
         after[places], T[:, places] = stepped, of_stepped
     return after, T, y, Y
+
+
+def several(q: Equations) -> bool:
+    """Whether a sample takes more than one explicit step, or implicit ones: not to be differentiated whole."""
+    return q.steps is not None and (isinstance(q.steps, Sticking) or q.steps.count > 1)
 
 
 def _slopes(values: list[ca.SX], by: list[ca.SX]) -> list[ca.SX]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import Adequacy
-from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.search import Search
 from ctrlgen.diagnosis.structure import Structure, changed
@@ -18,7 +18,6 @@ from ctrlgen.recording import Recording
 from ctrlgen.units import difference, from_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
-CI = 1.959964  # standard deviations of a 95 % interval
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.recording import Record, Recording
 
 STEPS = 40
+CI = 1.959964  # standard deviations of a 95 % interval
 NEGLIGIBLE = 0.01
 LITTLE = 1.3  # times the noise: what leaves more is not noise
 WORST = 1e8  # whitened residual of a simulation that has left the numbers

@@ -41,11 +41,22 @@ class Hypothesis:
 
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
         """The same where `causes` are there already: itself, one more of it, or None where there can be no more."""
+        if any(
+            (c.family, c.location) == (self.family, self.location) and c.effect != self.effect
+            for c in causes
+            if c.family
+        ):
+            return None
         there = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
         if not there:
             return self
         several = self.effect != PARAMETER and self.law.several
         return replace(self, count=1 + max(c.count for c in there)) if several else None
+
+    @property
+    def family(self) -> str | None:
+        """Of the effect."""
+        return None if self.effect == PARAMETER else self.law.family
 
     @property
     def law(self) -> type[Effect]:

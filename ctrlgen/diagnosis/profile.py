@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.fit import Fit, Fitter, _Problem
+from ctrlgen.diagnosis.fit import CI, Fit, Fitter, _Problem
 from ctrlgen.diagnosis.hypotheses import PARAMETER
 from ctrlgen.units import from_si
 
-CI = 1.959964
 FIRST = 2.0  # standard deviations at which the profile is looked at
 FARTHER = 3  # times it is looked at twice as far, while it is flat
 STEEP = 1.4  # times the quadratic rise, above which the others are fitted once more

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.carried import carried
+from ctrlgen.diagnosis.carried import carried, several
 from ctrlgen.diagnosis.equations import Equations, equations
 from ctrlgen.diagnosis.mapped import Recursion, evaluate
 from ctrlgen.model import Model, build_model
@@ -36,6 +36,7 @@ class Response:
         look_back = sample_time if np.isfinite(sample_time) else None
         self.model: Model = build_model(device, free, self.ambient, look_back)
         self._carried: dict[bool, Recursion] = {}
+        self._by_pattern: dict[tuple, ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
 
     @cached_property
@@ -59,6 +60,17 @@ class Response:
     def _equations(self) -> Equations:
         return equations(self.model, self._observed, self.sample_time, self.linear)
 
+    def linearised(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
+        """Along any motion, for the `chosen` m of the free numbers, at `p`."""
+        c, by_p = self._equations.constants(p)
+        given = self._symbols[:4]
+        by_f = by_p[:, list(chosen)]
+        slopes = self._stepped(by_f.sparsity())(*given, c, by_f) if several(self._equations) else None
+        if slopes is None:
+            F_S, F_c, H_S, H_c = self._sloped(*given, c)
+            slopes = [F_S, F_c @ by_f, H_S, H_c @ by_f]
+        return Linearised(ca.Function("linearised", given, slopes))
+
     @cached_property
     def _sloped(self) -> ca.Function:
         """`given` of the equations -> F_S, F_c, H_S, H_c."""
@@ -66,13 +78,18 @@ class Response:
         slopes = [ca.jacobian(a, b) for a in (q.following, q.y) for b in (q.given[0], q.given[4])]
         return ca.Function("sloped", q.given, slopes, {"cse": True})
 
-    def linearised(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
-        """Along any motion, for the `chosen` m of the free numbers, at `p`."""
-        c, by_p = self._equations.constants(p)
-        given = self._symbols[:4]
-        F_S, F_c, H_S, H_c = self._sloped(*given, c)
-        by_f = by_p[:, list(chosen)]
-        return Linearised(ca.Function("linearised", given, [F_S, F_c @ by_f, H_S, H_c @ by_f]))
+    def _stepped(self, pattern: ca.Sparsity) -> ca.Function:
+        """`given` of the equations, dc/df of some `pattern` -> F_S, F_f, H_S, H_f where a sample takes several steps."""
+        key = (pattern.shape, tuple(pattern.find()))
+        if key not in self._by_pattern:
+            by_f, n_s = ca.MX.sym("by_f", pattern), self.n_s
+            m = pattern.size2()
+            T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))  # dense: steps fill it
+            seed = ca.vertcat(ca.MX(n_s, pattern.size1()), by_f.T)
+            _, T, _, Y = carried(self._equations, T, seed, self._symbols)
+            slopes = [part.T for values in (T, Y) for part in (values[:n_s, :], values[n_s:, :])]
+            self._by_pattern[key] = ca.Function("stepped", [*self._symbols, by_f], slopes)
+        return self._by_pattern[key]
 
     def begin(self, record: Record, p: np.ndarray) -> np.ndarray:
         """S before the first sample: actuators at rest; the stage at home, or in balance where it has no inertia."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
@@ -30,6 +30,9 @@ TRIAL_STEPS = 8
 ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
+FORM = (
+    0.01  # of the squares that all causes take away: below, a cause of doubtful size may be the form of another's law
+)
 ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
@@ -214,6 +217,8 @@ class Searcher:
                 if max(used.get(s.hypothesis, 0) for s in suspects) >= max(2, self.trials // 2):
                     continue
                 structure = _cooled(current.fit)
+                if len({(h.family, h.location) if h.family else h for h in (s.hypothesis for s in suspects)}) < size:
+                    continue
                 for s in suspects:
                     used[s.hypothesis] = used.get(s.hypothesis, 0) + 1
                     structure = structure.with_cause(s.hypothesis, s.start)
@@ -281,9 +286,20 @@ class Searcher:
             if len(current.fit.structure.causes) <= least:
                 break
             bare = self.trial(_cooled(current.fit).without(k))
-            if not self._worth(bare, current):
+            if not self._worth(bare, current) or self._doubtful(bare, current, k):
                 current = bare
         return current
+
+    def _doubtful(self, bare: Trial, current: Trial, k: int) -> bool:
+        """Whether cause k takes away no more than the form of the others' laws may leave, or little and may be nothing
+        (the 95 % interval of its amplitude reaches off)."""
+        fit, causes = current.fit, current.fit.structure.causes
+        all_of_them = self.trial(Structure(fit.structure.device), steps=40).held - current.held
+        rough = max((c.law.rough for c in causes if c != causes[k] and c.effect != PARAMETER), default=0.0)
+        own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
+        sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+        vague = all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
+        return bare.held - current.held < max(rough**2, FORM if vague else 0.0) * all_of_them
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
         return tuple(t for t in self._replacements(current, k) if t.total < current.total + RIVAL)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.along import Along
 from ctrlgen.diagnosis.empirical import Empirical, empirical
-from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.free import Free, free
 from ctrlgen.diagnosis.where import projected
 from ctrlgen.units import difference
@@ -20,7 +20,6 @@ from ctrlgen.units import difference
 BINS = 24
 FEWEST = 5  # samples in a bin that is shown
 MOST_AXES = 2  # for which a term is sought
-CI = 1.959964
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ class AsymmetricHysteresis(Effect):
     """
 
     place = Place.FORCE
+    rough = 0.02
+    family = "hysteresis"
     rarity = 2.3
     needs = frozenset({"force"})
     source = "P. R. Dahl, AIAA Journal 14 (1976) 1675; the warp is ours"

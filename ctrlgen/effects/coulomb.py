@@ -9,6 +9,8 @@ class Coulomb(Effect):
     """Delta F = -f tanh(v/v_s). Holds for speeds well above v_s; below it the contact creeps instead of sticking."""
 
     place = Place.FORCE
+    rough = 0.02
+    sticks = True
     needs = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: friction in machines"
     params = (

@@ -10,6 +10,8 @@ class Creep(Effect):
     """
 
     place = Place.DISPLACEMENT
+    rough = 0.02
+    family = "creep"
     source = "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), standard solid"
     params = (
         Param("gain", "1", (0.0, 0.2), "extra travel after infinite time, per travel", off=0.0),

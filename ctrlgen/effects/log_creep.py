@@ -12,6 +12,8 @@ class LogCreep(Effect):
     """
 
     place = Place.DISPLACEMENT
+    rough = 0.02
+    family = "creep"
     source = "H. Jung, D.-G. Gweon, Rev. Sci. Instrum. 71 (2000) 1896: creep of piezoelectric actuators"
     params = (
         Param("gain", "1", (0.0, 0.1), "extra travel per decade of time, per travel", off=0.0),

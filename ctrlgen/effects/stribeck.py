@@ -12,7 +12,9 @@ class Stribeck(Effect):
     """
 
     place = Place.FORCE
+    rough = 0.02
     rarity = 1.0  # dry friction that does not fall is the commoner
+    sticks = True
     needs = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083, Gaussian form of Stribeck's curve"
     params = (
