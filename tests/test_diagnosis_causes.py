@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -9,7 +11,8 @@ from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, re
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import Hypothesis
-from ctrlgen.diagnosis.noise import estimate
+from ctrlgen.diagnosis.noise import coloured, estimate
+from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher, Trial
@@ -163,3 +166,34 @@ def test_a_place_has_one_form_of_hysteresis():
     elsewhere = Hypothesis("bouc_wen", "stage:other", "other")
     assert second.beside([first]) is None and first.beside([second]) is None
     assert second.beside([elsewhere, LATE]) is second
+
+
+@pytest.mark.parametrize("a", [0.0, 0.5, 0.8])
+def test_noise_is_told_at_the_frequencies_at_which_the_readings_move_least(a):
+    """Also beside physics left out that is sixteen times as large, which makes it up to twice as large."""
+    rng = np.random.default_rng(3)
+    noise = lfilter([1.0], [1.0, -a], rng.standard_normal(4500))[500:]
+    motion = lfilter([0.05], [1.0, -0.95], 1000 * rng.standard_normal(4000))
+    left_out = lfilter([0.005], [1.0, -0.97], motion)
+    total = 1 / np.sqrt(1 - a**2)
+    for change, most in ((0.0, 1.15), (left_out, 2.2)):
+        sd, ar, worth = quiet_noise(noise + change, motion)
+        floor = coloured(sd, ar)
+        assert 0.85 * total < floor < most * total
+        assert worth > 400
+
+
+def test_a_stretch_that_is_too_short_tells_no_noise():
+    assert quiet_noise(np.ones(150), np.ones(150)) is None
+    assert quiet_noise(np.zeros(500), np.ones(500)) is None
+
+
+def test_a_guessed_noise_is_refined_by_what_the_device_leaves():
+    """Nothing rests, repeats or dwells; the readings' own fastest part is motion, tens of times the noise."""
+    guess, fitter = (fitter_of() for _ in range(2))
+    for f in (guess, fitter):
+        f.recording = replace(f.recording, records=tuple(r for r in f.recording.records if r.role != "rest"))
+        f.noise = estimate(replace(f.recording, records=f.recording.records[:1]), SETTLING)
+    assert guess.noise.guessed[0] and guess.noise.floor[0] > 3 * NOISE
+    fitter.learn_quiet(fitter.fit(Structure(AXIS)))
+    assert fitter.noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in fitter.noise.said[0]

@@ -29,6 +29,7 @@ from ctrlgen.motion import settling_time
 from ctrlgen.recording import Recording
 
 Progress = Callable[[str], None]
+GUESSES = 2  # of the noise, each with the device fitted under the one before
 SOME_TIME = 1e-3  # s: effects that look back by samples do not change how long a device settles
 
 
@@ -51,6 +52,9 @@ def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -
     step("noise")
     noise = estimate(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
     fitter = Fitter(recording, noise)
+    for _ in range(GUESSES if noise.guessed.any() else 0):
+        fitter.learn_quiet(fitter.fit(Structure(device)))
+    noise = fitter.noise
     spikes = fitter.mark_spikes(fitter.fit(Structure(device)))
     acting = set(movable(device))
     sample_times = {r.sample_time for r in recording.records}

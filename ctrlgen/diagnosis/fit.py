@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from ctrlgen.diagnosis.noise import Noise, autoregression
+from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
@@ -115,6 +116,33 @@ class Fitter:
         self.to_fit = [r for r in records if r.role == "fit"]
         self.held = [r for r in records if r.role == "hold_out"]
         return f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
+
+    def learn_quiet(self, fit: Fit) -> None:
+        """Where the noise was guessed: from what `fit` leaves at the frequencies at which the readings move least."""
+        sd, ar, count, said = self.noise.sd.copy(), list(self.noise.ar), self.noise.count.copy(), list(self.noise.said)
+        for i in np.flatnonzero(self.noise.guessed):
+            parts = [p for r in self.to_fit if (p := self._quiet(fit, r, i)) is not None]
+            if not parts:
+                continue
+            weights = [c for *_, c in parts]
+            order = max(len(a) for _, a, _ in parts)
+            sd[i] = np.sqrt(np.average([s**2 for s, *_ in parts], weights=weights))
+            ar[i] = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in parts], axis=0, weights=weights)
+            count[i] = sum(weights)
+            said[i] = (
+                f"{self.recording.channels[i]}: from what the device as described leaves at the frequencies at which the "
+                f"readings move least, autoregressive of order {order}; record some rest to know it"
+            )
+        self.noise = replace(self.noise, sd=sd, ar=tuple(ar), count=count, said=tuple(said))
+
+    def _quiet(self, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
+        """On the longest stretch of valid samples of channel i."""
+        y = self.predicted(fit, record)[:, i]
+        good = np.flatnonzero(np.diff(np.concatenate([[False], record.valid[:, i] & np.isfinite(y), [False]])))
+        if not len(good):
+            return None
+        a, b = max(good.reshape(-1, 2), key=lambda run: run[1] - run[0])
+        return quiet_noise((record.observed[:, i] - y)[a:b], y[a:b])
 
     def learn_colour(self, fit: Fit) -> bool:
         """Where the noise was known from fewer samples than these: the colour of what `fit` leaves, if it leaves little.

@@ -1,12 +1,12 @@
 """Step 1: the noise, never from the misfit.
 
 In order of trust: a record at rest, repeated periods of the drive, dwells, the stated deviation, and last, saying so,
-the part of the readings above the drive's band. Its colour is an autoregressive model, order by BIC.
+the fastest part of the readings, which `quiet` then refines. Its colour is an autoregressive model, order by BIC.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -24,19 +24,22 @@ LINES = 3  # at most, taken out of a rest
 NEAR_BINS = 15  # of the spectrum, over which noise is level
 OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
 LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
+GUESSED = "from the fastest part of the readings, taken as white; record some rest to know it"
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
 @dataclass(frozen=True)
 class Noise:
     """Per channel: innovation `sd` [SI], AR coefficients, and a sentence on where they come from; `known` False where
-    nothing but the misfit can tell; `count` independent samples that the estimate rests on (inf where it was stated)."""
+    nothing but the misfit can tell; `count` independent samples that the estimate rests on (inf where it was stated);
+    `guessed` True where only the readings' fastest part told it."""
 
     sd: np.ndarray
     ar: tuple[np.ndarray, ...]
     known: np.ndarray
     said: tuple[str, ...]
     count: np.ndarray
+    guessed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
         """`values` (n, n_y, ...) filtered to unit white noise; zero where a sample or one that it leans on is not `valid`."""
@@ -82,7 +85,8 @@ def estimate(recording: Recording, settling: float) -> Noise:
     """The noise of each observed channel. `settling` [s]: how long the device itself goes on after a change of drive."""
     rows = [_channel(recording, i, settling) for i in range(len(recording.channels))]
     sd, ar, known, said, count = zip(*rows, strict=True)
-    return Noise(np.array(sd), ar, np.array(known), said, np.array(count))
+    guessed = np.array([text.endswith(GUESSED) for text in said])
+    return Noise(np.array(sd), ar, np.array(known), said, np.array(count), guessed)
 
 
 def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.ndarray, bool, str, float]:
@@ -116,8 +120,7 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         return sd, none, True, f"{name}: as stated, taken as white", STATED
     parts = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
     sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), rounding, 1e-300)  # 1 + 9 + 9 + 1: third differences
-    said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
-    return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST
+    return sd, none, True, f"{name}: {GUESSED}", sum(map(len, parts)) / ROBUST_COST
 
 
 def _flat(part: np.ndarray, degree: int) -> np.ndarray:

@@ -230,11 +230,14 @@ class Searcher:
 
     @staticmethod
     def _meant(trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
-        """Whether every cause but those `accepted` has an amplitude inside its bounds."""
+        """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one."""
         structure = trial.fit.structure
         for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
             if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
                 continue
+            usual = structure.usual(unknown)
+            if usual and not usual[0] <= value <= usual[1]:
+                return False
             span = 1e-6 * (unknown.high - unknown.low)
             if value >= unknown.high - span or (value <= unknown.low + span and unknown.low != unknown.nominal):
                 return False
@@ -259,7 +262,8 @@ class Searcher:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
         for k in range(len(current.fit.structure.causes) - 1):
             for rival in self._replacements(current, k):
-                if rival.total < current.total - max(RIVAL, self._slack(current)):
+                better = rival.total < current.total - max(RIVAL, self._slack(current))
+                if better and self._meant(rival, current.fit.structure.causes):
                     current = rival
         return current
 
@@ -302,7 +306,9 @@ class Searcher:
         return bare.held - current.held < max(rough**2, FORM if vague else 0.0) * all_of_them
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
-        return tuple(t for t in self._replacements(current, k) if t.total < current.total + RIVAL)
+        there = current.fit.structure.causes
+        found = self._replacements(current, k)
+        return tuple(t for t in found if t.total < current.total + RIVAL and self._meant(t, there))
 
 
 def _rarity(structure: Structure) -> float:

@@ -67,6 +67,14 @@ class Structure:
         keep = [k for k in range(len(self.causes)) if k != index]
         return replace(self, causes=tuple(self.causes[k] for k in keep), starts=tuple(self.starts[k] for k in keep))
 
+    def usual(self, unknown: Unknown) -> tuple[float, float] | None:
+        """The range [SI] outside of which an amplitude means something else than its effect's name says."""
+        cause = self.causes[unknown.cause]
+        p = None if cause.effect == PARAMETER else cause.law.amplitude()
+        if p is None or p.usual is None:
+            return None
+        return tuple(self.place(cause).si(end, p) for end in p.usual)
+
     def place(self, cause: Hypothesis) -> Where:
         """The channel at which a cause acts; the first one where it acts at all of them."""
         where = channels(nominal_links(self.device), cause.law.place)
