@@ -145,8 +145,9 @@ def test_a_start_that_is_far_off_is_begun_again_near_off():
         ("hysteresis", 0.2, 50.0, True),  # a law of hysteresis leaves a fiftieth of itself, 0.4 of 1000 squares
         ("hysteresis", 0.6, 50.0, False),
         ("drive_gain", 0.2, 50.0, False),  # a gain leaves nothing
-        ("drive_gain", 9.0, 1.5, True),  # may be nothing, and takes away less than a hundredth
-        ("drive_gain", 11.0, 1.5, False),
+        ("hysteresis", 9.0, 1.5, True),  # where it may be nothing, a tenth of itself, 10 squares
+        ("hysteresis", 11.0, 1.5, False),
+        ("drive_gain", 0.2, 1.5, False),
     ],
 )
 def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, first, lost, sure, doubtful):

@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.structure import Structure
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
 DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
-MOST_CAUSES = {"poses": 12, "series": 8}
+MOST_CAUSES = {"poses": 24, "series": 8}
 WORTHWHILE = (
     0.05  # of the held-out excess over the noise: what a further cause must take away; patches of a wrong law do not
 )
@@ -30,9 +30,7 @@ TRIAL_STEPS = 8
 ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
-FORM = (
-    0.01  # of the squares that all causes take away: below, a cause of doubtful size may be the form of another's law
-)
+VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
 ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
@@ -295,7 +293,7 @@ class Searcher:
         return current
 
     def _doubtful(self, bare: Trial, current: Trial, k: int) -> bool:
-        """Whether cause k takes away no more than the form of the others' laws may leave, or little and may be nothing
+        """Whether cause k takes away no more than the form of the other laws may leave; more, where it may be nothing
         (the 95 % interval of its amplitude reaches off)."""
         fit, causes = current.fit, current.fit.structure.causes
         all_of_them = self.trial(Structure(fit.structure.device), steps=40).held - current.held
@@ -303,7 +301,7 @@ class Searcher:
         own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
         vague = all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
-        return bare.held - current.held < max(rough**2, FORM if vague else 0.0) * all_of_them
+        return bare.held - current.held < (rough * (VAGUE if vague else 1.0)) ** 2 * all_of_them
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
         there = current.fit.structure.causes
