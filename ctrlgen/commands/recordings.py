@@ -13,6 +13,7 @@ from ctrlgen.errors import InputError
 from ctrlgen.terminal import (
     complain,
     counted,
+    err,
     out,
     print_batch,
     print_bootstrap,
@@ -38,16 +39,21 @@ def diagnose(
 
     Leaves in --out: report.html (open this first), diagnosis.json, device.next.toml, the device file with what was
     found, and next_experiment/ where another recording would settle a doubt. The exit status is 0 whatever the
-    verdict, and 2 for input that cannot be used.
+    verdict, and 2 for input that cannot be used. What is interrupted goes on from its fits when it is asked again.
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
-    from ctrlgen.diagnosis.job import Replicates, diagnose_into
+    from ctrlgen.diagnosis.job import Replicates, diagnose_into, unfinished
 
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         with progress() as advance:
             found = diagnose_into(device, recording, out_folder, seed, advance, replicates)
+    except KeyboardInterrupt:
+        kept = unfinished(out_folder)
+        if kept.exists():
+            err.print(f"the fits so far are in {escape(str(kept))}; the same command goes on from them", soft_wrap=True)
+        raise
     except InputError as error:
         complain(error)
         raise typer.Exit(2) from None

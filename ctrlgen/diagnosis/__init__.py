@@ -18,6 +18,7 @@ from ctrlgen.diagnosis.diagnosis import Diagnosis, errors, findings, verdict
 from ctrlgen.diagnosis.evidence import evidence
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses, nominal_links
+from ctrlgen.diagnosis.journal import Journal
 from ctrlgen.diagnosis.noise import estimate
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.screen import Screen
@@ -33,25 +34,33 @@ GUESSES = 2  # of the noise, each with the device fitted under the one before
 SOME_TIME = 1e-3  # s: effects that look back by samples do not change how long a device settles
 
 
-def diagnose(device: Device, recording: Recording, seed: int = 0, progress: Progress | None = None) -> Diagnosis:
+def diagnose(
+    device: Device,
+    recording: Recording,
+    seed: int = 0,
+    progress: Progress | None = None,
+    journal: Journal | None = None,
+) -> Diagnosis:
     """What `device` leaves out that `recording` shows.
 
-    Deterministic for a given `seed`. `progress` is called with a sentence before each step. Raises InputError where the
-    recording holds nothing to fit or to hold out.
+    Deterministic for a given `seed`. `progress` is called with a sentence before each step; what was fitted before stands
+    in the `journal`. Raises InputError where the recording holds nothing to fit or to hold out.
     """
     # one thread: the matrices are small; no warnings: a trial may leave the numbers, and is then rejected
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _diagnose(device, recording, seed, progress or (lambda _: None))
+        return _diagnose(device, recording, seed, progress or (lambda _: None), journal)
 
 
-def _diagnose(device: Device, recording: Recording, seed: int, step: Progress) -> Diagnosis:
+def _diagnose(
+    device: Device, recording: Recording, seed: int, step: Progress, journal: Journal | None = None
+) -> Diagnosis:
     recording = _relative_ambient(recording)
     missing = [role for role in ("fit", "hold_out") if not any(r.role == role for r in recording.records)]
     if missing:
         raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
     step("noise")
     noise = estimate(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
-    fitter = Fitter(recording, noise)
+    fitter = Fitter(recording, noise, journal)
     for _ in range(GUESSES if noise.guessed.any() else 0):
         fitter.learn_quiet(fitter.fit(Structure(device)))
     noise = fitter.noise

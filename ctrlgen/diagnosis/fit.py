@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ctrlgen.diagnosis.journal import Journal, key_of
 from ctrlgen.diagnosis.noise import Noise, autoregression
 from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.response import Response
@@ -69,10 +70,10 @@ class Fit:
 
 
 class Fitter:
-    """Fits structures to one recording with one noise model; keeps compiled responses."""
+    """Fits structures to one recording with one noise model; keeps compiled responses, and optima in a `journal`."""
 
-    def __init__(self, recording: Recording, noise: Noise) -> None:
-        self.recording, self.noise = recording, noise
+    def __init__(self, recording: Recording, noise: Noise, journal: Journal | None = None) -> None:
+        self.recording, self.noise, self.journal = recording, noise, journal
         self.cache: dict = {}
         self.to_fit = [r for r in recording.records if r.role == "fit"]
         self.held = [r for r in recording.records if r.role == "hold_out"]
@@ -86,15 +87,28 @@ class Fitter:
         """
         problem = _Problem(self, structure)
         begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)])
-        found = problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
+        found = self._optimum(problem, begin, steps)
         if nested is None or found.objective <= nested.objective:
             return found
         for i, u in enumerate(structure.unknowns):
             if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
                 begin[i] = u.nominal + NEAR_OFF * (begin[i] - u.nominal)
         begin[problem.k :] = np.concatenate(nested.starts)
-        again = problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
+        again = self._optimum(problem, begin, steps)
         return min(found, again, key=lambda fit: fit.objective)
+
+    def _optimum(self, problem: _Problem, begin: np.ndarray, steps: int) -> Fit:
+        """From the journal, where it has been found before."""
+        if self.journal is None:
+            return problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
+        s, noise = problem.structure, self.noise
+        valid = [int(r.valid.sum()) for r in self.recording.records]
+        key = key_of(s.causes, s.starts, sorted(s.own.items()), begin, steps, noise.sd, *noise.ar, valid)
+        optimum = self.journal.recall(key)
+        if optimum is None:
+            optimum = levenberg_marquardt(problem, problem.inner(begin), steps)
+            self.journal.keep(key, optimum)
+        return problem.result(optimum)
 
     def mark_spikes(self, fit: Fit) -> str:
         """Marks as not valid what stands out alone, for one or two samples, from what `fit` leaves over; says how many.

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from ctrlgen import diagnosis as engine
+from ctrlgen._version import __version__
 from ctrlgen.devices import Device, load_device
 from ctrlgen.diagnosis.bootstrap import Bootstrap, bootstrap
 from ctrlgen.diagnosis.diagnosis import Diagnosis
+from ctrlgen.diagnosis.journal import Journal
 from ctrlgen.diagnosis.page import Provenance, page
 from ctrlgen.diagnosis.record import as_dict, plain
 from ctrlgen.diagnosis.writeback import write_next
@@ -44,7 +46,11 @@ class Replicates:
 
 
 def diagnose(
-    device: Device | Path | str, recording: Recording | Paths, seed: int = 0, progress: Progress | None = None
+    device: Device | Path | str,
+    recording: Recording | Paths,
+    seed: int = 0,
+    progress: Progress | None = None,
+    journal: Journal | None = None,
 ) -> Diagnosis:
     """What `device` leaves out that `recording` shows; each may be an object or its file, a recording also several files.
 
@@ -56,7 +62,7 @@ def diagnose(
             progress("reading")
         paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
         recording = load_recordings(paths, build_model(device))
-    return engine.diagnose(device, recording, seed, progress)
+    return engine.diagnose(device, recording, seed, progress, journal)
 
 
 def diagnose_into(
@@ -69,11 +75,12 @@ def diagnose_into(
 ) -> Diagnosis:
     """The same, reported into the folder `out`, which is replaced whole or left alone. Raises InputError.
 
+    What is stopped leaves its fits in a file beside `out`, and goes on from there when it is asked the same again.
     With `replicates` bootstrap.json is written too, and stands in the diagnosis' `extra` as "bootstrap".
     """
     step = progress or (lambda _: None)
     with whole_folder(Path(out)) as draft:
-        found = diagnose(device, recordings, seed, step)
+        found = _diagnosed(device, recordings, unfinished(Path(out)), seed, step)
         if replicates is not None:
             found.extra["bootstrap"] = replicates.of(found, seed, step)
             write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
@@ -84,6 +91,27 @@ def diagnose_into(
             write_text(draft / "next_experiment" / name, content)
         write_text(draft / "diagnosis.json", json.dumps(as_dict(found), indent=1, allow_nan=False) + "\n")
         write_text(draft / "report.html", page(found, Provenance(digests(Path(device), recordings), seed)))
+    return found
+
+
+def unfinished(out: Path) -> Path:
+    """Where a diagnosis into `out` keeps its fits until it is done."""
+    return out.with_name(f"{out.resolve().name}.unfinished")
+
+
+def _diagnosed(
+    device: Path | str, recordings: Sequence[Path | str], kept: Path, seed: int, step: Progress
+) -> Diagnosis:
+    """The diagnosis, its fits `kept` in a file meanwhile."""
+    model = build_model(load_device(device))
+    step("reading")
+    recording = load_recordings(list(recordings), model)
+    made_from = {"version": __version__, "seed": seed, "files": digests(Path(device), recordings)}
+    journal = Journal(kept, made_from)
+    if journal.known:
+        step(f"going on after {journal.known} fits")
+    found = diagnose(model.device, recording, seed, step, journal)
+    journal.done()
     return found
 
 

@@ -1,0 +1,83 @@
+"""A diagnosis that is stopped goes on from the fits it had, and answers as if it had never been stopped."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_batch import SERVO, servo_poses
+
+from ctrlgen.diagnosis import fit
+from ctrlgen.diagnosis.job import diagnose_into, unfinished
+from ctrlgen.diagnosis.journal import Journal, key_of
+
+MADE_FROM = {"version": "1", "seed": 0, "files": {"a": "b"}}
+
+
+@pytest.fixture
+def asked(tmp_path) -> tuple[Path, list[Path]]:
+    """A device file and a recording of a table whose reading is off by a gain."""
+    (tmp_path / "table.toml").write_text(SERVO)
+    return tmp_path / "table.toml", [servo_poses(tmp_path / "run", 1e-3, 0)]
+
+
+@pytest.fixture
+def sought(monkeypatch) -> list[int]:
+    """One entry for every optimum that is looked for."""
+    calls, real = [], fit.levenberg_marquardt
+
+    def counted(problem, x, steps):
+        calls.append(steps)
+        return real(problem, x, steps)
+
+    monkeypatch.setattr(fit, "levenberg_marquardt", counted)
+    return calls
+
+
+def test_what_is_stopped_goes_on_and_ends_alike(asked, sought, tmp_path):
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    diagnose_into(*asked, whole)
+    needed = len(sought)
+    assert not unfinished(whole).exists()
+
+    def stop(said: str) -> None:
+        if len(sought) > needed // 3:
+            raise KeyboardInterrupt
+
+    sought.clear()
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_into(*asked, stopped, progress=stop)
+    done, said = len(sought), []
+    assert 0 < done < needed and not stopped.exists() and unfinished(stopped).exists()
+    sought.clear()
+    diagnose_into(*asked, stopped, progress=said.append)
+    assert len(sought) == needed - done
+    assert any(s.startswith("going on after") for s in said)
+    assert (stopped / "diagnosis.json").read_bytes() == (whole / "diagnosis.json").read_bytes()
+    assert not unfinished(stopped).exists()
+
+
+def test_another_seed_or_file_begins_anew(tmp_path):
+    path = tmp_path / "kept"
+    journal = Journal(path, MADE_FROM)
+    journal.keep("k", np.array([0.1, -1e-300]))
+    assert np.array_equal(Journal(path, MADE_FROM).recall("k"), [0.1, -1e-300])
+    assert Journal(path, MADE_FROM | {"seed": 1}).known == 0
+    assert Journal(path, MADE_FROM).known == 0  # the other one took its place
+
+
+def test_a_line_that_was_not_written_to_its_end_does_not_count(tmp_path):
+    path = tmp_path / "kept"
+    lines = [json.dumps(MADE_FROM), json.dumps(["a", [1.0]]), '["b", [2.']
+    path.write_text("\n".join(lines))
+    journal = Journal(path, MADE_FROM)
+    assert journal.known == 1 and journal.recall("b") is None
+    journal.keep("c", np.array([3.0]))
+    assert set(Journal(path, MADE_FROM).found) == {"a", "c"}
+
+
+def test_a_key_tells_values_and_order():
+    a, b = np.array([1.0, 2.0]), np.array([2.0, 1.0])
+    assert len({key_of(a, b), key_of(b, a), key_of(a), key_of(a, 1), key_of(a + 1e-16 * a, b + 1e-15)}) == 5
