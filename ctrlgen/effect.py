@@ -42,7 +42,8 @@ class Param:
     displacement and `partner` for that of the other channel of a pair; `bounds` and `grid` then count in typical
     sizes of those signals, so that one law serves micrometres and degrees. `grid` are the values tried when a shape
     is unknown and the effect is only suspected. A `level` is where a signal meets a limit: its grid counts in peaks of
-    that signal in the records at hand. An amplitude outside what is `usual` is something else.
+    that signal in the records at hand. A `pitch` is a path after which something repeats: those that
+    stand out along the readings are tried too. An amplitude outside what is `usual` is something else.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Param:
     grid: tuple[float, ...] = ()
     expected: tuple[float, float] | None = None
     level: bool = False
+    pitch: bool = False
     usual: tuple[float, float] | None = None
 
     @property

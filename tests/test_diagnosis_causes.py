@@ -12,6 +12,7 @@ from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, re
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.noise import coloured, estimate
+from ctrlgen.diagnosis.pitches import pitches
 from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.screen import Screen
@@ -142,12 +143,12 @@ def test_a_start_that_is_far_off_is_begun_again_near_off():
 @pytest.mark.parametrize(
     "first, lost, sure, doubtful",
     [
-        ("hysteresis", 0.2, 50.0, True),  # a law of hysteresis leaves a fiftieth of itself, 0.4 of 1000 squares
-        ("hysteresis", 0.6, 50.0, False),
-        ("drive_gain", 0.2, 50.0, False),  # a gain leaves nothing
-        ("hysteresis", 9.0, 1.5, True),  # where it may be nothing, a tenth of itself, 10 squares
-        ("hysteresis", 11.0, 1.5, False),
-        ("drive_gain", 0.2, 1.5, False),
+        ("hysteresis", 0.05, 50.0, True),  # a law of hysteresis leaves a hundredth of itself, 0.1 of 1000 squares
+        ("hysteresis", 0.2, 50.0, False),
+        ("drive_gain", 0.05, 50.0, False),  # a gain leaves nothing
+        ("hysteresis", 2.0, 1.5, True),  # where it may be nothing, a twentieth of itself, 2.5 squares
+        ("hysteresis", 3.0, 1.5, False),
+        ("drive_gain", 0.05, 1.5, False),
     ],
 )
 def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, first, lost, sure, doubtful):
@@ -169,19 +170,19 @@ def test_a_place_has_one_form_of_hysteresis():
     assert second.beside([elsewhere, LATE]) is second
 
 
-@pytest.mark.parametrize("a", [0.0, 0.5, 0.8])
-def test_noise_is_told_at_the_frequencies_at_which_the_readings_move_least(a):
+@pytest.mark.parametrize("a, shares", [(0.0, (0, 1)), (0.5, (0, 1)), (0.8, (0,))])
+def test_noise_is_told_at_the_frequencies_at_which_the_readings_move_least(a, shares):
     """Also beside physics left out that is sixteen times as large, which makes it up to twice as large."""
     rng = np.random.default_rng(3)
     noise = lfilter([1.0], [1.0, -a], rng.standard_normal(4500))[500:]
     motion = lfilter([0.05], [1.0, -0.95], 1000 * rng.standard_normal(4000))
     left_out = lfilter([0.005], [1.0, -0.97], motion)
     total = 1 / np.sqrt(1 - a**2)
-    for change, most in ((0.0, 1.15), (left_out, 2.2)):
-        sd, ar, worth = quiet_noise(noise + change, motion)
-        floor = coloured(sd, ar)
-        assert 0.85 * total < floor < most * total
+    for share in shares:
+        sd, ar, worth = quiet_noise(noise + share * left_out, motion)
+        assert 0.85 * total < coloured(sd, ar) < (2.2 if share else 1.15) * total
         assert worth > 400
+    assert quiet_noise(noise + 20 * left_out, motion) is None  # physics at all frequencies tells no noise
 
 
 def test_a_stretch_that_is_too_short_tells_no_noise():
@@ -198,3 +199,15 @@ def test_a_guessed_noise_is_refined_by_what_the_device_leaves():
     assert guess.noise.guessed[0] and guess.noise.floor[0] > 3 * NOISE
     fitter.learn_quiet(fitter.fit(Structure(AXIS)))
     assert fitter.noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in fitter.noise.said[0]
+
+
+def test_a_pitch_is_found_that_is_a_thousandth_of_the_path():
+    """Six fringes pass between two samples, so that no spectrum over time shows it."""
+    rng, pitch = np.random.default_rng(6), 1.58e-7
+    t = np.arange(4000) * H
+    path = 4e-5 * np.sin(2 * np.pi * 1.3 * t) + 2e-5 * np.sin(2 * np.pi * 7.7 * t)
+    noise = 7e-9 * rng.standard_normal(len(t))
+    first, *_ = pitches(path + noise, noise + 5e-9 * np.sin(2 * np.pi * path / pitch + 0.4))
+    assert first == pytest.approx(pitch, rel=1e-4)
+    assert pitches(path, noise) == ()
+    assert pitches(np.ones(50), noise[:50]) == ()

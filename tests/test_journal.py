@@ -61,10 +61,11 @@ def test_what_is_stopped_goes_on_and_ends_alike(asked, sought, tmp_path):
 
 def test_another_seed_or_file_begins_anew(tmp_path):
     path = tmp_path / "kept"
-    journal = Journal(path, MADE_FROM)
-    journal.keep("k", np.array([0.1, -1e-300]))
+    Journal(path, MADE_FROM).keep("k", np.array([0.1, -1e-300]))
     assert np.array_equal(Journal(path, MADE_FROM).recall("k"), [0.1, -1e-300])
-    assert Journal(path, MADE_FROM | {"seed": 1}).known == 0
+    other = Journal(path, MADE_FROM | {"seed": 1})
+    assert other.known == 0
+    other.keep("l", np.zeros(1))
     assert Journal(path, MADE_FROM).known == 0  # the other one took its place
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 from ctrlgen.chain import available, channels
 from ctrlgen.devices import Device, Links
@@ -64,24 +65,26 @@ class Hypothesis:
         return Effect.library[self.effect]
 
     def shapes(
-        self, where: Where, lines: tuple[float, ...] = (), peak: dict[str, float] | None = None
+        self, where: Where, lines: tuple[float, ...] = (), peak: dict[str, Any] | None = None
     ) -> list[dict[str, float]]:
         """Every combination of the grids of the shape parameters [SI]; one empty one for laws without shape.
 
         `lines` [Hz] that stand out of what is left over are tried beside the frequencies of the grids. With the `peak` of
         the signal ("channel") and of the displacement ("travel") in the records [SI], a level is tried at shares of it: a
-        limit beyond shows nowhere.
+        limit beyond shows nowhere. So are the paths ("pitches") after which what is left over repeats.
         """
         shaped = [p for p in self.law.params if p is not self.law.amplitude()]
         grids = [[*self._grid(p, where, peak), *(lines if p.unit == "Hz" else ())] for p in shaped]
         return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
 
-    def _grid(self, p: Param, where: Where, peak: dict[str, float] | None = None) -> list[float]:
+    def _grid(self, p: Param, where: Where, peak: dict[str, Any] | None = None) -> list[float]:
         """The values tried of a shape parameter [SI]."""
         low, high = self.bounds(p, where)
         if p.level and peak:
             return [min(max(value * peak[p.unit], low), high) for value in p.grid]
         grid = [where.si(value, p) for value in p.grid or (sum(p.bounds) / 2,)]
+        if p.pitch and peak:
+            grid += [value for value in peak["pitches"] if value >= low]
         return [value for value in grid if value <= high] or [(low + high) / 2]
 
     def bounds(self, p: Param, where: Where) -> tuple[float, float]:

@@ -16,10 +16,10 @@ class Journal:
     """Optimum by optimum, a line each, in the file `path`; begun anew unless it was `made_from` the same."""
 
     def __init__(self, path: Path, made_from: dict[str, Any]) -> None:
-        self.path = path
+        self.path, self.made_from = path, made_from
         self.found = self._read(made_from)
         self.known = len(self.found)
-        write_text(path, _line(made_from) + "".join(map(_line, self.found.items())))
+        self._begun = False
 
     def _read(self, made_from: dict[str, Any]) -> dict[str, list[float]]:
         """What is there of the same diagnosis; a line that was not written to its end does not count."""
@@ -40,6 +40,10 @@ class Journal:
     def keep(self, key: str, optimum: np.ndarray) -> None:
         """For the next time."""
         self.found[key] = optimum.tolist()
+        if not self._begun:
+            write_text(self.path, _line(self.made_from) + "".join(map(_line, self.found.items())))
+            self._begun = True
+            return
         with self.path.open("a", encoding="utf-8") as file:
             file.write(_line((key, self.found[key])))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,7 +21,7 @@ from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.effect import Effect, Place
 
-Peaks = dict[tuple[Place, int], dict[str, float]]  # of the signal ("channel") and of the displacement ("travel") [SI]
+Peaks = dict[tuple[Place, int], dict[str, Any]]  # channel, travel [SI]; of sensors, pitches [SI]
 
 SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
 

@@ -24,7 +24,7 @@ FIRST = 4  # bins: below, the window sees the mean
 
 def quiet_noise(left: np.ndarray, motion: np.ndarray) -> tuple[float, np.ndarray, float] | None:
     """Innovation deviation, coefficients and how many samples that is worth, from what is `left` over of a record and the
-    `motion` predicted, both (n,); None where it is too short."""
+    `motion` predicted, both (n,); None where it is too short, or where physics left out goes through all frequencies."""
     n = len(left)
     if n < SHORTEST:
         return None
@@ -41,6 +41,8 @@ def quiet_noise(left: np.ndarray, motion: np.ndarray) -> tuple[float, np.ndarray
     for _ in range(1 + WIDENINGS):
         sd, a = _fitted(spectrum[chosen], turn[chosen], n)
         chosen |= (around * MEDIAN <= ALIKE * sd**2 / np.abs(1 - a * turn) ** 2) & ~lines
+    if a > 0.999 * MOST:  # that is physics left out, fast as well as slow
+        return None
     return sd, np.array([a] if a else []), np.count_nonzero(chosen) / LOBE
 
 

@@ -16,11 +16,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.signal import find_peaks
 
+from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links
 from ctrlgen.diagnosis.laws import Column, Peaks, peaks
+from ctrlgen.diagnosis.pitches import pitches
 from ctrlgen.diagnosis.slopes import Slopes, Sums
 from ctrlgen.diagnosis.together import Suspect, Together
+from ctrlgen.effect import Place
 
 ALIKE = 1e-6  # of the largest: free directions with smaller slopes are taken as one with the others
 OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
@@ -66,8 +69,9 @@ class Screen:
         first, lines = 0, self._lines(fit)
         if self.peaks is None:
             self.peaks = peaks(self.fitter, fit)
+        known = self.peaks | self._pitches(fit)
         for record, start in zip(self.fitter.to_fit, fit.starts or [None] * len(self.fitter.to_fit), strict=True):
-            slopes = Slopes(self.fitter, fit, record, open_, lines, self.peaks)
+            slopes = Slopes(self.fitter, fit, record, open_, lines, known)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)
@@ -95,6 +99,21 @@ class Screen:
         peaks, _ = find_peaks(power, distance=4 * ZEROS)
         best = peaks[np.argsort(-power[peaks])[:LINES]]
         return tuple(float(f) for f in np.sort(best) / (ZEROS * len(left) * records[k].sample_time))
+
+    def _pitches(self, fit: Fit) -> Peaks:
+        """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does."""
+        records = self.fitter.to_fit
+        if self.fitter.recording.kind == "poses" or not records:
+            return {}
+        record = max(records, key=lambda r: r.valid.size)
+        left = record.observed - self.fitter.predicted(fit, record)
+        names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
+        read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
+        return {
+            (Place.SENSOR, names.index(name)): {"pitches": pitches(record.observed[good, i], left[good, i])}
+            for i, name in read
+            if name in names and np.any(good := record.valid[:, i] & np.isfinite(left[:, i]))
+        }
 
     def _judge(self, columns: list[Column], sums: Sums, gradient: np.ndarray, likeness: np.ndarray) -> Screened:
         """`gradient` U'r (k,), zero at an optimum inside all bounds; `likeness` |J's|/|J| (free numbers, columns)."""

@@ -293,20 +293,34 @@ class Searcher:
         return current
 
     def _doubtful(self, bare: Trial, current: Trial, k: int) -> bool:
-        """Whether cause k takes away no more than the form of the other laws may leave; more, where it may be nothing
-        (the 95 % interval of its amplitude reaches off)."""
+        """Whether cause k takes away no more than the form of another's law may leave of what that one takes away; more,
+        where k may be nothing (the 95 % interval of its amplitude reaches off)."""
         fit, causes = current.fit, current.fit.structure.causes
-        all_of_them = self.trial(Structure(fit.structure.device), steps=40).held - current.held
-        rough = max((c.law.rough for c in causes if c != causes[k] and c.effect != PARAMETER), default=0.0)
         own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
         vague = all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
-        return bare.held - current.held < (rough * (VAGUE if vague else 1.0)) ** 2 * all_of_them
+        lost = bare.held - current.held
+        for j, other in enumerate(causes):
+            rough = 0.0 if j == k or other.effect == PARAMETER else other.law.rough
+            if rough and lost < (rough * (VAGUE if vague else 1.0)) ** 2 * (
+                self.trial(_cooled(fit).without(j)).held - current.held
+            ):
+                return True
+        return False
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
         there = current.fit.structure.causes
         found = self._replacements(current, k)
-        return tuple(t for t in found if t.total < current.total + RIVAL and self._meant(t, there))
+        return tuple(
+            t
+            for t in found
+            if t.total < current.total + RIVAL and self._meant(t, there) and not _same(t.cause, there[k])
+        )
+
+
+def _same(a: Hypothesis | None, b: Hypothesis) -> bool:
+    """Whether two causes have one name, as harmonics do."""
+    return a is not None and (a.effect, a.location, a.path) == (b.effect, b.location, b.path)
 
 
 def _rarity(structure: Structure) -> float:

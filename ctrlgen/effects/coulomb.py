@@ -9,7 +9,7 @@ class Coulomb(Effect):
     """Delta F = -f tanh(v/v_s). Holds for speeds well above v_s; below it the contact creeps instead of sticking."""
 
     place = Place.FORCE
-    rough = 0.02
+    rough = 0.01
     sticks = True
     needs = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: friction in machines"

@@ -10,7 +10,7 @@ class Creep(Effect):
     """
 
     place = Place.DISPLACEMENT
-    rough = 0.02
+    rough = 0.01
     family = "creep"
     source = "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), standard solid"
     params = (

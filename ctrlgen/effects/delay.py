@@ -16,6 +16,7 @@ class Delay(Effect):
     """
 
     place = Place.SENSOR
+    rough = 0.002  # by interpolation
     needs = frozenset({"sample_time"})
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"
     params = (Param("delay", "ms", (0.0, 500.0), "age of the reading", off=0.0),)

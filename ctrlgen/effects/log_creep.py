@@ -12,7 +12,7 @@ class LogCreep(Effect):
     """
 
     place = Place.DISPLACEMENT
-    rough = 0.02
+    rough = 0.01
     family = "creep"
     source = "H. Jung, D.-G. Gweon, Rev. Sci. Instrum. 71 (2000) 1896: creep of piezoelectric actuators"
     params = (

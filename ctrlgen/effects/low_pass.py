@@ -11,7 +11,7 @@ class LowPass(Effect):
     """
 
     place = Place.SENSOR
-    rough = 0.01
+    rough = 0.005
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
     params = (
         Param("share", "1", (-0.5, 1.5), "part of the reading that is filtered", off=0.0, usual=(0.8, 1.2)),

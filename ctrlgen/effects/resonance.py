@@ -12,7 +12,7 @@ class Resonance(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.02
+    rough = 0.01
     needs = frozenset({"velocity"})
     source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: two degrees of freedom"
     params = (

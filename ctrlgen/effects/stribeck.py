@@ -12,7 +12,7 @@ class Stribeck(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.02
+    rough = 0.01
     rarity = 1.0  # dry friction that does not fall is the commoner
     sticks = True
     needs = frozenset({"velocity"})
