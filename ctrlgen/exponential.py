@@ -22,7 +22,7 @@ SOLVING = 2  # iterations for a velocity: from standstill they come from one sid
 Rest = Callable[[ca.SX, ca.SX], ca.SX]  # y, u -> N, its rows `acting`
 
 
-def steps_of(model: Model, sample_time: float) -> Exponential:
+def steps_of(model: Model, sample_time: float) -> Exponential | Sticking:
     """The steps that suit the model."""
     return Sticking(model, sample_time) if model.sticking else Exponential(model, sample_time)
 

@@ -398,6 +398,13 @@ stiffness = "0.01 N/um"
 reach = "2 um"
 loop = "0.7"
 """
+STICKING = """
+[[effect]]
+kind = "coulomb"
+at = "axis"
+force = "0.5 N"
+smoothing = "0.1 mm/s"
+"""
 CONTROLLED = """
 [loop]
 position_gain = "100 1/s"
@@ -406,7 +413,9 @@ integral_gain = "1e4 V/(m*s)"
 """
 
 
-@pytest.mark.parametrize("more", ["", HYSTERETIC, CONTROLLED], ids=["bare", "hysteresis", "in closed loop"])
+@pytest.mark.parametrize(
+    "more", ["", HYSTERETIC, STICKING, CONTROLLED], ids=["bare", "hysteresis", "dry friction", "in closed loop"]
+)
 def test_a_plant_with_inertia_moves_as_the_model_and_has_no_controller(more, compiler, tmp_path, rng):
     (tmp_path / "axis").mkdir()
     scenario = axis_scenario(tmp_path / "axis", more)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from ctrlgen.exponential import Steps, steps_of
+from ctrlgen.exponential import Exponential, Sticking, steps_of
 from ctrlgen.model import Model
 from ctrlgen.motion import Sample, next_sample
 
@@ -26,7 +26,7 @@ class Equations:
 
     constants: ca.Function
     model: Model
-    steps: Steps | None
+    steps: Exponential | Sticking | None
     linear: bool
     following: ca.SX
     y: ca.SX

@@ -298,14 +298,17 @@ class Searcher:
         fit, causes = current.fit, current.fit.structure.causes
         own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-        vague = all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
+        vague = bool(own) and all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
         lost = bare.held - current.held
+        most = self.trial(
+            Structure(fit.structure.device), steps=40
+        ).held  # without one alone a fit may leave the numbers
         for j, other in enumerate(causes):
             rough = 0.0 if j == k or other.effect == PARAMETER else other.law.rough
-            if rough and lost < (rough * (VAGUE if vague else 1.0)) ** 2 * (
-                self.trial(_cooled(fit).without(j)).held - current.held
-            ):
-                return True
+            if rough:
+                taken = min(self.trial(_cooled(fit).without(j)).held, most) - current.held
+                if lost < (rough * (VAGUE if vague else 1.0)) ** 2 * taken:
+                    return True
         return False
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:

@@ -2,8 +2,8 @@
 
     x' = step(x, z, u),  0 = g(x', z', u) by Newton's method, then every signal of (x', z', u)
 
-with the drive u held over the sample. A stage with inertia takes the exponential Runge-Kutta step of
-`ctrlgen.motion` for (x, z) instead. The memories of effects are part of x. The sensors' readings are those before
+with the drive u held over the sample. A stage with inertia takes the exponential steps of
+`ctrlgen.exponential` for (x, z) instead. The memories of effects are part of x. The sensors' readings are those before
 the measuring chain: its noise and its converter (`ctrlgen.readings`) are not in the C.
 """
 
