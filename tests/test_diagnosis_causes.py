@@ -143,11 +143,11 @@ def test_a_start_that_is_far_off_is_begun_again_near_off():
 @pytest.mark.parametrize(
     "first, lost, sure, doubtful",
     [
-        ("hysteresis", 0.05, 50.0, True),  # a law of hysteresis leaves a hundredth of itself, 0.1 of 1000 squares
-        ("hysteresis", 0.2, 50.0, False),
-        ("drive_gain", 0.05, 50.0, False),  # a gain leaves nothing
-        ("hysteresis", 2.0, 1.5, True),  # where it may be nothing, a twentieth of itself, 2.5 squares
-        ("hysteresis", 3.0, 1.5, False),
+        ("hysteresis", 0.3, 50.0, True),  # a law of hysteresis leaves a fiftieth of itself, 0.4 of 1000 squares
+        ("hysteresis", 0.5, 50.0, False),
+        ("drive_gain", 0.3, 50.0, False),  # a gain leaves nothing
+        ("hysteresis", 9.0, 1.5, True),  # where it may be nothing, a tenth of itself, 10 squares
+        ("hysteresis", 11.0, 1.5, False),
         ("drive_gain", 0.05, 1.5, False),
     ],
 )

@@ -13,7 +13,7 @@ class AsymmetricHysteresis(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.01
+    rough = 0.02
     family = "hysteresis"
     rarity = 2.3
     needs = frozenset({"force"})

@@ -13,7 +13,7 @@ class BoucWen(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.01
+    rough = 0.02
     family = "hysteresis"
     needs = frozenset({"force"})
     source = "Y. K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249; R. Bouc (1967)"

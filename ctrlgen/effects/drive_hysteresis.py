@@ -14,7 +14,7 @@ class DriveHysteresis(Effect):
     """
 
     place = Place.DRIVE
-    rough = 0.01
+    rough = 0.02
     rarity = 2.3
     needs = frozenset({"actuator"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"

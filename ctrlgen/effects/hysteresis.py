@@ -16,7 +16,7 @@ class Hysteresis(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.01
+    rough = 0.02
     family = "hysteresis"
     needs = frozenset({"force"})
     source = "W. D. Iwan, J. Appl. Mech. 33 (1966) 893; K. Kuhnen, Eur. J. Control 9 (2003) 407"
