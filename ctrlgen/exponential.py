@@ -46,6 +46,10 @@ class Steps:
     def _rest(self, model: Model) -> ca.SX:
         return ca.vertcat(model.sampled_rates, model.v) - self.A @ ca.vertcat(model.x, model.z)
 
+    def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
+        """y one step on, the drive going from `u` to `u_end`."""
+        return self.points(N, y, u, u_end)[0]
+
     def drives(self, u: ca.SX, u_next: ca.SX, linear: bool) -> list[ca.SX]:
         """The drive at the beginning of each step of a sample, and at its end."""
         return [u + k / self.count * (u_next - u) if linear else u for k in range(self.count + 1)]
@@ -70,10 +74,6 @@ class Exponential(Steps):
         middle = h * (2 * whole[2] - 4 * whole[3])
         ends = h * (whole[1] - 3 * whole[2] + 4 * whole[3]), h * (4 * whole[3] - whole[2])
         self.W = [self._acting(M) for M in (ends[0], middle, middle, ends[1])]
-
-    def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
-        """y one step on, the drive going from `u` to `u_end`."""
-        return self.points(N, y, u, u_end)[0]
 
     def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the four (y, u) where N was evaluated."""
@@ -111,10 +111,6 @@ class Sticking(Steps):
         first = model.x.numel() - model.v.numel()
         self.places = [first + i for i in model.sticking]  # in y
         self.own = [self.acting.index(i) for i in self.places]  # in N
-
-    def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
-        """y one step on, the drive going from `u` to `u_end`."""
-        return self.points(N, y, u, u_end)[0]
 
     def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the two (y, u) where N = N(y, u) was solved for."""

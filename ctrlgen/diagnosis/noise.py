@@ -24,7 +24,6 @@ LINES = 3  # at most, taken out of a rest
 NEAR_BINS = 15  # of the spectrum, over which noise is level
 OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
 LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
-GUESSED = "from the fastest part of the readings, taken as white; record some rest to know it"
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
@@ -84,23 +83,23 @@ def coloured(sd: float, a: np.ndarray) -> float:
 def estimate(recording: Recording, settling: float) -> Noise:
     """The noise of each observed channel. `settling` [s]: how long the device itself goes on after a change of drive."""
     rows = [_channel(recording, i, settling) for i in range(len(recording.channels))]
-    sd, ar, known, said, count = zip(*rows, strict=True)
-    guessed = np.array([text.endswith(GUESSED) for text in said])
-    return Noise(np.array(sd), ar, np.array(known), said, np.array(count), guessed)
+    sd, ar, known, said, count, guessed = zip(*rows, strict=True)
+    return Noise(np.array(sd), ar, np.array(known), said, np.array(count), np.array(guessed))
 
 
-def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.ndarray, bool, str, float]:
+def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.ndarray, bool, str, float, bool]:
     name, stated = recording.channels[i], recording.noise[i]
     none = np.zeros(0)
     if recording.kind == "poses":
         if stated:
-            return stated, none, True, f"{name}: as stated", np.inf
+            return stated, none, True, f"{name}: as stated", np.inf, False
         return (
             1.0,
             none,
             False,
             f"{name}: not stated and no pose repeats; taken from what the best model leaves",
             np.inf,
+            False,
         )
     moving = [r for r in recording.records if r.role != "rest"]
     rounding = lattice(np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])) / np.sqrt(12.0)
@@ -114,13 +113,14 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         if parts:
             sd, a = _with_rounding(*autoregression(parts), rounding)
             n = sum(map(len, parts))
-            return sd, a, True, f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}", float(n)
+            return sd, a, True, f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}", float(n), False
     if stated:
         sd, _ = _with_rounding(stated, none, rounding)
-        return sd, none, True, f"{name}: as stated, taken as white", STATED
+        return sd, none, True, f"{name}: as stated, taken as white", STATED, False
     parts = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
     sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), rounding, 1e-300)  # 1 + 9 + 9 + 1: third differences
-    return sd, none, True, f"{name}: {GUESSED}", sum(map(len, parts)) / ROBUST_COST
+    said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
+    return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST, True
 
 
 def _flat(part: np.ndarray, degree: int) -> np.ndarray:
