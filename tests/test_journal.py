@@ -59,6 +59,11 @@ def test_what_is_stopped_goes_on_and_ends_alike(asked, sought, tmp_path):
     assert not unfinished(stopped).exists()
 
 
+def test_the_folder_one_stands_in_has_a_name_too(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert unfinished(Path(".")) == tmp_path.with_name(f"{tmp_path.name}.unfinished")
+
+
 def test_another_seed_or_file_begins_anew(tmp_path):
     path = tmp_path / "kept"
     Journal(path, MADE_FROM).keep("k", np.array([0.1, -1e-300]))

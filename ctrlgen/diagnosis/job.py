@@ -96,7 +96,8 @@ def diagnose_into(
 
 def unfinished(out: Path) -> Path:
     """Where a diagnosis into `out` keeps its fits until it is done."""
-    return out.with_name(f"{out.resolve().name}.unfinished")
+    out = out.resolve()  # "." has no name of its own
+    return out.with_name(f"{out.name}.unfinished")
 
 
 def _diagnosed(
