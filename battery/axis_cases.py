@@ -217,7 +217,7 @@ def device_text(stated: Axis) -> str:
     ]  # fmt: skip
     if stated.loop:
         g = stated.loop
-        lines += ["", "[loop]", f'position_gain = "{g.position_gain:g} 1/s"',
+        lines += ["", "[loop]", 'measures = "displacement"', f'position_gain = "{g.position_gain:g} 1/s"',
                   f'velocity_gain = "{g.velocity_gain:g} V/(m/s)"', f'integral_gain = "{g.integral_gain:g} V/(m*s)"']  # fmt: skip
     return "\n".join(lines) + "\n"
 

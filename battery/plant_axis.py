@@ -141,7 +141,8 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
     for count, (u, rise) in enumerate(zip(fine_drive(given, linear).tolist(), rises, strict=True)):
         if loop is not None:
             if count % SUBSTEPS == 0:  # a digital controller: computed at the sample, held until the next
-                asked = loop.velocity_gain * (loop.position_gain * (u - q) - v) + loop.integral_gain * summed
+                reference = given[count // SUBSTEPS]
+                asked = loop.velocity_gain * (loop.position_gain * (reference - q) - v) + loop.integral_gain * summed
             summed += (u - q) * h
             u = asked
         u = min(max(u, -limit), limit)

@@ -204,11 +204,12 @@ class Chain:
         pose = self._with_terms(Place.POSE, links.pose(displacement))
         reading = self._with_terms(Place.SENSOR, pose)
         u = links.drive.expr
-        command = links.feedback(u, reading, self.v, x) if links.feedback else u
+        measured = reading if links.measured == "reading" else z
+        command = links.feedback(u, measured, self.v, x) if links.feedback else u
         if links.feedback:  # computed at every sample and held until the next
             self.held, self.held_value = ca.SX.sym("held", n), command
         drive = self._with_terms(Place.DRIVE, self.held if links.feedback else u)
-        produced = u - reading if links.feedback else links.heat(drive)
+        produced = u - measured if links.feedback else links.heat(drive)
         heat = ca.SX.sym("heat", produced.numel())  # an unknown of its own: the inverse need not take squares apart
         arriving = self._with_terms(Place.HEAT, heat)
         if links.moving:

@@ -43,7 +43,8 @@ class Param:
     sizes of those signals, so that one law serves micrometres and degrees. `grid` are the values tried when a shape
     is unknown and the effect is only suspected. A `level` is where a signal meets a limit: its grid counts in peaks of
     that signal in the records at hand. A `pitch` is a path after which something repeats: those that
-    stand out along the readings are tried too. An amplitude outside what is `usual` is something else.
+    stand out along the readings are tried too. An amplitude outside what is `usual` is something else; one with a `grid`
+    acts in proportion nowhere near `off`, and is screened by what it does at those values.
     """
 
     name: str

@@ -79,6 +79,12 @@ def test_a_closed_loop_holds_its_reference():
     assert y[-1] == pytest.approx(1e-3, rel=1e-3)
 
 
+def test_a_digital_controller_reads_its_reference_at_the_sample_however_it_goes_on():
+    axis = Axis(95.0, 200.0, 0.0, 35.0, 0.3, 10.0, Loop(160.0, 243.0))
+    reference = 1e-3 * np.sin(0.02 * np.arange(600))
+    assert np.array_equal(laws.simulate(axis, reference, linear=True), laws.simulate(axis, reference))
+
+
 @pytest.mark.parametrize("name", sorted(laws.DRAW))
 def test_a_law_is_absent_at_zero_and_present_otherwise(name):
     planted = laws.draw(name, np.random.default_rng(3), SCENE)

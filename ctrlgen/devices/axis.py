@@ -38,12 +38,14 @@ class Actuator(Section):
 class Loop(Section):
     """The position controller, u = k_p k_v (r - y) - k_v q' + k_i int(r - y) dt, clipped at the drive limit.
 
-    Computed at every sample and held until the next, as a digital controller does.
+    Computed at every sample and held until the next, as a digital controller does. `measures`: whether y is the
+    recorded reading, with all its errors, or the displacement q, as an encoder of the controller's own has it.
     """
 
     domain: ClassVar[str] = "actuator"
     tolerance: ClassVar[float | None] = 0.0
 
+    measures: Literal["reading", "displacement"] = "reading"
     position_gain: quantity("1/s", positive=True)
     velocity_gain: quantity("V/(m/s)", low=0.0)
     integral_gain: quantity("V/(m*s)", low=0.0)
@@ -93,6 +95,7 @@ class Axis(Device):
             pose=lambda d: d,
             rates=(lambda x, error: error) if closed else (lambda x, heat: ca.SX(0, 1)),
             feedback=feedback if closed else None,
+            measured=self.loop.measures if closed else "reading",
             command_signal=("amplifier drive", unit, "u_", largest) if closed else None,
             limits=limits,
         )  # fmt: skip

@@ -65,9 +65,10 @@ class Links:
     `heat_signal` is (label, unit, column prefix, typical size) of what the drive becomes before it acts.
 
     With a `mass` per axis the displacement has inertia, mass d'' = force - resistance(d) - `drag`(d'), instead of
-    standing in balance. With `feedback` (u, reading, d', x) -> drive the loop is closed: u is the reference, and
-    `heat` (u - reading) drives the states. An `imposed` device is moved by its drive (displacement, velocity,
-    acceleration) and reads the force that takes. `bipolar` says whether the drive has both signs.
+    standing in balance. With `feedback` (u, y, d', x) -> drive the loop is closed on y, the reading or the displacement
+    as `measured` says: u is the reference, and `heat` (u - y) drives the states. An `imposed` device is moved by its
+    drive (displacement, velocity, acceleration) and reads the force that takes. `bipolar` says whether the drive has
+    both signs.
     `moving` (drive, x, d, d') -> force and rates of the states stands instead of `force` and `rates` where they depend
     on the velocity too, or the states on the displacement.
     `second_order` is what finite turns of a linear mechanism's links add to `pose`, `yielding` by how much less stages
@@ -96,6 +97,7 @@ class Links:
     mass: tuple[float | ca.SX, ...] | None = None
     drag: Callable[[ca.SX], ca.SX] | None = None
     feedback: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX] | None = None
+    measured: str = "reading"
     command_signal: tuple[str, str, str, float] | None = None
     imposed: bool = False
     bipolar: bool = True

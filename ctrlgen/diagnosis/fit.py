@@ -239,9 +239,11 @@ def _start_sizes(response: object) -> np.ndarray:
 def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndarray:
     """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431), steps clipped at the bounds.
 
-    Ends when a step promises less than `NEGLIGIBLE` of one squared standard deviation.
+    A step that fails is tried without its part in the records' starts: those may bend within a gap or a fringe. Ends when
+    a step promises less than `NEGLIGIBLE` of one squared standard deviation.
     """
     low, high = problem.bounds
+    own = np.arange(len(x)) < problem.k
     x, damping = np.clip(x, low, high), 1e-6
     r, J = problem.evaluate(x)
     for _ in range(steps):
@@ -249,23 +251,35 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
         open_ = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))) & (np.diag(H) > 0)
         if not open_.any():
             break
-        H, g = H[np.ix_(open_, open_)], gradient[open_]
-        step = np.zeros_like(x)
-        step[open_] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), g, rcond=None)[0]
-        step /= max(1.0, float(np.max(np.abs(step) / problem.most)))
-        promised = -(g @ step[open_] + 0.5 * step[open_] @ H @ step[open_])
-        if promised < NEGLIGIBLE:
+        step = _damped(H, gradient, open_, damping, problem.most)
+        if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
             break
-        tried = np.clip(x + step, low, high)
-        r_tried = problem.residual(tried)
-        if r_tried @ r_tried < r @ r:
-            x, damping = tried, max(damping / 10, 1e-9)
+        better = _better(problem, r, np.clip(x + step, low, high))
+        if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
+            step = _damped(H, gradient, open_ & own, damping, problem.most)
+            better = _better(problem, r, np.clip(x + step, low, high))
+        if better is not None:
+            x, damping = better, max(damping / 10, 1e-9)
             r, J = problem.evaluate(x)
         else:
             damping = max(damping * 30, 1e-4)
             if damping > 1e8:
                 break
     return x
+
+
+def _damped(H: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float, most: np.ndarray) -> np.ndarray:
+    """Marquardt's step of the numbers that are `open_`, none of them further than its `most`."""
+    step = np.zeros_like(gradient)
+    H = H[np.ix_(open_, open_)]
+    step[open_] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), gradient[open_], rcond=None)[0]
+    return step / max(1.0, float(np.max(np.abs(step) / most)))
+
+
+def _better(problem: _Problem, r: np.ndarray, tried: np.ndarray) -> np.ndarray | None:
+    """`tried`, where it leaves less than `r`."""
+    left = problem.residual(tried)
+    return tried if left @ left < r @ r else None
 
 
 class _Problem:

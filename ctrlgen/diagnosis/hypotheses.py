@@ -77,6 +77,11 @@ class Hypothesis:
         grids = [[*self._grid(p, where, peak), *(lines if p.unit == "Hz" else ())] for p in shaped]
         return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
 
+    def secants(self, where: Where, peak: dict[str, Any] | None = None) -> list[float]:
+        """The amplitudes [SI] to which the slope from `off` is taken too, where the law bends at once."""
+        p = self.law.amplitude()
+        return self._grid(p, where, peak) if p.grid else []
+
     def _grid(self, p: Param, where: Where, peak: dict[str, Any] | None = None) -> list[float]:
         """The values tried of a shape parameter [SI]."""
         low, high = self.bounds(p, where)

@@ -104,12 +104,17 @@ class Laws:
         meant = amplitude.expected or (low - off, high - off)
         span = (meant[0] / size, meant[1] / size)
         entered = tuple(probes[law.place, i] for i, _ in at)
-        for shape in h.shapes(where, lines, self.peaks.get((law.place, at[0][0]))):
-            terms = tuple(self._term(law(h.at, {}, h.of), i, other, shape, off, size) for i, other in at)
-            yield Column(h, shape, entered, terms, size, side, span)
+        peak = self.peaks.get((law.place, at[0][0]))
+        for shape in h.shapes(where, lines, peak):
+            for finite in (0.0, *h.secants(where, peak)):
+                terms = tuple(self._term(law(h.at, {}, h.of), i, other, shape, off, size, finite) for i, other in at)
+                yield Column(h, shape, entered, terms, size, side, span)
 
-    def _term(self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float) -> int:
-        key = (law.kind, i, partner, tuple(shape.items()), off, size)
+    def _term(
+        self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float, finite: float
+    ) -> int:
+        """The slope at `off`, or from there to the amplitude `finite`."""
+        key = (law.kind, i, partner, tuple(shape.items()), off, size, finite)
         if key not in self._known:
             states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
             a = ca.SX.sym("a")
@@ -119,10 +124,13 @@ class Laws:
             s.__dict__.update(new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
             self._known[key] = len(self.terms)
-            rates = [ca.substitute(ca.SX(change[state.name]), a, off) for state in law.states]
-            stepped = [ca.substitute(ca.SX(new[state.name]), a, off) if state.stepped else None for state in law.states]
+            at = finite or off
+            rates = [ca.substitute(ca.SX(change[state.name]), a, at) for state in law.states]
+            stepped = [ca.substitute(ca.SX(new[state.name]), a, at) if state.stepped else None for state in law.states]
             clocks = [state.clock for state in law.states]
             value = ca.SX(law.term(s, p))
+            if finite:
+                value = ca.substitute(value, a, finite) * (a - off) / (finite - off)
             self.terms.append(_Term(value, a, off, size, list(states.values()), rates, stepped, clocks))
         return self._known[key]
 
