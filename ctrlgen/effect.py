@@ -42,9 +42,10 @@ class Param:
     displacement and `partner` for that of the other channel of a pair; `bounds` and `grid` then count in typical
     sizes of those signals, so that one law serves micrometres and degrees. `grid` are the values tried when a shape
     is unknown and the effect is only suspected. A `level` is where a signal meets a limit: its grid counts in peaks of
-    that signal in the records at hand. A `pitch` is a path after which something repeats: those that
-    stand out along the readings are tried too. An amplitude outside what is `usual` is something else; one with a `grid`
-    acts in proportion nowhere near `off`, and is screened by what it does at those values.
+    that signal in the records at hand, or, of a time, in twelfths of their length. What the records themselves suggest
+    of the kind `seen` is tried too: "pitches" of the path, "moments" in time. An amplitude outside what is `usual` is
+    something else; one with a `grid` acts in proportion nowhere near `off`, and is screened by what it does at those
+    values.
     """
 
     name: str
@@ -55,7 +56,7 @@ class Param:
     grid: tuple[float, ...] = ()
     expected: tuple[float, float] | None = None
     level: bool = False
-    pitch: bool = False
+    seen: str = ""
     usual: tuple[float, float] | None = None
 
     @property

@@ -63,12 +63,15 @@ def place_of(effect: type[Effect]) -> tuple[dict, list[Where]]:
     raise AssertionError(f"{effect.kind} acts on no device that is known here")
 
 
+SUGGESTED = {"moments": (0.3, 1.0, 3.0)}
+
+
 def shapes(effect: type[Effect], where: Where) -> list[dict[str, float]]:
-    """Every combination of the shape parameters' grids, SI."""
+    """Every combination of the shape parameters' grids, SI; of what records suggest, a few."""
     shaped = [p for p in effect.params if p.off is None]
     return [
         dict(zip((p.name for p in shaped), [where.si(v, p) for v, p in zip(values, shaped, strict=True)], strict=True))
-        for values in product(*(p.grid for p in shaped))
+        for values in product(*(p.grid or SUGGESTED[p.seen] for p in shaped))
     ]
 
 
@@ -450,7 +453,7 @@ def test_has_an_equation_a_source_bounds_and_fits_on_a_screen(effect):
     for p in effect.params:
         assert p.doc and p.bounds[0] < p.bounds[1]
         assert p.off is None or p.bounds[0] <= p.off <= p.bounds[1]
-        assert (p.off is None) == bool(p.grid)
+        assert p.off is not None or p.grid or p.seen in SUGGESTED
         assert all(p.bounds[0] <= value <= p.bounds[1] for value in p.grid)
         assert same_dimension(where.unit_of(p), where.unit_of(p))  # a unit that is known
     for state in effect.states:

@@ -121,10 +121,13 @@ def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, Chann
 
 
 def values(fit: Fit) -> dict[str, Estimate]:
-    """Every unknown of a fit, in its reader's unit."""
+    """Every unknown of a fit, in its reader's unit. An amplitude is known no better than its law's form is right."""
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if len(fit.theta) else np.zeros(0)
     found = {}
     for unknown, value, s in zip(fit.structure.unknowns, fit.theta, sd, strict=True):
+        cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
+        if unknown.amplitude and cause.effect != PARAMETER:
+            s = np.hypot(s, cause.law.rough * (value - unknown.nominal))
         ends = (value, max(value - CI * s, unknown.low), min(value + CI * s, unknown.high))
         shown = [float(from_si(v, unknown.unit)) for v in ends]
         found[unknown.path] = Estimate(shown[0], (shown[1], shown[2]), unknown.unit)

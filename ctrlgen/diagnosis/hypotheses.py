@@ -6,9 +6,8 @@ Every effect of the library at every place where it can act, and every number of
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
 
 from ctrlgen.chain import available, channels
 from ctrlgen.devices import Device, Links
@@ -22,6 +21,16 @@ DOMAIN = {
 }  # fmt: skip
 PARAMETER = "parameter"
 HALF = 0.49  # of the sampling rate: frequencies beyond look like lower ones, and half of it like nothing or an offset
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the records show at one place, SI: the `most` that the signal ("channel") and the displacement ("travel") reach,
+    and a part of the records' time ("s"): a limit beyond shows nowhere. `suggested`: frequencies ("lines") that stand out of
+    what is left over, paths after which it repeats ("pitches"), times between which it may change ("moments")."""
+
+    most: dict[str, float] = field(default_factory=dict)
+    suggested: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -64,33 +73,26 @@ class Hypothesis:
         """The effect's class. Raises KeyError for a parameter."""
         return Effect.library[self.effect]
 
-    def shapes(
-        self, where: Where, lines: tuple[float, ...] = (), peak: dict[str, Any] | None = None
-    ) -> list[dict[str, float]]:
-        """Every combination of the grids of the shape parameters [SI]; one empty one for laws without shape.
-
-        `lines` [Hz] that stand out of what is left over are tried beside the frequencies of the grids. With the `peak` of
-        the signal ("channel") and of the displacement ("travel") in the records [SI], a level is tried at shares of it: a
-        limit beyond shows nowhere. So are the paths ("pitches") after which what is left over repeats.
-        """
+    def shapes(self, where: Where, seen: Seen) -> list[dict[str, float]]:
+        """Every combination of the values tried of the shape parameters [SI]; one empty one for laws without shape."""
         shaped = [p for p in self.law.params if p is not self.law.amplitude()]
-        grids = [[*self._grid(p, where, peak), *(lines if p.unit == "Hz" else ())] for p in shaped]
+        grids = [self._tried(p, where, seen) for p in shaped]
         return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
 
-    def secants(self, where: Where, peak: dict[str, Any] | None = None) -> list[float]:
+    def secants(self, where: Where, seen: Seen) -> list[float]:
         """The amplitudes [SI] to which the slope from `off` is taken too, where the law bends at once."""
         p = self.law.amplitude()
-        return self._grid(p, where, peak) if p.grid else []
+        return self._tried(p, where, seen) if p.grid else []
 
-    def _grid(self, p: Param, where: Where, peak: dict[str, Any] | None = None) -> list[float]:
-        """The values tried of a shape parameter [SI]."""
+    def _tried(self, p: Param, where: Where, seen: Seen) -> list[float]:
+        """The grid of a parameter and what the records suggest beside it [SI]."""
         low, high = self.bounds(p, where)
-        if p.level and peak:
-            return [min(max(value * peak[p.unit], low), high) for value in p.grid]
-        grid = [where.si(value, p) for value in p.grid or (sum(p.bounds) / 2,)]
-        if p.pitch and peak:
-            grid += [value for value in peak["pitches"] if value >= low]
-        return [value for value in grid if value <= high] or [(low + high) / 2]
+        if p.level and p.unit in seen.most:
+            return [min(max(value * seen.most[p.unit], low), high) for value in p.grid]
+        suggested = [*seen.suggested.get(p.seen, ()), *(seen.suggested.get("lines", ()) if p.unit == "Hz" else ())]
+        grid = p.grid or (() if suggested else (sum(p.bounds) / 2,))
+        tried = [*(where.si(value, p) for value in grid), *(value for value in suggested if value >= low)]
+        return [value for value in tried if value <= high] or [(low + high) / 2]
 
     def bounds(self, p: Param, where: Where) -> tuple[float, float]:
         """Of a parameter [SI], here and with these samples."""

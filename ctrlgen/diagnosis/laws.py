@@ -5,10 +5,9 @@ A law at one place with one shape is one term, however many hypotheses hold it: 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -16,12 +15,12 @@ from scipy.linalg import expm
 
 from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import Hypothesis, nominal_links
+from ctrlgen.diagnosis.hypotheses import Hypothesis, Seen, nominal_links
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.effect import Effect, Place
 
-Peaks = dict[tuple[Place, int], dict[str, Any]]  # channel, travel [SI]; of sensors, pitches [SI]
+Peaks = dict[tuple[Place, int], dict[str, float]]  # channel, travel [SI]
 
 SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
 
@@ -45,7 +44,8 @@ def peaks(fitter: Fitter, fit: Fit) -> Peaks:
     found: Peaks = {}
     links = nominal_links(fit.structure.device)
     responses = fit.structure.responses(fitter.recording, fitter.cache)
-    places = [(place, i) for place in (Place.DRIVE, Place.FORCE) for i in range(len(channels(links, place)))]
+    reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
+    places = [(place, i) for place in reached for i in range(len(channels(links, place)))]
     for record, start in zip(fitter.to_fit, fit.starts, strict=True):
         response = responses[record.sample_time, record.linear]
         m, n = response.model, len(record.time)
@@ -80,16 +80,20 @@ class Laws:
     """The terms of `hypotheses` on the motions of `response`, and one column for every choice of shape."""
 
     def __init__(
-        self, response: Response, structure: Structure, hypotheses: list[Hypothesis], lines: tuple[float, ...],
-        probes: dict[tuple[Place, int], int], peaks: Peaks,
+        self, response: Response, structure: Structure, hypotheses: list[Hypothesis],
+        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], Seen],
     ) -> None:  # fmt: skip
-        self.response, self.peaks = response, peaks
+        self.response = response
         self.terms: list[_Term] = []
         self._known: dict[tuple, int] = {}
-        self.columns = [c for h in hypotheses for c in self._of(h, structure, lines, probes)]
+        self.columns = [c for h in hypotheses for c in self._of(h, structure, probes, seen)]
 
     def _of(
-        self, h: Hypothesis, structure: Structure, lines: tuple[float, ...], probes: dict[tuple[Place, int], int]
+        self,
+        h: Hypothesis,
+        structure: Structure,
+        probes: dict[tuple[Place, int], int],
+        seen: Callable[[Place, int], Seen],
     ) -> Iterator[Column]:
         law, where = h.law, structure.place(h)
         names = [w.channel for w in channels(nominal_links(structure.device), law.place)]
@@ -104,9 +108,9 @@ class Laws:
         meant = amplitude.expected or (low - off, high - off)
         span = (meant[0] / size, meant[1] / size)
         entered = tuple(probes[law.place, i] for i, _ in at)
-        peak = self.peaks.get((law.place, at[0][0]))
-        for shape in h.shapes(where, lines, peak):
-            for finite in (0.0, *h.secants(where, peak)):
+        here = seen(law.place, at[0][0])
+        for shape in h.shapes(where, here):
+            for finite in (0.0, *h.secants(where, here)):
                 terms = tuple(self._term(law(h.at, {}, h.of), i, other, shape, off, size, finite) for i, other in at)
                 yield Column(h, shape, entered, terms, size, side, span)
 

@@ -11,6 +11,7 @@ largest |z| is judged against simulations of that. |cos| near one says what this
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.signal import find_peaks
 
 from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
 from ctrlgen.diagnosis.laws import Column, Peaks, peaks
 from ctrlgen.diagnosis.pitches import pitches
 from ctrlgen.diagnosis.slopes import Slopes, Sums
@@ -28,6 +29,7 @@ from ctrlgen.effect import Place
 ALIKE = 1e-6  # of the largest: free directions with smaller slopes are taken as one with the others
 OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
 LINES = 3  # of the spectrum of what is left, tried as frequencies
+PARTS = 12  # of the records' time: an event is tried in the middle of each
 ZEROS = 8  # padding of that spectrum
 NULLS = 2000  # simulated records without mismatch
 
@@ -66,12 +68,9 @@ class Screen:
         sums: Sums | None = None
         columns: list[Column] = []
         U, back = _directions(fit.J)
-        first, lines = 0, self._lines(fit)
-        if self.peaks is None:
-            self.peaks = peaks(self.fitter, fit)
-        known = self.peaks | self._pitches(fit)
+        first, seen = 0, self._seen(fit)
         for record, start in zip(self.fitter.to_fit, fit.starts or [None] * len(self.fitter.to_fit), strict=True):
-            slopes = Slopes(self.fitter, fit, record, open_, lines, known)
+            slopes = Slopes(self.fitter, fit, record, open_, seen)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)
@@ -85,6 +84,28 @@ class Screen:
         return self._judge(
             columns, sums, U.T @ fit.residual, np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
         )
+
+    def _seen(self, fit: Fit) -> Callable[[Place, int], Seen]:
+        """What the records show at each place, after what `fit` explains."""
+        if self.peaks is None:
+            self.peaks = peaks(self.fitter, fit)
+        most, repeating = self.peaks, self._pitches(fit)
+        moments, part = self._moments()
+        common = {"lines": self._lines(fit), "moments": moments}
+
+        def at(place: Place, i: int) -> Seen:
+            here = common | {"pitches": repeating[place, i]} if (place, i) in repeating else common
+            return Seen(most.get((place, i), {}) | {"s": part}, here)
+
+        return at
+
+    def _moments(self) -> tuple[tuple[float, ...], float]:
+        """The middles of equal parts of the time that the records to fit take, and the length of a part, on their clock."""
+        series, records = self.fitter.recording.kind == "series", self.fitter.to_fit
+        ends = [(r.time[0], r.time[-1]) if series else (0.0, float(len(r.time))) for r in records] or [(0.0, 1.0)]
+        begin, end = min(a for a, _ in ends), max(b for _, b in ends)
+        part = (end - begin) / PARTS
+        return tuple(begin + (k + 0.5) * part for k in range(PARTS)), part
 
     def _lines(self, fit: Fit) -> tuple[float, ...]:
         """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
@@ -100,7 +121,7 @@ class Screen:
         best = peaks[np.argsort(-power[peaks])[:LINES]]
         return tuple(float(f) for f in np.sort(best) / (ZEROS * len(left) * records[k].sample_time))
 
-    def _pitches(self, fit: Fit) -> Peaks:
+    def _pitches(self, fit: Fit) -> dict[tuple[Place, int], tuple[float, ...]]:
         """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does."""
         records = self.fitter.to_fit
         if self.fitter.recording.kind == "poses" or not records:
@@ -110,7 +131,7 @@ class Screen:
         names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         return {
-            (Place.SENSOR, names.index(name)): {"pitches": pitches(record.observed[good, i], left[good, i])}
+            (Place.SENSOR, names.index(name)): pitches(record.observed[good, i], left[good, i])
             for i, name in read
             if name in names and np.any(good := record.valid[:, i] & np.isfinite(left[:, i]))
         }

@@ -6,18 +6,19 @@ S+ = F(S, u) + F_delta delta, y = H(S, u) + H_delta delta, linearised along the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, nominal_links
-from ctrlgen.diagnosis.laws import Column, Laws, Peaks
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
+from ctrlgen.diagnosis.laws import Column, Laws
 from ctrlgen.diagnosis.mapped import evaluate
 from ctrlgen.diagnosis.probe import with_probes
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.spread import Spread
+from ctrlgen.effect import Place
 from ctrlgen.recording import Record
 
 BLOCK = 500  # samples worked on at a time: what belongs to them stays in the cache
@@ -52,8 +53,7 @@ class Slopes:
         fit: Fit,
         record: Record,
         hypotheses: list[Hypothesis],
-        lines: tuple[float, ...],
-        peaks: Peaks,
+        seen: Callable[[Place, int], Seen],
     ) -> None:
         self.fitter, self.record = fitter, record
         probed, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
@@ -70,7 +70,7 @@ class Slopes:
         self.p[len(known) + len(number_paths) :] = 0.0
         entered = {where: free.index(path) for where, path in probes.items()}
         others = [h for h in hypotheses if h.effect != PARAMETER]
-        self.laws = Laws(self.response, fit.structure, others, lines, entered, peaks)
+        self.laws = Laws(self.response, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]
         self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
         self.columns = list(self.laws.columns)

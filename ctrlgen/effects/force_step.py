@@ -1,12 +1,11 @@
 """A force that sets in at a moment: something dropped on the stage, a cable that drags, air that is switched on."""
 
-import casadi as ca
-
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.event import CLOCK, WHEN, happened
 
 
 class ForceStep(Effect):
-    """Delta F = f (1 + tanh((t - t_0)/w))/2, t from the common zero of the records' clock. Holds for one event."""
+    """Delta F = f e(t), e from 0 to 1 within the time T from the moment t_0 on. Holds for one event."""
 
     place = Place.FORCE
     needs = frozenset({"force"})
@@ -15,10 +14,9 @@ class ForceStep(Effect):
     source = "definition"
     params = (
         Param("force", "channel", (-1.0, 1.0), "after the step", off=0.0),
-        Param("moment", "s", (-1e6, 1e6), "when it happens", grid=(0.3, 1.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0)),
-        Param("rise", "s", (1e-4, 1e2), "time it takes", grid=(0.02,)),
+        *WHEN,
     )
-    states = (State("t", "s", 1.0, clock=True),)
+    states = CLOCK
 
     def term(self, s, p):
-        return p.force * (1 + ca.tanh((s.t - p.moment) / p.rise)) / 2
+        return p.force * happened(s, p)
