@@ -11,7 +11,7 @@ from conftest import SCENARIOS
 from ctrlgen import build_model, load_device
 from ctrlgen.diagnosis import slopes as slopes_module
 from ctrlgen.diagnosis.fit import Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, Seen
 from ctrlgen.diagnosis.noise import Noise
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.screen import Screen
@@ -30,6 +30,10 @@ LAWS = [
     Hypothesis("swapped", "actuator:1X", "1X", "2X"), Hypothesis("frame_turn", "mechanism:delta_x", "delta_x"),
     Hypothesis(PARAMETER, "actuator:thermal_resistance", path="actuator.thermal_resistance"),
 ]  # fmt: skip
+
+
+def shows_nothing(place, i):
+    return Seen()
 
 
 @pytest.fixture(scope="module")
@@ -59,12 +63,15 @@ def brute(slopes, start):
     after, _ = r.motion(record, slopes.p, start)
     before = np.vstack([r._start(record, slopes.p, start), after[:-1]])
     F_S, F_p, H_S, H_p = slopes.linear.along(before, *r._inputs(record))
-    step, memory, f = slopes.laws.compiled(slopes.p), slopes.laws.start(record.time[0]), []
+    step, memory, f, ends = slopes.laws.compiled(slopes.p), slopes.laws.start(record.time[0]), [], []
     for k in range(N):
-        memory, term = step(memory, before[k], record.drive[k], 0.0)
+        memory, term, end = step(memory, before[k], record.drive[k], 0.0, after[k])
         f.append([*term.full().ravel(), *slopes.sizes])
+        ends.append(end.full().ravel())
     f = np.array(f)
-    mean = (f + np.vstack([f[1:], f[-1:]])) / 2
+    following = np.vstack([f[1:], f[-1:]])
+    following[:, slopes.laws.driven] = ends
+    mean = (f + following) / 2
     D, Y = np.zeros((r.n_s, len(slopes.columns))), np.zeros((N, 6, len(slopes.columns)))
     enters = np.zeros((f.shape[1], len(slopes.columns), F_p.shape[2]))
     for j, column in enumerate(slopes.columns):
@@ -80,7 +87,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
     monkeypatch.setattr(slopes_module, "BLOCK", 123)
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.to_fit[0]
-    slopes = Slopes(hexapod, fit, record, LAWS, (), {})
+    slopes = Slopes(hexapod, fit, record, LAWS, shows_nothing)
     white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
     found = slopes.sums(white, J, fit.starts[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
@@ -100,7 +107,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.to_fit[0]
-    slopes = Slopes(hexapod, fit, record, [law], (), {})
+    slopes = Slopes(hexapod, fit, record, [law], shows_nothing)
     column, start = slopes.columns[-1], np.zeros(len(fit.starts[0]))
     name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
     slope = brute(slopes, start)[:, :, -1]

@@ -270,9 +270,9 @@ def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndar
 
 def _damped(H: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float, most: np.ndarray) -> np.ndarray:
     """Marquardt's step of the numbers that are `open_`, none of them further than its `most`."""
-    step = np.zeros_like(gradient)
-    H = H[np.ix_(open_, open_)]
-    step[open_] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H)), gradient[open_], rcond=None)[0]
+    step, scale = np.zeros_like(gradient), np.sqrt(np.diag(H)[open_])  # no number's unit decides what can be solved for
+    H = H[np.ix_(open_, open_)] / np.outer(scale, scale)
+    step[open_] = -np.linalg.lstsq(H + damping * np.eye(len(H)), gradient[open_] / scale, rcond=None)[0] / scale
     return step / max(1.0, float(np.max(np.abs(step) / most)))
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
 
 import casadi as ca
@@ -143,23 +144,38 @@ class Laws:
         clocks = [clock for term in self.terms for clock in term.clocks]
         return np.where(clocks, time if np.isfinite(self.response.sample_time) else 0.0, 0.0)
 
+    @cached_property
+    def driven(self) -> list[int]:
+        """The terms that jump with a drive which is held from sample to sample."""
+        m = self.response.model
+        if self.response.linear or not np.isfinite(self.response.sample_time):
+            return []
+        jumping = ca.vertcat(m.u, m.held, m.heat)
+        return [k for k, term in enumerate(self.terms) if ca.depends_on(ca.jacobian(term.value, term.a), jumping)]
+
     def compiled(self, p: np.ndarray) -> ca.Function:
-        """(memory, S, u, ambient) -> (memory after the sample, every dterm/damplitude * size), with the numbers `p`.
+        """(memory, S, u, ambient, S one sample on) -> (memory after the sample, every dterm/damplitude * size, that of the
+        `driven` terms at the end of the sample), with the numbers `p`.
 
         A settled pose is read with the memories that it has settled to.
         """
         m = self.response.model
         memory = ca.vertcat(ca.SX(0, 1), *(s for term in self.terms for s in term.states))
         after = m.closed(ca.vertcat(ca.SX(0, 1), *(value for term in self.terms for value in self._after(term))))
-        found = ca.SX(0, 1)
+        found = end = ca.SX(0, 1)
+        S, S_next = ca.vertcat(m.x, m.z), ca.SX.sym("S_next", m.x.numel() + m.z.numel())
         if self.terms:  # each term depends on its own amplitude alone: one derivative of all of them
             a, offs = ca.vertcat(*(t.a for t in self.terms)), ca.DM([t.off for t in self.terms])
             every = ca.vertcat(*(t.value for t in self.terms))
-            found = m.closed(ca.substitute(ca.jtimes(every, a, ca.DM([t.size for t in self.terms])), a, offs))
+            open_ = ca.substitute(ca.jtimes(every, a, ca.DM([t.size for t in self.terms])), a, offs)
+            found = m.closed(open_)
+            if self.driven:  # the drive stays as the sample began
+                (end,) = ca.substitute([open_[self.driven]], [memory, S], [after, S_next])
+                end = m.closed(end)
         if not np.isfinite(self.response.sample_time):
             found = ca.substitute(found, memory, after)
-        given = [memory, ca.vertcat(m.x, m.z), m.u, self.response.ambient]
-        general = ca.Function("general", [*given, m.p], [after, found])
+        given = [memory, S, m.u, self.response.ambient, S_next]
+        general = ca.Function("general", [*given, m.p], [after, found, end])
         return ca.Function("laws", given, [ca.densify(value) for value in general(*given, p)], {"cse": True})
 
     def _after(self, term: _Term) -> list[ca.SX]:

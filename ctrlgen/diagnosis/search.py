@@ -45,6 +45,11 @@ class Trial:
     total: float
     cause: Hypothesis | None = None
 
+    @property
+    def price(self) -> float:
+        """Of its numbers and of the rarity of its causes."""
+        return self.total - self.fit.objective - self.held
+
 
 @dataclass(frozen=True, eq=False)
 class Round:
@@ -139,17 +144,25 @@ class Searcher:
         """The same fit driven to its end; trials stop early."""
         return self.trial(_cooled(trial.fit), trial.cause, steps=40)
 
-    def _slack(self, trial: Trial) -> float:
-        """The difference of T that says nothing where a structure leaves much over: what is left is not noise."""
-        return SLACK * max(trial.total - self.n_fit - self.n_held, 0.0)
+    def _ahead(self, a: Trial, b: Trial) -> float:
+        """By how much `a` is better than `b`, and that is beyond what says nothing; negative where it is not.
+
+        Where both leave more than noise, squares count in units of what the better one leaves a sample, on the records to
+        fit and on those held out (quasi-likelihood): what neither explains does not choose between them.
+        """
+        best = min(a, b, key=lambda t: t.total)
+        c_fit = max(best.fit.objective / max(self.n_fit, 1), 1.0)
+        c_held = max(best.held / max(self.n_held, 1), 1.0)
+        gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
+        return gained - SLACK * (self.n_fit * (1 - 1 / c_fit) + self.n_held * (1 - 1 / c_held))
 
     def _plainest(self, better: list[Trial]) -> Trial:
-        """The best trial, or one of as few numbers that explains as much to the slack and is less rare."""
+        """The best trial, or one of as few numbers that is no worse beyond the slack and is less rare."""
         first = better[0]
+        for t in better:
+            first = t if self._ahead(t, first) > 0 else first
         numbers = len(first.fit.structure.unknowns)
-        alike = [
-            t for t in better if t.total < first.total + self._slack(first) and len(t.fit.structure.unknowns) <= numbers
-        ]
+        alike = [t for t in better if self._ahead(first, t) <= 0 and len(t.fit.structure.unknowns) <= numbers]
         return min(alike, key=lambda t: (_rarity(t.fit.structure), t.total), default=first)
 
     def _ended(self, current: Trial, trials: tuple[Trial, ...]) -> tuple[Trial, ...]:
@@ -259,9 +272,9 @@ class Searcher:
     def _swap(self, current: Trial) -> Trial:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
         for k in range(len(current.fit.structure.causes) - 1):
-            for rival in self._replacements(current, k):
-                better = rival.total < current.total - max(RIVAL, self._slack(current))
-                if better and self._meant(rival, current.fit.structure.causes):
+            rivals = self._replacements(current, k)
+            for rival in (*(self._polished(t) for t in rivals[:ENDED]), *rivals[ENDED:]):
+                if self._ahead(rival, current) > RIVAL and self._meant(rival, current.fit.structure.causes):
                     current = rival
         return current
 

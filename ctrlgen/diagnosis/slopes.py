@@ -109,27 +109,29 @@ class Slopes:
     def _blocks(self, start: np.ndarray | None, lost: np.ndarray) -> Iterator[tuple[int, int, Iterator[np.ndarray]]]:
         """Blocks of samples [a, b) with what each channel reads of its columns; marks terms as `lost` on the way.
 
-        Every block is evaluated with the sample after it, whose terms act together with its last ones.
+        Every block is evaluated with the sample after it, whose terms act together with its last ones; those of a held drive
+        act together with what they become before it changes.
         """
         r, record, n = self.response, self.record, len(self.record.time)
         series = np.isfinite(r.sample_time)
         after, _ = r.motion(record, self.p, start)
         before = np.vstack([r._start(record, self.p, start), after[:-1]])
         inputs = (before, *r._inputs(record))
-        seen = (before if series else after, record.drive, inputs[3])
+        seen = (before if series else after, record.drive, inputs[3], after)
         size = min(BLOCK, n)
         laws = self.laws.compiled(self.p).mapaccum(size + 1)
         memory = self.laws.start(record.time[0])
         for a in range(0, n, size):
             here = np.minimum(np.arange(a, a + size + 1), n - 1)  # the last block is filled up
             k = min(size, n - a)
-            memories, found = evaluate(laws, memory, *(x[here] for x in seen))
+            memories, found, ends = evaluate(laws, memory, *(x[here] for x in seen))
             memory = memories[size - 1]
             if a + k == n:
                 found[k:] = found[k - 1]
             found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])
             lost |= ~np.all(np.abs(found) < LOST, axis=0)
             found[:, lost] = 0.0  # memories that have left the numbers say nothing
-            f, following = found[:k], found[1 : k + 1] if series else found[:k]
+            f, following = found[:k], found[1 : k + 1].copy() if series else found[:k]
+            following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])
             linear = self.linear.along(*(x[here[:size]] for x in inputs))
             yield a, a + k, self.spread.readings([block[:k] for block in linear], f, following)

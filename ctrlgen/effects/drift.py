@@ -7,6 +7,7 @@ class Drift(Effect):
     """Delta y = r t, t from the common zero of the records' clock. Holds over times short against what drifts."""
 
     place = Place.SENSOR
+    rough = 0.1  # what drifts wanders
     source = "definition"
     params = (Param("rate", "channel/s", (-1.0, 1.0), "drift per time", off=0.0),)
     states = (State("t", "s", 1.0, clock=True),)
