@@ -33,6 +33,7 @@ class Chain:
         self.resisting = links.resistance(self.within_reach)
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
+        self.acceleration = ca.SX.sym("a", self.v.numel())
         self.before: dict[Place, ca.SX] = {}
         self.held = self.held_value = ca.SX(0, 1)
         self.rates: ca.SX | None = None
@@ -72,12 +73,14 @@ class Chain:
             self.members.append(_Member(effect, values, where, i, partner, states))
 
     def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
-        """`before` plus every term of the effects at `place`; their rates are noted on the way."""
-        total = ca.SX(before)
-        self.before[place] = total[:]
-        for member in self.members:
-            if member.effect.place is place:
-                total[member.index] += member.act(self.seen(place, member.index, member.partner, member.states))
+        """`before` plus every term of the effects at `place`, stage after stage; their rates are noted on the way."""
+        total, here = ca.SX(before), [m for m in self.members if m.effect.place is place]
+        for stage in sorted({m.effect.stage for m in here}):
+            self.before[place] = total[:]
+            for member in here:
+                if member.effect.stage == stage:
+                    total[member.index] += member.act(self.seen(place, member.index, member.partner, member.states))
+        self.before[place] = ca.SX(before)
         return total
 
     def seen(self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX]) -> SimpleNamespace:
@@ -98,6 +101,9 @@ class Chain:
             s.force = self.resisting[i]
         known = place in (Place.POSE, Place.SENSOR) and self.v.numel() and not self.links.imposed
         s.rate = ca.jtimes(s.value, self.z, self.v) if known else None
+        s.second_rate = None
+        if known:
+            s.second_rate = ca.jtimes(s.rate, self.z, self.v) + ca.jtimes(s.rate, self.v, self.acceleration)
         where = channels(self.links, place)[s.index]
         s.scale, s.travel = where.scale, where.travel_scale
         return s
@@ -131,7 +137,8 @@ class Chain:
         sampled = ca.substitute(rates, heat, produced)
 
         def closed(expr: ca.SX) -> ca.SX:
-            return ca.substitute(ca.SX(expr), self.held, self.held_value)
+            moving = ca.substitute(ca.SX(expr), self.acceleration, acceleration)
+            return ca.substitute(moving, self.held, self.held_value)
 
         signals = {role: replace(signal, expr=closed(signal.expr)) for role, signal in signals.items()}
         return dict(
@@ -147,6 +154,7 @@ class Chain:
             ambient=self.ambient,
             stepped={i: closed(value) for i, value in following.items()},
             sticking=self._sticking(),
+            acceleration=self.acceleration,
             held=self.held,
             held_value=self.held_value,
             sampled_rates=sampled,

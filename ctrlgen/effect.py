@@ -124,7 +124,8 @@ class Effect:
     """Base of every effect: one subclass per file in `ctrlgen/effects/`.
 
     `term(s, p)` is the contribution, in the unit of the place. `s` gives `value` (the signal at this place and
-    channel before any effect), its `rate` [1/s] (None where the motion does not give it), `all` (the same for every
+    channel before any effect of this stage), its `rate` [1/s] and `second_rate` [1/s^2] (None where the motion does not
+    give them; the second one for `update` alone), `all` (the same for every
     channel, a vector), `index` (of this channel), `scale` and `travel` (typical sizes of the signal and of the stage
     displacement), the effect's own states, `ambient` (rise of the surroundings [K]), `sample_time` [s] where it is
     needed and, for axis channels, `displacement` (and `displacements` of all axes), `velocity` (None for a device
@@ -149,6 +150,9 @@ class Effect:
     mutual: ClassVar[bool] = False
     channel_unit: ClassVar[str | tuple[str, ...] | None] = None  # or of one of these dimensions
     partner_unit: ClassVar[str | None] = None
+    stage: ClassVar[int] = (
+        0  # among the effects of its place: later ones act on what earlier ones leave, alike ones side by side
+    )
     several: ClassVar[bool] = False  # may act more than once at one place, as harmonics do
     active: ClassVar[bool] = False  # may put energy into the stage
     sticks: ClassVar[bool] = False  # its force at standstill is what holds the stage there: steps must be implicit

@@ -38,6 +38,7 @@ class Model:
     (n_axes,). `stepped` gives, for states that change once a sample, the new value by their place in x; `clocks` are
     the places of those that count time. `sticking`: axes with inertia where dry friction may hold. `ambient` is the rise
     of the surroundings [K], zero unless it was asked for.
+    `acceleration`: the symbol of v', for what `seen` gives.
     With a loop the drive is computed at every sample and `held`: its symbol, its `held_value`, and the rates in its terms.
     `seen` (place, channel, partner, states) is what an effect's law would read there.
     `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
@@ -57,6 +58,7 @@ class Model:
     stepped: dict[int, ca.SX]
     clocks: tuple[int, ...]
     sticking: tuple[int, ...]
+    acceleration: ca.SX
     held: ca.SX
     held_value: ca.SX
     sampled_rates: ca.SX
@@ -95,8 +97,10 @@ class Model:
         return self.ambient if self.ambient.is_symbolic() else ca.SX.sym("ambient")
 
     def closed(self, expr: ca.SX) -> ca.SX:
-        """An effect's expression without the symbols of heat and of a held drive."""
-        return ca.substitute(ca.substitute(ca.SX(expr), self.heat, self.heat_of_drive), self.held, self.held_value)
+        """An effect's expression without the symbols of acceleration, heat and a held drive."""
+        moving = self.rates_of_heat[self.x.numel() - self.v.numel() :]
+        expr = ca.substitute(ca.SX(expr), self.acceleration, moving)
+        return ca.substitute(ca.substitute(expr, self.heat, self.heat_of_drive), self.held, self.held_value)
 
     @cached_property
     def moved_by(self) -> frozenset[str]:

@@ -9,7 +9,7 @@ from conftest import SCENARIOS
 
 from ctrlgen import exponential, load_device
 from ctrlgen.diagnosis import equations
-from ctrlgen.diagnosis.fit import levenberg_marquardt
+from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.hypotheses import hypotheses, nominal_links
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.structure import Structure

@@ -33,7 +33,7 @@ LAYERS = [
     "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s2_figures reproduce.s3 reproduce.s3_hinges",
     "reproduce.all",
     "diagnosis.mapped diagnosis.equations", "diagnosis.carried",
-    "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise diagnosis.pitches diagnosis.journal "
+    "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise diagnosis.pitches diagnosis.journal diagnosis.descent "
     "diagnosis.quiet diagnosis.spikes",
     "diagnosis.structure", "diagnosis.fit",
     "diagnosis.laws", "diagnosis.spread", "diagnosis.slopes", "diagnosis.together",

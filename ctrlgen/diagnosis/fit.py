@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.journal import Journal, key_of
 from ctrlgen.diagnosis.noise import Noise, autoregression
 from ctrlgen.diagnosis.quiet import quiet_noise
@@ -22,7 +23,6 @@ from ctrlgen.recording import Record, Recording
 
 STEPS = 40
 CI = 1.959964  # standard deviations of a 95 % interval
-NEGLIGIBLE = 0.01
 LITTLE = 1.3  # times the noise: what leaves more is not noise
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
@@ -221,10 +221,35 @@ class Fitter:
         left = np.where(record.valid, record.observed - y, 0.0)
         return _finite(self.noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid))
 
-    def held_out(self, fit: Fit) -> tuple[float, int]:
-        """Whitened sum of squares on the held-out records, and the number of usable samples."""
-        total = sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)
-        return total, int(sum(self.noise.usable(r.valid).sum() for r in self.held))
+    def held_out(self, fit: Fit) -> float:
+        """-2 ln of how likely the held-out records are, as the numbers are known from the records to fit.
+
+        |r(p + dp)|^2 + dp' C^-1 dp + ln det(I + C J'J), C the covariance of the numbers p, r and J the whitened residual and
+        its slopes there, dp the step that is most likely: numbers that the records to fit leave open are not held against
+        their structure, and earn it nothing. Without numbers, or where the step does not help, |r(p)|^2.
+        """
+        plain, sd = self._held_squares(fit), np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+        if not len(sd) or not np.all((sd > 0) & np.isfinite(sd)):
+            return plain
+        b, H = np.zeros(len(sd)), np.zeros((len(sd), len(sd)))
+        for record in self.held:
+            response = fit.structure.responses(self.recording, self.cache)[record.sample_time, record.linear]
+            J = self.noise.whiten(response.sensitivities(record, fit.theta)[1][:, :, : len(sd)], record.valid) * sd
+            J = J.reshape(-1, len(sd))
+            b, H = b + J.T @ self.whitened(fit, record).ravel(), H + J.T @ J
+        C = fit.covariance / np.outer(sd, sd)
+        spread = np.eye(len(sd)) + C @ H
+        if not np.isfinite(spread).all() or not np.isfinite(b).all():
+            return plain
+        step = np.linalg.solve(spread, C @ b)
+        low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
+        moved = np.clip(fit.theta + sd * step, low, high)
+        away = (moved - fit.theta) / sd
+        squares = self._held_squares(replace(fit, theta=moved)) + float(away @ np.linalg.pinv(C, rcond=1e-12) @ away)
+        return min(plain, squares) + float(np.linalg.slogdet(spread)[1])
+
+    def _held_squares(self, fit: Fit) -> float:
+        return sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
@@ -234,52 +259,6 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _start_sizes(response: object) -> np.ndarray:
     m = response.model
     return START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(response.initial)]
-
-
-def levenberg_marquardt(problem: _Problem, x: np.ndarray, steps: int) -> np.ndarray:
-    """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431), steps clipped at the bounds.
-
-    A step that fails is tried without its part in the records' starts: those may bend within a gap or a fringe. Ends when
-    a step promises less than `NEGLIGIBLE` of one squared standard deviation.
-    """
-    low, high = problem.bounds
-    own = np.arange(len(x)) < problem.k
-    x, damping = np.clip(x, low, high), 1e-6
-    r, J = problem.evaluate(x)
-    for _ in range(steps):
-        gradient, H = J.T @ r, J.T @ J
-        open_ = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))) & (np.diag(H) > 0)
-        if not open_.any():
-            break
-        step = _damped(H, gradient, open_, damping, problem.most)
-        if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
-            break
-        better = _better(problem, r, np.clip(x + step, low, high))
-        if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
-            step = _damped(H, gradient, open_ & own, damping, problem.most)
-            better = _better(problem, r, np.clip(x + step, low, high))
-        if better is not None:
-            x, damping = better, max(damping / 10, 1e-9)
-            r, J = problem.evaluate(x)
-        else:
-            damping = max(damping * 30, 1e-4)
-            if damping > 1e8:
-                break
-    return x
-
-
-def _damped(H: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float, most: np.ndarray) -> np.ndarray:
-    """Marquardt's step of the numbers that are `open_`, none of them further than its `most`."""
-    step, scale = np.zeros_like(gradient), np.sqrt(np.diag(H)[open_])  # no number's unit decides what can be solved for
-    H = H[np.ix_(open_, open_)] / np.outer(scale, scale)
-    step[open_] = -np.linalg.lstsq(H + damping * np.eye(len(H)), gradient[open_] / scale, rcond=None)[0] / scale
-    return step / max(1.0, float(np.max(np.abs(step) / most)))
-
-
-def _better(problem: _Problem, r: np.ndarray, tried: np.ndarray) -> np.ndarray | None:
-    """`tried`, where it leaves less than `r`."""
-    left = problem.residual(tried)
-    return tried if left @ left < r @ r else None
 
 
 class _Problem:

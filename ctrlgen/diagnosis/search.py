@@ -100,7 +100,7 @@ class Searcher:
         if known is not None and known.fit.objective <= fit.objective:
             self.known[key] = (known, steps)
             return replace(known, cause=cause)
-        held, _ = self.fitter.held_out(fit)
+        held = self.fitter.held_out(fit)
         price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
         price += 2 * _rarity(structure)
         found = Trial(fit, held, fit.objective + price + held, cause)

@@ -9,37 +9,43 @@ EVERY = range(SAMPLES + 1)
 
 
 class Delay(Effect):
-    """Delta y(t) = y(t - tau) - y(t), by cubic Hermite polynomials through values and slopes of the last five samples.
+    """Delta y(t) = y(t - tau) - y(t), by the polynomial of fourth degree through value and slope at both samples and the
+    curvature just after the older one (third degree and the neighbours' slope where the motion does not give them).
 
-    Holds up to five samples (longer delays count as five) and below a fifth of the sampling rate. Where the slope of
-    the signal is not known, it is that of the neighbouring samples.
+    Holds up to five samples (longer delays count as five) and below a fifth of the sampling rate.
     """
 
     place = Place.SENSOR
-    rough = 0.002  # by interpolation
+    stage = 2
+    rough = 0.001  # by interpolation
     needs = frozenset({"sample_time"})
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"
     params = (Param("delay", "ms", (0.0, 500.0), "age of the reading", off=0.0),)
     states = (
         *(State(f"y{k}", "channel", 1.0, stepped=True) for k in EVERY),
         *(State(f"r{k}", "channel/s", 10.0, stepped=True) for k in EVERY),
+        *(State(f"c{k}", "channel/s^2", 100.0, stepped=True) for k in EVERY),
     )
 
     def term(self, s, p):
-        D = ca.fmin(p.delay / s.sample_time, SAMPLES)
-        total = 0.0
-        for k in EVERY:
-            t = k - D
-            near = ca.fmax(1 - ca.fabs(t), 0)
-            total += near**2 * (3 - 2 * near) * (getattr(s, f"y{k}") - s.value)
-            total += t * near**2 * s.sample_time * getattr(s, f"r{k}")
+        h, total = s.sample_time, 0.0
+        D = ca.fmin(p.delay / h, SAMPLES)
+        for k in EVERY[:-1]:  # from sample k, w = 0, back to sample k + 1, w = 1
+            near, old = ([getattr(s, f"{name}{j}") for name in "yrc"] for j in (k, k + 1))
+            w, slope = D - k, h * near[1]
+            gap, turn = old[0] - near[0] + slope, slope - h * old[1]
+            fourth = (h**2 * old[2] + 6 * gap - 4 * turn) / 2 if s.second_rate is not None else 0.0
+            third = turn - 2 * gap - 2 * fourth
+            between = w * (w * (gap - third - fourth + w * (third + w * fourth)) - slope)
+            inside = (w >= 0) * (w < 1) if k + 1 < SAMPLES else w >= 0
+            total += ca.if_else(inside, near[0] - s.value + between, 0.0)
         return total
 
     def update(self, s, p):
         slope = (s.value - s.y0) / s.sample_time if s.rate is None else s.rate
-        new = {"y0": s.value, "r0": slope}
+        new = {"y0": s.value, "r0": slope, "c0": 0.0 if s.second_rate is None else s.second_rate}
         for k in EVERY[1:]:
-            new |= {f"y{k}": getattr(s, f"y{k - 1}"), f"r{k}": getattr(s, f"r{k - 1}")}
+            new |= {f"{name}{k}": getattr(s, f"{name}{k - 1}") for name in "yrc"}
         if s.rate is None:
             new["r1"] = (s.value - s.y1) / (2 * s.sample_time)
         return new

@@ -14,6 +14,7 @@ class DriveHysteresis(Effect):
     """
 
     place = Place.DRIVE
+    stage = 1
     rough = 0.02
     rarity = 2.3
     needs = frozenset({"actuator"})

@@ -6,16 +6,18 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class EndStop(Effect):
-    """Delta F = -k x^2/(x + e), x = d - gap where positive: a spring k beyond the gap, on the negative side for gap < 0.
+    """Delta F = -k x^2/(x + e) (1 + x/e)^(n - 1), x = d - gap where positive; on the negative side for gap < 0.
 
-    e, a hundredth of the typical travel, rounds the corner. Exactly nothing before contact. Holds for elastic contact.
+    n = 1 is a spring k, n = 1.5 Hertz's contact of a ball. e, a thousandth of the typical travel, rounds the corner and is
+    where k counts. Exactly nothing before contact. Holds for elastic contact.
     """
 
     place = Place.FORCE
     needs = frozenset({"force"})
-    source = "definition: a spring beyond a gap, its corner rounded"
+    rough = 0.05
+    source = "K. L. Johnson, Contact Mechanics (1985), eq. (4.23): Hertz; its corner rounded"
     params = (
-        Param("stiffness", "channel/travel", (0.0, 1e3), "stiffness of the stop", off=0.0),
+        Param("stiffness", "channel/travel", (0.0, 1e3), "stiffness of the stop at first", off=0.0),
         Param(
             "gap",
             "travel",
@@ -24,9 +26,11 @@ class EndStop(Effect):
             grid=(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97),
             level=True,
         ),
+        Param("power", "1", (1.0, 2.0), "n: how the force grows with the depth", grid=(1.0, 1.5)),
     )
 
     def term(self, s, p):
         side = ca.sign(p.gap)
         x = ca.fmax(side * (s.displacement - p.gap), 0)
-        return -p.stiffness * side * x**2 / (x + 0.01 * s.travel)
+        e = 1e-3 * s.travel
+        return -p.stiffness * side * x**2 / (x + e) * (1 + x / e) ** (p.power - 1)

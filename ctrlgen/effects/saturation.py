@@ -15,7 +15,7 @@ class Saturation(Effect):
     needs = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): actuator faults; smooth form ours"
     params = (
-        Param("share", "1", (0.0, 1.5), "1 where nothing above the level is delivered", off=0.0),
+        Param("share", "1", (0.0, 1.5), "1 where nothing above the level is delivered", off=0.0, expected=(0.5, 1.5)),
         Param(
             "level",
             "channel",

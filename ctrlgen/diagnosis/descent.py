@@ -1,0 +1,70 @@
+"""Damped least squares within bounds."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+NEGLIGIBLE = 0.01  # of one squared standard deviation
+
+
+class Problem(Protocol):
+    """Numbers x of order one, of which the first `k` are the structure's own and the others the records' starts; each may
+    step by its `most` at once."""
+
+    k: int
+    most: np.ndarray
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]: ...
+
+    def residual(self, x: np.ndarray) -> np.ndarray: ...
+
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
+    """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431), steps clipped at the bounds.
+
+    A step that fails is tried without its part in the records' starts: those may bend within a gap or a fringe. Ends when
+    a step promises less than `NEGLIGIBLE` of one squared standard deviation.
+    """
+    low, high = problem.bounds
+    own = np.arange(len(x)) < problem.k
+    x, damping = np.clip(x, low, high), 1e-6
+    r, J = problem.evaluate(x)
+    for _ in range(steps):
+        gradient, H = J.T @ r, J.T @ J
+        open_ = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))) & (np.diag(H) > 0)
+        if not open_.any():
+            break
+        step = _damped(H, gradient, open_, damping, problem.most)
+        if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
+            break
+        better = _better(problem, r, np.clip(x + step, low, high))
+        if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
+            step = _damped(H, gradient, open_ & own, damping, problem.most)
+            better = _better(problem, r, np.clip(x + step, low, high))
+        if better is not None:
+            x, damping = better, max(damping / 10, 1e-9)
+            r, J = problem.evaluate(x)
+        else:
+            damping = max(damping * 30, 1e-4)
+            if damping > 1e8:
+                break
+    return x
+
+
+def _damped(H: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float, most: np.ndarray) -> np.ndarray:
+    """Marquardt's step of the numbers that are `open_`, none of them further than its `most`."""
+    step, scale = np.zeros_like(gradient), np.sqrt(np.diag(H)[open_])  # no number's unit decides what can be solved for
+    H = H[np.ix_(open_, open_)] / np.outer(scale, scale)
+    step[open_] = -np.linalg.lstsq(H + damping * np.eye(len(H)), gradient[open_] / scale, rcond=None)[0] / scale
+    return step / max(1.0, float(np.max(np.abs(step) / most)))
+
+
+def _better(problem: Problem, r: np.ndarray, tried: np.ndarray) -> np.ndarray | None:
+    """`tried`, where it leaves less than `r`."""
+    left = problem.residual(tried)
+    return tried if left @ left < r @ r else None
