@@ -17,11 +17,14 @@ class Problem(Protocol):
     most: np.ndarray
 
     @property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]: ...
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest x."""
 
-    def residual(self, x: np.ndarray) -> np.ndarray: ...
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """What is squared and summed."""
 
-    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same with its slopes by x."""
 
 
 def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
