@@ -154,6 +154,7 @@ class Chain:
             ambient=self.ambient,
             stepped={i: closed(value) for i, value in following.items()},
             sticking=self._sticking(),
+            bristles=tuple(first + k for k, (m, s, _) in enumerate(memories) if m.effect.sticks and not s.stepped),
             acceleration=self.acceleration,
             held=self.held,
             held_value=self.held_value,

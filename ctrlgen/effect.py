@@ -42,10 +42,10 @@ class Param:
     displacement and `partner` for that of the other channel of a pair; `bounds` and `grid` then count in typical
     sizes of those signals, so that one law serves micrometres and degrees. `grid` are the values tried when a shape
     is unknown and the effect is only suspected. A `level` is where a signal meets a limit: its grid counts in peaks of
-    that signal in the records at hand, or, of a time, in twelfths of their length. What the records themselves suggest
-    of the kind `seen` is tried too: "pitches" of the path, "moments" in time. An amplitude outside what is `usual` is
-    something else; one with a `grid` acts in proportion nowhere near `off`, and is screened by what it does at those
-    values.
+    that signal, of the travel or of its rate in the records at hand, or, of a time, in twelfths of their length. What the
+    records themselves suggest of the kind `seen` is tried too: "pitches" of the path, "moments" in time. An amplitude
+    outside what is `usual` is something else; one with a `grid` acts in proportion nowhere near `off`, and is screened by
+    what it does at those values.
     """
 
     name: str
@@ -155,7 +155,10 @@ class Effect:
     )
     several: ClassVar[bool] = False  # may act more than once at one place, as harmonics do
     active: ClassVar[bool] = False  # may put energy into the stage
-    sticks: ClassVar[bool] = False  # its force at standstill is what holds the stage there: steps must be implicit
+    sticks: ClassVar[bool] = (
+        False  # its force at standstill is what holds the stage there: steps must be implicit, also in its
+    )
+    # states, whose rates are linear in themselves
     rarity: ClassVar[float] = (
         0.0  # ln of how many times rarer it is than a wrong gain: decides among causes that explain alike
     )

@@ -10,7 +10,7 @@ from ctrlgen.effect import Param, State
 
 WHEN = (
     Param("moment", "s", (-1e6, 1e6), "when it sets in", seen="moments"),
-    Param("rise", "s", (1e-4, 1e2), "time it takes", grid=(1.0,), level=True),
+    Param("rise", "s", (1e-4, 1.0), "time it takes", grid=(1.0,), level=True),
 )
 CLOCK = (State("t", "s", 1.0, clock=True),)
 

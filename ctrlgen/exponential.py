@@ -17,6 +17,7 @@ from ctrlgen.model import Model
 SUBSTEP = 0.8  # step times the fastest nominal eigenvalue; what is not linear is then right to 1e-3 of itself
 FASTEST = 5.0  # eigenvalue times sample time beyond which a lag is over within a sample, and exact
 REVERSING = 0.2  # the same where a reversal takes no time: what friction does is then right to 2 % of itself
+REVERSALS = 4  # steps a sample at least, for the same reason
 MOST_SUBSTEPS = 16
 SOLVING = 2  # iterations for a velocity: from standstill they come from one side and quadratically
 Rest = Callable[[ca.SX, ca.SX], ca.SX]  # y, u -> N, its rows `acting`
@@ -30,8 +31,10 @@ def steps_of(model: Model, sample_time: float) -> Exponential | Sticking:
 class Steps:
     """What both kinds have: `count` a sample, of h [s]; A; the rows `acting` of y that N alone has; E = e^(A h)."""
 
+    LEAST = 1
+
     def __init__(self, model: Model, sample_time: float, A: np.ndarray, longest: float) -> None:
-        self.count = substeps(A, sample_time, longest)
+        self.count = max(substeps(A, sample_time, longest), self.LEAST)
         self.h = sample_time / self.count
         self.A = _sparse(A)
         rest = self._rest(model)
@@ -91,18 +94,22 @@ class Exponential(Steps):
 
 
 class Sticking(Steps):
-    """Steps implicit in the velocities of the axes that stick; N to second order, also across a reversal that takes no time.
+    """Steps implicit in the velocities of the axes that stick and in the bristles that hold them; N to second order, also
+    across a reversal that takes no time.
 
     With c = 1/3: Y = E_c y + P N(Y) and y+ = E y + W N(Y) + V N(y+), E_c = e^(A c h), P = c h phi_1(A c h); W and V
     integrate the straight line through N(Y) at c and N(y+) at 1 (the nodes of Radau IIA). What stands stays: N(y+) is
     whatever keeps it at rest.
     """
 
-    NODE = 1 / 3
+    NODE, LEAST = 1 / 3, REVERSALS
 
     def __init__(self, model: Model, sample_time: float) -> None:
         stuck, sliding = home_slope(model), home_slope(model, 1.0)
-        super().__init__(model, sample_time, np.where(np.abs(sliding) < np.abs(stuck), sliding, stuck), REVERSING)
+        A = np.where(np.abs(sliding) < np.abs(stuck), sliding, stuck)
+        self.bristles = list(model.bristles)  # in y
+        A[self.bristles, :] = A[:, self.bristles] = 0.0  # they bend and slip far faster than anything else
+        super().__init__(model, sample_time, A, REVERSING)
         h, c, (_, phi_1, phi_2, _) = self.h, self.NODE, self.phis
         E_c, phi_c, *_ = _phis(self.A.full() * c * h)
         self.E_c, self.P = _sparse(E_c), self._acting(c * h * phi_c)
@@ -111,6 +118,7 @@ class Sticking(Steps):
         first = model.x.numel() - model.v.numel()
         self.places = [first + i for i in model.sticking]  # in y
         self.own = [self.acting.index(i) for i in self.places]  # in N
+        self.bent = [self.acting.index(i) for i in self.bristles]
 
     def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the two (y, u) where N = N(y, u) was solved for."""
@@ -123,32 +131,51 @@ class Sticking(Steps):
         """Y = base + M n and n = N(Y, u), from a guess of n.
 
         Newton's method for each velocity, from where the guess goes, or from standstill where it does not go the way that
-        a standstill would be left: friction bends toward its full force, so that no iterate from there overshoots. What
-        else N depends on follows along.
+        a standstill would be left: friction bends toward its full force, so that no iterate from there overshoots. The
+        bristles go exactly where the velocity takes them; what else N depends on follows along.
         """
-        n, weight = n[:], ca.diag(M[self.places, self.own])
+        weight = ca.diag(M[self.places, self.own])
+
+        def at_speed(v: ca.SX, n: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+            """Y with the velocities v, N there, and the slope by them; for a guess of the rest of n."""
+            n = n[:]
+            n[self.own] += (v - (base + M @ n)[self.places]) / weight
+            Y = ca.densify(base + M @ n)
+            Y[self.places] = v
+            return self._sloped(N, base, M, Y, u)
+
         sliding = (base + M @ n)[self.places]
-        still = base + M @ n
-        still[self.places] = 0
-        n[self.own] = N(still, u)[self.own]
+        _, n, _ = at_speed(ca.SX.zeros(len(self.places)), n)
         way = ca.sign((base + M @ n)[self.places])
         v = ca.fmax(way * sliding, 0) * way
-        n[self.own] += (v - (base + M @ n)[self.places]) / weight
         for _ in range(SOLVING):
-            Y = base + M @ n
-            v = Y[self.places]
-            n, slope = self._sloped(N, Y, u)
+            _, n, slope = at_speed(v, n)
             off = (base + M @ n)[self.places] - v
-            after = ca.fmax(way * (v + off / (1 - weight * slope)), 0) * way
-            n[self.own] += (after - v - off) / weight
+            v = ca.fmax(way * (v + off / (1 - weight * slope)), 0) * way
+        if self.bristles:
+            _, n, _ = at_speed(v, n)
+        n[self.own] += (v - (base + M @ n)[self.places]) / weight
         return base + M @ n, n
 
-    def _sloped(self, N: Rest, Y: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """N at Y, and how much each sticking row changes with its own velocity."""
+    def _sloped(self, N: Rest, base: ca.SX, M: ca.DM, Y: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Y with the bristles where its velocities take them, N there, and how much each sticking row changes with its own
+        velocity, the bristles with it."""
         at = ca.SX.sym("Y", Y.numel())
         value = N(at, u)
-        slope = ca.vertcat(*(ca.jacobian(value[i], at[k]) for i, k in zip(self.own, self.places, strict=True)))
-        return tuple(ca.substitute([value, slope], [at], [Y]))
+        slopes = [ca.jacobian(value[i], at[k]) for i, k in zip(self.own, self.places, strict=True)]
+        bend = ca.SX(0, 1)
+        for i, k in zip(self.bent, self.bristles, strict=True):
+            m = M[k, i]
+            stiff = 1 - m * ca.jacobian(value[i], at[k])
+            bend = ca.vertcat(bend, at[k] + (base[k] + m * value[i] - at[k]) / stiff)
+            for j, (own, place) in enumerate(zip(self.own, self.places, strict=True)):
+                slopes[j] += ca.jacobian(value[own], at[k]) * m * ca.jacobian(value[i], at[place]) / stiff
+        slope = ca.vertcat(*slopes)
+        if self.bristles:
+            Y = Y[:]
+            Y[self.bristles] = ca.substitute(bend, at, Y)
+        value, slope = ca.substitute([value, slope], [at], [Y])
+        return Y, value, slope
 
 
 def _sparse(M: np.ndarray) -> ca.DM:

@@ -36,8 +36,8 @@ class Model:
     (temperatures), then come the effects' memories, then the velocities `v` (n_axes,; none without inertia: z' = v).
     `rates_of_heat` dx/dt (n_x,) in terms of the `heat` that `heat_of_drive` (u) produces, and `balance` 0 = g(x, z, u)
     (n_axes,). `stepped` gives, for states that change once a sample, the new value by their place in x; `clocks` are
-    the places of those that count time. `sticking`: axes with inertia where dry friction may hold. `ambient` is the rise
-    of the surroundings [K], zero unless it was asked for.
+    the places of those that count time. `sticking`: axes with inertia where dry friction may hold; `bristles`: places
+    in x of its states. `ambient` is the rise of the surroundings [K], zero unless it was asked for.
     `acceleration`: the symbol of v', for what `seen` gives.
     With a loop the drive is computed at every sample and `held`: its symbol, its `held_value`, and the rates in its terms.
     `seen` (place, channel, partner, states) is what an effect's law would read there.
@@ -58,6 +58,7 @@ class Model:
     stepped: dict[int, ca.SX]
     clocks: tuple[int, ...]
     sticking: tuple[int, ...]
+    bristles: tuple[int, ...]
     acceleration: ca.SX
     held: ca.SX
     held_value: ca.SX
@@ -98,9 +99,9 @@ class Model:
 
     def closed(self, expr: ca.SX) -> ca.SX:
         """An effect's expression without the symbols of acceleration, heat and a held drive."""
-        moving = self.rates_of_heat[self.x.numel() - self.v.numel() :]
-        expr = ca.substitute(ca.SX(expr), self.acceleration, moving)
-        return ca.substitute(ca.substitute(expr, self.heat, self.heat_of_drive), self.held, self.held_value)
+        if self.inertial:
+            expr = ca.substitute(ca.SX(expr), self.acceleration, self.rates_of_heat[-self.v.numel() :])
+        return ca.substitute(ca.substitute(ca.SX(expr), self.heat, self.heat_of_drive), self.held, self.held_value)
 
     @cached_property
     def moved_by(self) -> frozenset[str]:

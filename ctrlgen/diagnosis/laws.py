@@ -21,8 +21,10 @@ from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.effect import Effect, Place
 
-Peaks = dict[tuple[Place, int], dict[str, float]]  # channel, travel [SI]
+Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
+REACHED = ("channel", "travel", "travel/s")
 
+SMALL = 1e-6
 SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
 
 
@@ -51,14 +53,16 @@ def peaks(fitter: Fitter, fit: Fit) -> Peaks:
         response = responses[record.sample_time, record.linear]
         m, n = response.model, len(record.time)
         seen = [m.seen(place, i, None, {}) for place, i in places]
-        rows = m.closed(ca.vertcat(*(ca.vertcat(s.value, s.displacement) for s in seen)))
+        still = ca.SX.zeros(1)
+        given = [(s.value, s.displacement, still if s.velocity is None else s.velocity) for s in seen]
+        rows = m.closed(ca.vertcat(*(value for values in given for value in values)))
         f = ca.Function("signals", [ca.vertcat(m.x, m.z), m.u, response.ambient, m.p], [rows])
         S = response.motion(record, fit.theta, start if len(start) else None)[0]
         values = f.map(n)(S.T, record.drive.T, response._ambients(record)[None, :], np.tile(fit.theta[:, None], (1, n)))
-        most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, 2)
+        most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
         for where, row in zip(places, most, strict=True):
-            old = found.get(where, {"channel": 0.0, "travel": 0.0})
-            found[where] = {"channel": max(old["channel"], row[0]), "travel": max(old["travel"], row[1])}
+            old = found.get(where, {})
+            found[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
     return found
 
 
@@ -187,7 +191,13 @@ class Laws:
         h = SETTLED_LAG if settled else h
         memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)
         A = ca.jacobian(rates, memory)
-        step = h * rates if ca.symvar(A) else h * ca.DM(_phi_1(h * ca.DM(A).full())) @ rates
+        if not ca.symvar(A):
+            step = h * ca.DM(_phi_1(h * ca.DM(A).full())) @ rates
+        elif A.sparsity().is_diag():
+            own = h * ca.diag(A)
+            step = h * rates * ca.if_else(ca.fabs(own) > SMALL, ca.expm1(own) / own, 1 + own / 2)
+        else:
+            step = h * rates
         return [
             new if new is not None else state + (1.0 if settled else h) if clock else state + change
             for state, new, clock, change in zip(

@@ -2,21 +2,34 @@
 
 import casadi as ca
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effect import Effect, Param, Place, State
+
+STILL = 1e-6  # of v_s: keeps 0/0 away
 
 
 class Coulomb(Effect):
-    """Delta F = -f tanh(v/v_s). Holds for speeds well above v_s; below it the contact creeps instead of sticking."""
+    """dz/dt = v (1 - z/tanh(v/v_s))/r, Delta F = -f z: bristles that bend by some r, then slide with the force f.
+
+    Dahl's law for v_s = 0, f tanh(v/v_s) for r = 0: a contact loaded for long creeps at some v_s. Right after a reversal the
+    bristles are a spring f/r. Holds for contacts that do not wear.
+    """
 
     place = Place.FORCE
-    rough = 0.01
+    rough = 0.02
+    family = "dry friction"
     sticks = True
     needs = frozenset({"velocity"})
-    source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: friction in machines"
+    source = "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; the rest is its usual smooth form"
     params = (
         Param("force", "channel", (0.0, 1.0), "force of sliding", off=0.0),
-        Param("smoothing", "travel/s", (1e-4, 1e3), "speed v_s of full force", grid=(1e-3, 0.01, 0.1, 1.0, 10.0)),
+        Param("reach", "travel", (1e-6, 0.03), "way in which the contact yields", grid=(3e-4, 3e-3, 0.03), level=True),
+        Param("smoothing", "travel/s", (1e-5, 1e3), "v_s, below which it creeps", grid=(1e-4, 0.1), level=True),
     )
+    states = (State("z", "1", 1.0),)
 
     def term(self, s, p):
-        return -p.force * ca.tanh(s.velocity / p.smoothing)
+        return -p.force * s.z
+
+    def rates(self, s, p):
+        speed = ca.sqrt((s.velocity / p.smoothing) ** 2 + STILL**2)
+        return {"z": (s.velocity - p.smoothing * speed / ca.tanh(speed) * s.z) / p.reach}

@@ -1,27 +1,34 @@
-"""Friction that falls as a lubricant film builds up."""
+"""Dry friction that falls as a lubricant film builds up."""
 
 import casadi as ca
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effect import Effect, Param, Place, State
 
 
 class Stribeck(Effect):
-    """Delta F = -f exp(-(v/v_s)^2) tanh(10 v/v_s): the excess over dry friction at low speed.
+    """dz/dt = (v - |v| z/g(v))/r, Delta F = -f z, g = 1 + (b - 1) exp(-(v/v_s)^2): b f breaks it away, f is left at speed.
 
-    Holds for lubricated guides; the rest below v_s/10 is creep, not sticking.
+    LuGre's law, its bristles without damping. Holds for lubricated guides.
     """
 
     place = Place.FORCE
-    rough = 0.01
+    rough = 0.02
     rarity = 1.0  # dry friction that does not fall is the commoner
+    family = "dry friction"
     sticks = True
     needs = frozenset({"velocity"})
-    source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083, Gaussian form of Stribeck's curve"
+    source = "C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, eqs. (1)-(4)"
     params = (
-        Param("force", "channel", (0.0, 1.0), "excess of breakaway over sliding", off=0.0),
-        Param("speed", "travel/s", (1e-3, 1e3), "speed v_s at which it is gone", grid=(0.01, 0.1, 1.0, 10.0, 100.0)),
+        Param("force", "channel", (0.0, 1.0), "force of sliding at speed", off=0.0),
+        Param("breakaway", "1", (1.0, 5.0), "b: force that breaks it away, per force of sliding", grid=(1.8,)),
+        Param("speed", "travel/s", (1e-3, 1e3), "v_s, where the excess is gone", grid=(0.01, 0.05, 0.2), level=True),
+        Param("reach", "travel", (1e-6, 0.03), "way in which the contact yields", grid=(1e-3, 0.01), level=True),
     )
+    states = (State("z", "1", 1.0),)
 
     def term(self, s, p):
-        ratio = s.velocity / p.speed
-        return -p.force * ca.exp(-(ratio**2)) * ca.tanh(10 * ratio)
+        return -p.force * s.z
+
+    def rates(self, s, p):
+        level = 1 + (p.breakaway - 1) * ca.exp(-((s.velocity / p.speed) ** 2))
+        return {"z": (s.velocity - ca.fabs(s.velocity) * s.z / level) / p.reach}
