@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, record
 
+from ctrlgen.diagnosis.adequacy import judge
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.noise import coloured, estimate
@@ -46,16 +47,16 @@ def fitter_of(change=lambda u: move(u), after=lambda y: y, n=1500, seed=4) -> Fi
     return Fitter(recording, estimate(recording, SETTLING))
 
 
-def fine(u: np.ndarray) -> np.ndarray:
-    """The position ten times a sample."""
+def fine(u: np.ndarray, push: np.ndarray | float = 0.0) -> np.ndarray:
+    """The position ten times a sample, under a drive held and another force `push` [N]."""
     from scipy.signal import cont2discrete
 
     A, B = np.array([[0, 1], [-2e5 / M, -C / M]]), np.array([[0], [1 / M]])
     Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / FINE)
     x, out = np.zeros(2), []
-    for volts in np.repeat(u, FINE):
+    for force in KF * np.repeat(u, FINE) + push:
         out.append(x[0])
-        x = Ad @ x + Bd[:, 0] * KF * volts
+        x = Ad @ x + Bd[:, 0] * force
     return np.array(out)
 
 
@@ -211,3 +212,84 @@ def test_a_pitch_is_found_that_is_a_thousandth_of_the_path():
     assert first == pytest.approx(pitch, rel=1e-4)
     assert pitches(path, noise) == ()
     assert pitches(np.ones(50), noise[:50]) == ()
+
+
+def test_what_moves_at_rest_is_no_noise():
+    """A level that jumps at random is as large at rest as when held out; its innovations give it away."""
+    jumps = np.random.default_rng(8)
+
+    def telegraph(y):
+        return y + 6 * NOISE * np.cumprod(np.where(jumps.random(len(y)) < 0.01, -1.0, 1.0))
+
+    for after, restless in ((lambda y: y, ()), (telegraph, ("reading.axis",))):
+        fitter = fitter_of(after=after)
+        found = judge(fitter, fitter.fit(Structure(AXIS)))
+        assert found.restless == restless and found.passed == (not restless)
+
+
+def test_play_is_seen_by_what_it_does_at_finite_gaps():
+    """The slope at no gap says little of a stage that creeps and swings about its goal."""
+    fitter = fitter_of(played)
+    fit = fitter.fit(Structure(AXIS))
+    found = Screen(fitter, [BACKLASH]).run(fit).suspects[0]
+    assert found.start["gap"] == pytest.approx(6e-8, rel=0.3)
+    assert found.z**2 > 0.5 * (fit.objective - fit.n)
+
+
+@pytest.mark.parametrize("moment", [0.18, 0.87, 1.33])
+def test_an_event_is_found_wherever_it_is_and_begins_at_its_moment(moment):
+    """A force that sets in within 3 ms."""
+
+    def pushed(u):
+        t = np.arange(len(u) * FINE) * H / FINE
+        return fine(u, 0.02 * np.clip((t - moment) / 3e-3, 0, 1) * (len(u) > 1000))[::FINE]
+
+    fitter = fitter_of(pushed)
+    event = Hypothesis("force_step", "disturbance:axis", "axis")
+    start = Screen(fitter, [event]).run(fitter.fit(Structure(AXIS))).suspects[0].start
+    fit = fitter.fit(Structure(AXIS).with_cause(event, start))
+    k = next(i for i, u in enumerate(fit.structure.unknowns) if u.name == "moment")
+    value, sd = fit.theta[k], np.sqrt(fit.covariance[k, k])
+    assert abs(value - moment) < 3 * sd + 1e-4 and sd < 1e-3
+
+
+def test_a_drive_that_is_held_stays_held_through_its_sample():
+    """A late share of a fast drive: the slope keeps most of what the share does."""
+    lag = Hypothesis("thermal_lag", "actuator:axis", "axis")
+
+    def late(u):
+        slow = lfilter([0, 1 - np.exp(-H / 0.3)], [1, -np.exp(-H / 0.3)], u)
+        return move(0.97 * u + 0.03 * slow)
+
+    fitter = fitter_of(late)
+    fit = fitter.fit(Structure(AXIS))
+    suspect = Screen(fitter, [lag]).run(fit).suspects[0]
+    assert suspect.z**2 > 0.8 * (fit.objective - fit.n)
+
+
+def test_numbers_that_the_fit_leaves_open_are_not_held_against_a_structure():
+    fitter = fitter_of()
+    fit = fitter.fit(Structure(AXIS))
+    n = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+    off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
+    plain = sum(float(np.sum(fitter.whitened(off, r) ** 2)) for r in fitter.held)
+    loose = replace(off, J=off.J / 40)  # as if known 40 times worse
+    assert plain > 1.5 * n
+    assert fitter.held_out(loose) < 0.7 * plain
+    assert fitter.held_out(fit) < fitter.held_out(off)
+
+
+def test_what_bends_a_reading_is_delayed_afterwards():
+    delay, bow = Hypothesis("delay", "sensor:axis", "axis"), Hypothesis("bow", "sensor:axis", "axis")
+    ends = {}
+    for order in ((delay, bow), (bow, delay)):
+        start = {delay: {"delay": 1.4e-3}, bow: {"curvature": 2e3}}
+        s = Structure(AXIS, order, tuple(start[c] for c in order))
+        fitter = fitter_of()
+        response = s.responses(fitter.recording, {})[H, False]
+        ends[order] = response.outputs(fitter.to_fit[0], s.start)[:, 0]
+    plain = Structure(AXIS, (delay,), ({"delay": 1.4e-3},))
+    late = plain.responses(fitter.recording, {})[H, False].outputs(fitter.to_fit[0], plain.start)[:, 0]
+    assert np.array_equal(*ends.values())
+    bent = late + 2e3 * late**2
+    assert np.abs(ends[delay, bow] - bent).max() < 0.02 * np.abs(bent - late).max()

@@ -58,7 +58,7 @@ def test_the_missing_physics_is_named(loop):
     """Stages that stiffen and struts that turn are in the plant; which number of the lever is off, poses alone cannot tell."""
     assert loop.diagnosis["verdict"] in ("explained", "ambiguous")
     found = {(f["effect"], f["location"]) for f in loop.diagnosis["findings"]}
-    assert {("link_load", "stage:all"), ("turning_links", "mechanism:all")} <= found
+    assert {("link_load", "stage:all"), ("finite_rotation", "mechanism:all")} <= found
 
 
 @pytest.mark.long

@@ -31,6 +31,7 @@ from ctrlgen.recording import Recording
 
 Progress = Callable[[str], None]
 GUESSES = 2  # of the noise, each with the device fitted under the one before
+RESTLESS = "{}: what is left at rest is no noise, it jumps or remembers; something acts there that is not described"
 SOME_TIME = 1e-3  # s: effects that look back by samples do not change how long a device settles
 
 
@@ -91,7 +92,7 @@ def _diagnose(
         detectable=beside.detectable,
         next_experiment=beside.next_experiment,
         history=beside.history,
-        notes=(*recording.notes, *noise.said, *([spikes] if spikes else [])),
+        notes=(*recording.notes, *noise.said, *([spikes] if spikes else []), *map(RESTLESS.format, after.restless)),
         device=device,
         recording=fitter.recording,
         search=found,

@@ -1,7 +1,8 @@
-"""Steps 3 and 9: does a structure leave anything over? Judged on the held-out records.
+"""Steps 3 and 9: does a structure leave anything over? Judged on the held-out records, and on what is left at rest.
 
 The squares that must be expected there are those of the noise and of what the fit could not know better,
-n + trace(J_h C J_h'), with C the covariance of the fitted numbers.
+n + trace(J_h C J_h'), with C the covariance of the fitted numbers. At rest, where the noise was learnt, its size says
+nothing; but stationary noise leaves neither memory nor heavy tails after whitening, and a stage that moves by itself does.
 """
 
 from __future__ import annotations
@@ -12,22 +13,28 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.noise import without_lines
+from ctrlgen.lattice import lattice
 
 RATIO = 1.10  # held-out error over what is expected: the gate of the design
 SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
 NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
 SIGMAS = 2.6  # standard deviations of the noise's own estimate that are granted
+RESTLESS = 1e-6  # p below which what is left at rest is no noise
+ROUNDED = 0.5  # of the noise: steps of the readings from which on these tests see the steps
 SMALL_SAMPLE = 0.001  # p of so large an error by chance, above which the gate's ratio says nothing
 LAGS = 20
 
 
 @dataclass(frozen=True)
 class Adequacy:
-    """`ratio` of held-out error to what is expected, per channel; the smallest p of each test; `passed` all of it."""
+    """`ratio` of held-out error to what is expected, per channel; the smallest p of each test; `restless` channels, which
+    do at rest what no noise does; `passed` all of it."""
 
     ratio: tuple[float, ...]
     p_values: dict[str, float]
     passed: bool
+    restless: tuple[str, ...] = ()
 
     @property
     def worst(self) -> float:
@@ -59,7 +66,23 @@ def judge(fitter: Fitter, fit: Fit) -> Adequacy:
     chance = min(1.0, n_y * min(map(float, stats.chi2.sf(squares / doubt**2, np.maximum(expected, 1.0)))))
     smallest["size"] = chance
     above = any(r > RATIO * d for r, d in zip(ratio, doubt, strict=True)) and chance < SMALL_SAMPLE
-    return Adequacy(ratio, smallest, not (above or rejected))
+    restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
+    return Adequacy(ratio, smallest, not (above or rejected or restless), restless)
+
+
+def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
+    """Whether what is left of channel i at rest has a memory beyond the noise's, or tails that noise has not."""
+    for record in fitter.recording.records:
+        if record.role != "rest" or fitter.recording.kind != "series":
+            continue
+        e = fitter.whitened(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
+        step = lattice(record.observed[record.valid[:, i], i])
+        if len(e) < 5 * LAGS or np.ptp(e) == 0 or step > ROUNDED * fitter.noise.floor[i]:
+            continue
+        e = without_lines(e)  # a vibration is looked for by itself
+        if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESTLESS:
+            return True
+    return False
 
 
 def _spread(fitter: Fitter, fit: Fit, record: object) -> np.ndarray:

@@ -132,7 +132,7 @@ def _of_law(
     fitting = [where for where in places if law.fits(where)]
     for where in () if law.whole else fitting:
         yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, highest=highest)
-    if law.whole or (len(fitting) > 1 and law.place not in (Place.POSE, Place.SENSOR)):
+    if law.whole or (len(fitting) > 1 and law.place is not Place.SENSOR):
         yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
 
 

@@ -109,7 +109,7 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
     }
     for source, (degree, parts) in samples.items():
-        parts = _quiet([_without_lines(_flat(part, degree)) for part in parts if len(part) >= SHORTEST_REST])
+        parts = _quiet([without_lines(_flat(part, degree)) for part in parts if len(part) >= SHORTEST_REST])
         if parts:
             sd, a = _with_rounding(*autoregression(parts), rounding)
             n = sum(map(len, parts))
@@ -129,7 +129,7 @@ def _flat(part: np.ndarray, degree: int) -> np.ndarray:
     return part - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, part, degree))
 
 
-def _without_lines(part: np.ndarray) -> np.ndarray:
+def without_lines(part: np.ndarray) -> np.ndarray:
     """Without sinusoids that stand out of the spectrum: a vibration is a disturbance with a cause, no noise."""
     n = len(part)
     for _ in range(LINES):

@@ -1,21 +1,19 @@
-"""Rotations that are not infinitesimal: the platform turns while it moves."""
-
-import casadi as ca
+"""Rotations that are not infinitesimal: links turn as the mechanism moves, its Jacobian is not the one at home."""
 
 from ctrlgen.effect import Effect, Param, Place
 
 
 class FiniteRotation(Effect):
-    """Delta delta = g theta x delta/2: the second order of the twist's exponential, g = 1 for a straight screw.
+    """Delta pose = g pose_2(d): the second order of the loop closure of links of constant length, g = 1 for pivots at their ends.
 
-    Holds for angles below 0.1 rad; what is left is theta^2/6 of the motion.
+    Holds for travel far below the links' length; what is left is (d/l)^2 of the motion.
     """
 
     place = Place.POSE
-    needs = frozenset({"spatial"})
-    channel_unit = "m"
-    source = "R. M. Murray, Z. Li, S. S. Sastry, Robotic Manipulation (1994), chapter 2: exponential of a twist"
-    params = (Param("share", "1", (-4.0, 4.0), "1 for motion along one screw", off=0.0),)
+    needs = frozenset({"second_order"})
+    whole = True
+    source = "J.-P. Merlet, Parallel Robots (2006), chapter 4: loop closure, expanded to second order"
+    params = (Param("share", "1", (-2.0, 4.0), "1 for links on ideal pivots", off=0.0),)
 
     def term(self, s, p):
-        return p.share * ca.cross(s.all[:3], s.all[3:])[s.index - 3] / 2
+        return p.share * s.second_order()[s.index]
