@@ -16,7 +16,7 @@ class ThermalLag(Effect):
     needs = frozenset({"actuator", "unheated"})
     source = "J. H. Lienhard, A Heat Transfer Textbook (2019), chapter 5: lumped bodies"
     params = (
-        Param("share", "1", (0.0, 1.0), "part that acts late", off=0.0),
+        Param("share", "1", (0.0, 1.2), "part that acts late", off=0.0),
         Param("tau", "s", (1e-3, 1e4), "time constant", grid=(0.01, 0.05, 0.3, 1.0, 3.0, 10.0, 60.0)),
         Param("second", "1", (0.01, 1.0), "r: the second time constant, per first", grid=(0.05, 0.3)),
     )
