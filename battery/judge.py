@@ -162,6 +162,7 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
             left.remove(hit)
             j.places.append(place_is_right(_location(hit, truth), truth))
             j.covered += _covered(hit, truth)
+    left = [f for f in left if not any(_harmonic(f, t) for t in truths)]
     spare = [f for f in left if not any(_among(f, t) for t in truths)]
     j.named += [("nothing", f["effect"]) for f in spare]
     j.wrong = bool(spare)
@@ -180,6 +181,15 @@ def _among(finding: dict[str, Any], truth: dict[str, Any], own: bool = False) ->
     """Whether an alternative of the finding is right (or, with `own`, the finding itself)."""
     rivals = [*finding.get("alternatives", []), *([finding] if own else [])]
     return any(is_right(r["effect"], r.get("location", ""), truth) for r in rivals)
+
+
+def _harmonic(finding: dict[str, Any], truth: dict[str, Any]) -> bool:
+    """Whether a further finding is the second harmonic that the plant's cyclic error has too."""
+    period = finding.get("parameters", {}).get("period")
+    if finding["effect"] != truth["name"] or not truth.get("shape", {}).get("second") or period is None:
+        return False
+    half = truth["shape"]["period"] / 2
+    return abs(in_si(float(period["value"]), period["unit"]) - half) < 0.01 * half
 
 
 def _location(finding: dict[str, Any], truth: dict[str, Any]) -> str:

@@ -192,6 +192,26 @@ def fabricated(kind):
     return out
 
 
+def test_the_second_harmonic_of_a_planted_fringe_is_no_further_cause():
+    truth = {"name": "cyclic", "location": "sensor:axis", "amplitude": 1e-8, "shape": {"period": 4e-7, "second": 0.1}}
+    answer = {"case": "case_1", "class": "single", "planted": [truth]}
+
+    def judged(period: str, **shape):
+        fringes = [
+            {
+                "effect": "cyclic",
+                "location": "sensor:axis",
+                "parameters": {"period": {"value": p, "ci95": [p, p], "unit": "um"}},
+            }
+            for p in (0.4, float(period))
+        ]
+        planted = [truth | {"shape": truth["shape"] | shape}]
+        return judge.judge(answer | {"planted": planted}, {"verdict": "explained", "findings": fringes})
+
+    assert judged("0.2").exact and not judged("0.2").wrong
+    assert not judged("0.3").exact and not judged("0.2", second=0.0).exact
+
+
 def measured(judged):
     return {row.what: row for row in score.table(judged)}
 

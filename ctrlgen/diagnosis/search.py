@@ -31,7 +31,7 @@ ENDED = 2  # trials a round that are fitted to the end although they look useles
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
 VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
-ABLE = 0.5  # of what a cause gained: what its rival must promise; shapes between the grid's points lose that much
+ABLE = 0.25  # of what a cause takes away: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
 
@@ -167,7 +167,7 @@ class Searcher:
 
     def _ended(self, current: Trial, trials: tuple[Trial, ...]) -> tuple[Trial, ...]:
         """The trials, those driven to their end that leave least on the records to fit but are not justified so early."""
-        best = sorted((t for t in trials if self._meant(t)), key=lambda t: t.fit.objective)[:ENDED]
+        best = sorted(trials, key=lambda t: t.fit.objective)[:ENDED]
         early = [t for t in best if t.fit.objective < current.fit.objective and not self._justified(current, t)]
         return tuple(self._polished(t) if t in early else t for t in trials)
 
@@ -191,9 +191,10 @@ class Searcher:
         return screened.threshold**2 if hidden else max(screened.threshold**2, MATERIAL**2 * self.n_fit)
 
     def _conspicuous(self, current: Trial, screened: Screened) -> list[Suspect]:
-        loud = [s for s in screened.suspects if s.z**2 > self._need(current, screened)]
-        if not loud:
-            return []
+        return self._loud(screened, self._need(current, screened))
+
+    def _loud(self, screened: Screened, need: float) -> list[Suspect]:
+        loud = [s for s in screened.suspects if s.z**2 > need]
         chosen: list[Suspect] = []
         for s in loud:
             same = sum(c.hypothesis.effect == s.hypothesis.effect for c in chosen)
@@ -208,7 +209,7 @@ class Searcher:
             trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis, current.fit)
         return tuple(sorted(trials, key=lambda t: t.total))
 
-    def _attempt(self, structure: Structure, cause: Hypothesis, nested: Fit) -> list[Trial]:
+    def _attempt(self, structure: Structure, cause: Hypothesis, nested: Fit | None = None) -> list[Trial]:
         """The trial; none where no device can be built with the numbers suspected."""
         try:
             return [self.trial(structure, cause, nested=nested)]
@@ -274,21 +275,29 @@ class Searcher:
         for k in range(len(current.fit.structure.causes) - 1):
             rivals = self._replacements(current, k)
             for rival in (*(self._polished(t) for t in rivals[:ENDED]), *rivals[ENDED:]):
-                if self._ahead(rival, current) > RIVAL and self._meant(rival, current.fit.structure.causes):
+                plainer = len(rival.fit.structure.unknowns) < len(current.fit.structure.unknowns)
+                ahead = current.total - rival.total if plainer else self._ahead(rival, current)
+                if ahead > RIVAL and self._meant(rival, current.fit.structure.causes):
                     current = rival
         return current
 
     def _replacements(self, current: Trial, k: int) -> list[Trial]:
+        """What would be suspected instead of cause k, with all the rest as it is now: refitted, it may have gone astray."""
         structure = current.fit.structure
-        bare = self.trial(_cooled(current.fit).without(k))
-        screened = self._screened(bare)
-        gained = bare.fit.objective - current.fit.objective
+        others = _cooled(current.fit).without(k)
+        bare = self.fitter.fit(others, steps=0)
+        screened = self.screen.run(bare)
+        gained = bare.objective - current.fit.objective
         able = [
             s
-            for s in self._conspicuous(bare, screened)
+            for s in self._loud(screened, self._need(current, screened))
             if s.z**2 > ABLE * gained and s.hypothesis != structure.causes[k]
         ]
-        return sorted(self._try(bare, able[:REPLACEMENTS]), key=lambda t: t.total)
+        trials = []
+        for s in able[:REPLACEMENTS]:
+            self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
+            trials += self._attempt(others.with_cause(s.hypothesis, s.start), s.hypothesis)
+        return sorted(trials, key=lambda t: t.total)
 
     def _screened(self, trial: Trial) -> Screened:
         key = frozenset(trial.fit.structure.causes)
@@ -319,7 +328,8 @@ class Searcher:
         for j, other in enumerate(causes):
             rough = 0.0 if j == k or other.effect == PARAMETER else other.law.rough
             if rough:
-                taken = min(self.trial(_cooled(fit).without(j)).held, most) - current.held
+                neither = self.trial(_cooled(bare.fit).without(j - (j > k)))  # beside k another may take j's place
+                taken = min(neither.held, most) - bare.held
                 if lost < (rough * (VAGUE if vague else 1.0)) ** 2 * taken:
                     return True
         return False

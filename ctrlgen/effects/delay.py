@@ -16,7 +16,7 @@ class Delay(Effect):
     """
 
     place = Place.SENSOR
-    stage = 2
+    stage = 3
     rough = 0.001  # by interpolation
     needs = frozenset({"sample_time"})
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"

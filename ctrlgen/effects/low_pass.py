@@ -11,7 +11,7 @@ class LowPass(Effect):
     """
 
     place = Place.SENSOR
-    stage = 1
+    stage = 2
     rough = 0.005
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
     params = (

@@ -15,7 +15,7 @@ class Quantisation(Effect):
     """
 
     place = Place.SENSOR
-    stage = 3
+    stage = 4
     source = "B. Widrow, I. Kollar, Quantization Noise (2008)"
     params = (
         Param("share", "1", (0.0, 1.5), "1 where every reading is rounded", off=0.0),

@@ -7,7 +7,7 @@ class Stuck(Effect):
     """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Holds for one that is dead all the time."""
 
     place = Place.SENSOR
-    stage = 3
+    stage = 4
     rarity = 2.3
     source = "R. Isermann, Fault-Diagnosis Systems (2006): sensor faults"
     params = (

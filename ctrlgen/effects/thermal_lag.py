@@ -12,7 +12,7 @@ class ThermalLag(Effect):
 
     place = Place.DRIVE
     stage = 1
-    rough = 0.01
+    rough = 0.02
     needs = frozenset({"actuator", "unheated"})
     source = "J. H. Lienhard, A Heat Transfer Textbook (2019), chapter 5: lumped bodies"
     params = (
