@@ -34,7 +34,7 @@ class Chain:
         self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
         self.velocity = links.drive.expr[1] if links.imposed else self.v
         self.acceleration = ca.SX.sym("a", self.v.numel())
-        self.before: dict[Place, ca.SX] = {}
+        self.before: dict[Place, list[tuple[float, ca.SX]]] = {}  # stages, and the signal before each
         self.held = self.held_value = ca.SX(0, 1)
         self.rates: ca.SX | None = None
         self.carried = self.z
@@ -75,17 +75,21 @@ class Chain:
     def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
         """`before` plus every term of the effects at `place`, stage after stage; their rates are noted on the way."""
         total, here = ca.SX(before), [m for m in self.members if m.effect.place is place]
+        levels = self.before[place] = []
         for stage in sorted({m.effect.stage for m in here}):
-            self.before[place] = total[:]
+            levels.append((stage, total[:]))
             for member in here:
                 if member.effect.stage == stage:
-                    total[member.index] += member.act(self.seen(place, member.index, member.partner, member.states))
-        self.before[place] = ca.SX(before)
+                    s = self.seen(place, member.index, member.partner, member.states, stage)
+                    total[member.index] += member.act(s)
+        levels.append((float("inf"), total[:]))
         return total
 
-    def seen(self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX]) -> SimpleNamespace:
-        """What the law of an effect at channel `i` of `place` may read, with the effect's own `states`."""
-        before = self.before[place]
+    def seen(
+        self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX], stage: int = 0
+    ) -> SimpleNamespace:
+        """What the law of an effect at channel `i` and a stage of `place` may read, with the effect's own `states`."""
+        before = next(signal for level, signal in self.before[place] if level >= stage)
         s = SimpleNamespace(
             value=before[i], all=before, index=i, partner=partner, ambient=self.ambient, sample_time=self.sample_time,
             **states,

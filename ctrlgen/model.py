@@ -21,7 +21,6 @@ import numpy as np
 
 from ctrlgen.chain import Chain
 from ctrlgen.devices import Device, Limit, Signal
-from ctrlgen.effect import Place
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.units import show
 
@@ -40,7 +39,7 @@ class Model:
     in x of its states. `ambient` is the rise of the surroundings [K], zero unless it was asked for.
     `acceleration`: the symbol of v', for what `seen` gives.
     With a loop the drive is computed at every sample and `held`: its symbol, its `held_value`, and the rates in its terms.
-    `seen` (place, channel, partner, states) is what an effect's law would read there.
+    `seen` (place, channel, partner, states, stage) is what an effect's law would read there.
     `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
     is one, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
     """
@@ -77,7 +76,7 @@ class Model:
     z_scale: np.ndarray
     u_scale: np.ndarray
     force_scale: float
-    seen: Callable[[Place, int, int | None, dict[str, ca.SX]], SimpleNamespace]
+    seen: Callable[..., SimpleNamespace]
 
     @cached_property
     def rates(self) -> ca.SX:

@@ -128,7 +128,7 @@ class Laws:
             states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
-            s = self.response.model.seen(law.place, i, partner, states)
+            s = self.response.model.seen(law.place, i, partner, states, law.stage)
             new = law.update(s, p)
             s.__dict__.update(new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)

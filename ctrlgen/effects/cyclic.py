@@ -12,7 +12,6 @@ class Cyclic(Effect):
     """
 
     place = Place.SENSOR
-    stage = 1  # the fringes are of what the geometry before has bent
     several = True
     channel_unit = ("m", "rad")
     source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
