@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.noise import coloured, estimate
 from ctrlgen.diagnosis.pitches import pitches
 from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.read_off import read_off
+from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher, Trial
 from ctrlgen.diagnosis.spikes import alone
@@ -293,3 +294,16 @@ def test_what_bends_a_reading_is_delayed_afterwards():
     assert np.array_equal(*ends.values())
     bent = late + 2e3 * late**2
     assert np.abs(ends[delay, bow] - bent).max() < 0.02 * np.abs(bent - late).max()
+
+
+def test_lines_that_the_records_cannot_part_are_one():
+    fitter = fitter_of()
+    line = Hypothesis("vibration", "disturbance:axis", "axis")
+    once_more = replace(line, count=1)
+    span = max(r.time[-1] for r in fitter.to_fit)
+    for apart, parts in ((0.3, False), (0.8, True)):
+        start = {"amplitude": 1e-8, "phase": 0.0}
+        starts = tuple(start | {"frequency": f} for f in (40.0, 40.0 + apart / span))
+        fit = fitter.fit(Structure(AXIS, (line, once_more), starts), steps=0)
+        assert resolved(fitter.recording, fit) == parts
+        assert resolved(fitter.recording, fit, (line, once_more))

@@ -37,7 +37,7 @@ LAYERS = [
     "diagnosis.quiet diagnosis.spikes",
     "diagnosis.structure", "diagnosis.fit",
     "diagnosis.laws", "diagnosis.spread", "diagnosis.slopes", "diagnosis.together",
-    "diagnosis.screen diagnosis.adequacy", "diagnosis.search", "diagnosis.diagnosis", "diagnosis.read_off",
+    "diagnosis.screen diagnosis.adequacy diagnosis.resolved", "diagnosis.search", "diagnosis.diagnosis", "diagnosis.read_off",
     "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
     "diagnosis.empirical diagnosis.detectable diagnosis.profile diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
     "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",

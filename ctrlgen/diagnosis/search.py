@@ -15,6 +15,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
 
@@ -240,10 +241,11 @@ class Searcher:
             best = max([best, *(current.fit.objective - t.fit.objective for t in trials if self._meant(t))])
         return trials
 
-    @staticmethod
-    def _meant(trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
-        """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one."""
+    def _meant(self, trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
+        """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one, and is no double."""
         structure = trial.fit.structure
+        if not resolved(self.fitter.recording, trial.fit, accepted):
+            return False
         for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
             if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
                 continue

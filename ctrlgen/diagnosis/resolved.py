@@ -1,0 +1,54 @@
+"""Whether the records can tell two lines of one kind apart: fringes of two periods, vibrations of two frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ctrlgen.diagnosis.fit import Fit
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.recording import Recording
+
+APART = 0.5  # periods by which two lines must part over what the records to fit cover: nearer, they only beat as one
+
+
+def resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()) -> bool:
+    """Whether every two causes of one kind at one place part; those `accepted` are not compared with one another."""
+    causes = fit.structure.causes
+    for j, k in combinations(range(len(causes)), 2):
+        a, b = causes[j], causes[k]
+        if a.effect == PARAMETER or not a.law.several or (a.effect, a.location) != (b.effect, b.location):
+            continue
+        if a in accepted and b in accepted:
+            continue
+        lines = [_line(fit, i) for i in (j, k)]
+        if abs(lines[0] - lines[1]) * _covered(recording, a) < APART:
+            return False
+    return True
+
+
+def _line(fit: Fit, k: int) -> float:
+    """Periods a second, or a unit of the path, of cause k; zero for one that has none."""
+    values = fit.values(k)
+    for p in fit.structure.causes[k].law.params:
+        if p.unit == "Hz":
+            return values[p.name]
+        if p.seen == "pitches":
+            return 1 / values[p.name]
+    return 0.0
+
+
+def _covered(recording: Recording, cause: Hypothesis) -> float:
+    """The longest of the records to fit [s], or how far its reading goes in them [SI]; no end where neither is meant."""
+    records = [r for r in recording.records if r.role == "fit"]
+    params = cause.law.params
+    if any(p.unit == "Hz" for p in params):
+        return max(float(r.time[-1] - r.time[0]) for r in records)
+    channel = f"reading.{cause.at}"
+    if not any(p.seen == "pitches" for p in params) or channel not in recording.channels:
+        return np.inf
+    i = recording.channels.index(channel)
+    read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
+    return float(np.ptp(read)) if len(read) else np.inf
