@@ -296,14 +296,14 @@ def test_what_bends_a_reading_is_delayed_afterwards():
     assert np.abs(ends[delay, bow] - bent).max() < 0.02 * np.abs(bent - late).max()
 
 
-def test_lines_that_the_records_cannot_part_are_one():
+def test_fringes_that_the_records_cannot_part_are_one():
+    """They must part by half a period over the path that was read."""
     fitter = fitter_of()
-    line = Hypothesis("vibration", "disturbance:axis", "axis")
-    once_more = replace(line, count=1)
-    span = max(r.time[-1] for r in fitter.to_fit)
-    for apart, parts in ((0.3, False), (0.8, True)):
-        start = {"amplitude": 1e-8, "phase": 0.0}
-        starts = tuple(start | {"frequency": f} for f in (40.0, 40.0 + apart / span))
-        fit = fitter.fit(Structure(AXIS, (line, once_more), starts), steps=0)
-        assert resolved(fitter.recording, fit) == parts
-        assert resolved(fitter.recording, fit, (line, once_more))
+    fringe = Hypothesis("cyclic", "sensor:axis", "axis")
+    once_more = replace(fringe, count=1)
+    path = max(float(np.ptp(r.observed)) for r in fitter.to_fit)
+    for apart, part in ((0.3, False), (0.8, True)):
+        starts = tuple({"amplitude": 1e-8, "phase": 0.0, "period": path / periods} for periods in (5.0, 5.0 + apart))
+        fit = fitter.fit(Structure(AXIS, (fringe, once_more), starts), steps=0)
+        assert resolved(fitter.recording, fit) == part
+        assert resolved(fitter.recording, fit, (fringe, once_more))
