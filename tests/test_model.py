@@ -3,10 +3,10 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import effect_device
+from conftest import SCENARIOS, effect_device
 from scipy.linalg import expm
 
-from ctrlgen import InputError, build_model, simulate
+from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.devices.mems_hexapod import matrices
 from ctrlgen.linearisation import equilibrium, linearise
 from ctrlgen.physics import thermal_actuator, xy_stage
@@ -182,3 +182,17 @@ def test_two_effects_of_one_kind_keep_their_own_states():
     creep = {"kind": "creep", "gain": "0.1", "tau": "1 s"}
     model = build_model(effect_device({**creep, "at": "1X"}, {**creep, "at": "all"}))
     assert len(model.x_names) == 6 + 1 + 6 and len(set(model.x_names)) == 13
+
+
+@pytest.mark.parametrize("measures", ["reading", "displacement"])
+def test_a_loop_is_closed_on_what_it_measures(tmp_path, measures):
+    """A sensor that reads 10 % too much misleads the controller that reads it, and no other."""
+    text = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
+    loop = 'position_gain = "60 1/s"\nvelocity_gain = "20 V/(m/s)"\nintegral_gain = "5e4 V/(m*s)"\n'
+    ends = []
+    for effect in ("", '\n[[effect]]\nkind = "sensor_gain"\nat = "axis"\ngain = "10 %"\n'):
+        (tmp_path / "device.toml").write_text(f'{text}\n[loop]\nmeasures = "{measures}"\n{loop}{effect}')
+        model = build_model(load_device(tmp_path / "device.toml"))
+        ends.append(simulate(model, np.full((4000, 1), 1e-5), 1e-3).signals["displacement"][-1, 0])
+    assert ends[0] == pytest.approx(1e-5, rel=1e-3)
+    assert ends[1] == pytest.approx(1e-5 / 1.1 if measures == "reading" else 1e-5, rel=1e-3)
