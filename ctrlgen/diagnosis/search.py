@@ -1,7 +1,7 @@
 """Steps 7 and 8: fit the suspects jointly with the device, add the one that explains most, drop what is not needed, swap.
 
-Structures are compared by T = objective on the records to fit + BIC's price of their numbers + whitened squares on the
-held-out records, where nothing was fitted, + twice the rarity of their causes: among equals the plainer one is named.
+Structures are compared by T = objective on the records to fit + BIC's price of their numbers + -2 ln of how likely they make
+the held-out records, where nothing was fitted, + twice the rarity of their causes: among equals the plainer one is named.
 A cause is added only if the record shows it beyond what chance does anywhere among all hypotheses, if it is material (a
 tenth of the noise), and if the held-out records gain.
 """
@@ -39,7 +39,7 @@ CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One structure fitted, with its whitened squares on the held-out records and its total T."""
+    """One structure fitted, with `held`, its -2 ln likelihood on the held-out records (`Fitter.held_out`), and its total T."""
 
     fit: Fit
     held: float
