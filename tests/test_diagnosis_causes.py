@@ -13,7 +13,7 @@ from ctrlgen.diagnosis.adequacy import judge
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.noise import coloured, estimate
-from ctrlgen.diagnosis.pitches import pitches
+from ctrlgen.diagnosis.pitches import jumps, pitches
 from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.resolved import resolved
@@ -213,6 +213,33 @@ def test_a_pitch_is_found_that_is_a_thousandth_of_the_path():
     assert first == pytest.approx(pitch, rel=1e-4)
     assert pitches(path, noise) == ()
     assert pitches(np.ones(50), noise[:50]) == ()
+
+
+@pytest.mark.parametrize("place", [-6e-6, 1.5e-6, 1.1e-5])
+def test_a_reading_that_jumps_at_a_place_is_found_there(place):
+    """A straight ramp of 60 nm over 0.2 um, in a path of 40 um."""
+
+    def stitched(y):
+        return y + 6e-8 * np.clip((y - place) / 2e-7 + 0.5, 0, 1)
+
+    fitter = fitter_of(after=stitched)
+    assert np.ptp(fitter.to_fit[0].observed) > 2.5e-5
+    error = Hypothesis("stitching_error", "sensor:axis", "axis")
+    start = Screen(fitter, [error]).run(fitter.fit(Structure(AXIS))).suspects[0].start
+    fit = fitter.fit(Structure(AXIS).with_cause(error, start))
+    found = {u.name: value for u, value in zip(fit.structure.unknowns, fit.theta, strict=True)}
+    assert found["offset"] == pytest.approx(6e-8, rel=0.05)
+    beside = np.sort(fitter.to_fit[0].observed[:, 0] - place)
+    near = beside[beside < -1e-7][-1], beside[beside > 1e-7][0]  # the last reading before the ramp, the first beyond
+    assert near[0] < found["position"] - place < near[1] and np.ptp(near) < 1e-6
+    assert fit.chi2 < 1.1 * fit.n
+
+
+def test_what_has_no_jump_suggests_no_jump_of_note():
+    path = 4e-5 * np.sin(np.arange(4000) / 130)
+    step = np.where(path > 1.3e-5, 2e-9, 0.0)
+    assert jumps(path, step + 1e-4 * path)[0] == pytest.approx(1.3e-5, abs=4e-7)
+    assert jumps(np.ones(50), np.zeros(50)) == ()
 
 
 def test_what_moves_at_rest_is_no_noise():

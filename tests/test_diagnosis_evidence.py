@@ -19,9 +19,10 @@ from ctrlgen.diagnosis.free import free
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.lines import lines
 from ctrlgen.diagnosis.noise import Noise, estimate
-from ctrlgen.diagnosis.profile import BOUNDED, profiles, sandwich_over_model
+from ctrlgen.diagnosis.profile import BOUNDED, profiles
 from ctrlgen.diagnosis.proposal import files
 from ctrlgen.diagnosis.response import Response
+from ctrlgen.diagnosis.scatter import deviations, sandwich_over_model
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.structure import Structure
@@ -278,7 +279,9 @@ def test_noise_with_memory_taken_as_white_widens_the_interval():
         fitter = axis_fitter(white=white)
         assert len(fitter.noise.ar[0]) == 0
         fit = fitter.fit(Structure(AXIS).with_cause(DRIFT, {"rate": 1e-9}))
-        ratios.append(sandwich_over_model(fitter, fit)[-1])
+        ratios.append(sandwich_over_model(fit)[-1])
+        widened = deviations(fit)[-1] / np.sqrt(fit.covariance[-1, -1])
+        assert widened == (1.0 if white is None else ratios[-1])
         (found,) = profiles(fitter, fit)
         width = found.ci95[1] - found.ci95[0]
         assert width > 1.9 * 1.96 * np.sqrt(fit.covariance[-1, -1]) * 1e6 * max(ratios[-1] / 1.25, 1)

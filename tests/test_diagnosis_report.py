@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY
 from ctrlgen.diagnosis.job import diagnose_into, unfinished
 from ctrlgen.diagnosis.page import Provenance, page
 from ctrlgen.diagnosis.pictures import POINTS, thinned
+from ctrlgen.diagnosis.profile import BOUNDED, Profile
 from ctrlgen.diagnosis.record import as_dict, plain
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.words import gathered, interval, next_steps, sentence
@@ -243,13 +244,13 @@ def test_the_page_shows_whatever_evidence_there_is(found):
     part = {"label": "reading.axis", "excess": 4.0, "ci95": (3.0, 5.0)}
     nominal = {"output": [part], "direction": {"axis": [{**part, "label": "forward"}]}, "said": ["more below 1 Hz"]}
     where = {"nominal": nominal, "left": {"said": []}}
-    profile = {
-        "effect": "creep", "location": "stage:axis", "parameter": "tau", "value": 0.2, "ci95": (0.1, 0.3), "unit": "s",
-        "points": ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)),
-    }  # fmt: skip
+    profile = Profile(
+        "effect[0].tau", "creep", "stage:axis", "tau", 0.2, (0.1, 0.3), "s", ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)), BOUNDED,
+        True, None,
+    )  # fmt: skip
     experiment = {"drive": "multisine", "duration": {"value": 20.0, "unit": "s"}}
     told = replace(
-        found, where=where, next_experiment=experiment, history=({"was": "before"},), extra={"profiles": (profile,)},
+        found, where=where, next_experiment=experiment, history=({"was": "before"},), extra={}, profiles=(profile,),
         detectable={"drift": {"value": float("nan"), "unit": "nm/s"}},
     )  # fmt: skip
     text = page(told, Provenance({}, 0))

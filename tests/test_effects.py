@@ -63,7 +63,7 @@ def place_of(effect: type[Effect]) -> tuple[dict, list[Where]]:
     raise AssertionError(f"{effect.kind} acts on no device that is known here")
 
 
-SUGGESTED = {"moments": (0.3, 1.0, 3.0)}
+SUGGESTED = {"moments": (0.3, 1.0, 3.0), "places": (-0.3, 0.1, 0.6)}
 
 
 def shapes(effect: type[Effect], where: Where) -> list[dict[str, float]]:

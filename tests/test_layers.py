@@ -36,10 +36,10 @@ LAYERS = [
     "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise diagnosis.pitches diagnosis.journal diagnosis.descent "
     "diagnosis.quiet diagnosis.spikes",
     "diagnosis.structure", "diagnosis.fit",
-    "diagnosis.laws", "diagnosis.spread", "diagnosis.slopes", "diagnosis.together",
+    "diagnosis.laws diagnosis.scatter", "diagnosis.spread diagnosis.profile", "diagnosis.slopes", "diagnosis.together",
     "diagnosis.screen diagnosis.adequacy diagnosis.resolved", "diagnosis.search", "diagnosis.diagnosis", "diagnosis.read_off",
     "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
-    "diagnosis.empirical diagnosis.detectable diagnosis.profile diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
+    "diagnosis.empirical diagnosis.detectable diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
     "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",
     "diagnosis.writeback diagnosis.picture_maps diagnosis.picture_sure", "diagnosis.pictures", "diagnosis.page",
     "diagnosis.bootstrap", "diagnosis.job", "batch",

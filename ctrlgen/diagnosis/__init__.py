@@ -20,6 +20,7 @@ from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses, nominal_links
 from ctrlgen.diagnosis.journal import Journal
 from ctrlgen.diagnosis.noise import estimate
+from ctrlgen.diagnosis.profile import profiles
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher
@@ -82,10 +83,11 @@ def _diagnose(
     seen = read_off(fitter, found)
     said = verdict(found, after, bool(noise.known.all()), bool(seen))
     step("evidence")
+    sure = profiles(fitter, found.chosen.fit)
     beside = evidence(fitter, found, after.passed, seed)
     return Diagnosis(
         verdict=said,
-        findings=(*findings(found), *seen),
+        findings=(*findings(found, sure), *seen),
         held_out=errors(fitter, found, noise.known),
         adequacy=after,
         where=beside.where,
@@ -97,6 +99,7 @@ def _diagnose(
         recording=fitter.recording,
         search=found,
         fitter=fitter,
+        profiles=sure,
         extra=beside.extra,
     )
 

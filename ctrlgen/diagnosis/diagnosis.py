@@ -12,6 +12,8 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import Adequacy
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.profile import Profile
+from ctrlgen.diagnosis.scatter import deviations
 from ctrlgen.diagnosis.search import Search
 from ctrlgen.diagnosis.structure import Structure, changed
 from ctrlgen.recording import Recording
@@ -72,6 +74,7 @@ class Diagnosis:
     recording: Recording
     search: Search
     fitter: Fitter
+    profiles: tuple[Profile, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -80,7 +83,7 @@ class Diagnosis:
 
         A device written in Python has no file: this is what to put into its code.
         """
-        return values(self.search.chosen.fit)
+        return values(self.search.chosen.fit, self.profiles)
 
     @cached_property
     def corrected(self) -> Device:
@@ -120,24 +123,27 @@ def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, Chann
     return found
 
 
-def values(fit: Fit) -> dict[str, Estimate]:
-    """Every unknown of a fit, in its reader's unit. An amplitude is known no better than its law's form is right."""
-    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if len(fit.theta) else np.zeros(0)
-    found = {}
-    for unknown, value, s in zip(fit.structure.unknowns, fit.theta, sd, strict=True):
+def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
+    """Every unknown of a fit, in its reader's unit. An amplitude is known no better than its law's form is right, and no
+    number better than its profile says."""
+    found, profiled = {}, {p.path: p for p in profiles}
+    for unknown, value, s in zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
         if unknown.amplitude and cause.effect != PARAMETER:
             s = np.hypot(s, cause.law.rough * (value - unknown.nominal))
         ends = (value, max(value - CI * s, unknown.low), min(value + CI * s, unknown.high))
-        shown = [float(from_si(v, unknown.unit)) for v in ends]
-        found[unknown.path] = Estimate(shown[0], (shown[1], shown[2]), unknown.unit)
+        value, low, high = (float(from_si(v, unknown.unit)) for v in ends)
+        if unknown.path in profiled:
+            below, above = profiled[unknown.path].ci95
+            low, high = min(low, below), max(high, above)
+        found[unknown.path] = Estimate(value, (low, high), unknown.unit)
     return found
 
 
-def findings(search: Search) -> tuple[Finding, ...]:
+def findings(search: Search, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
     """The causes of the chosen structure with intervals and rivals, the most important first."""
     fit, rows = search.chosen.fit, []
-    estimates = values(fit)
+    estimates = values(fit, profiles)
     for k, cause in enumerate(fit.structure.causes):
         number = cause.path.rpartition(".")[2]
         parameters = {

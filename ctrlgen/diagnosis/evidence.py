@@ -11,7 +11,6 @@ from ctrlgen.diagnosis.along import along
 from ctrlgen.diagnosis.detectable import detectable
 from ctrlgen.diagnosis.experiment import Experiment, next_experiment
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.profile import profiles
 from ctrlgen.diagnosis.proposal import files
 from ctrlgen.diagnosis.search import Round, Search, Trial
 from ctrlgen.diagnosis.unknown import unknown
@@ -23,7 +22,7 @@ REST = 1.1  # noise: what is left above it is looked into although causes were f
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """`where`, `detectable`, `next_experiment`, `history` and `extra` (profiles, unknown, files of the next experiment)
+    """`where`, `detectable`, `next_experiment`, `history` and `extra` (unknown, files of the next experiment)
     as plain numbers and words, in the reader's units."""
 
     where: dict[str, Any]
@@ -44,7 +43,7 @@ def evidence(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> 
 
     before = [along(fitter, nominal, record) for record in records]
     after = before if chosen is nominal else [along(fitter, chosen, record) for record in records]
-    extra: dict[str, Any] = {"profiles": plain(profiles(fitter, chosen)), "unknown": None, "files": {}}
+    extra: dict[str, Any] = {"unknown": None, "files": {}}
     if not explained:
         extra["unknown"] = plain(unknown(fitter, chosen, after))
     experiment = next_experiment(fitter, search, explained, seed)

@@ -35,7 +35,8 @@ START_SIZE = 0.3  # of a state's typical size: how far a record may start from r
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A fitted structure. `theta` the unknowns [SI], `starts` what each record to fit starts with; `chi2` of the
-    readings alone, over `n` usable samples; `J` whitened slopes with the prior's rows, by unknowns, then starts."""
+    readings alone, over `n` usable samples; `residual` and `J` the whitened residual and its slopes by the unknowns, then
+    the starts: rows of the readings of records of `shapes` (samples, channels), then of the prior."""
 
     structure: Structure
     theta: np.ndarray
@@ -45,6 +46,7 @@ class Fit:
     residual: np.ndarray
     J: np.ndarray
     penalty: float
+    shapes: tuple[tuple[int, int], ...] = ()
 
     @property
     def objective(self) -> float:
@@ -372,5 +374,5 @@ class _Problem:
         return Fit(
             self.structure, values[: self.k], tuple(starts), float(readings @ readings), usable, rows,
             J / self.by_inner(values),
-            float(rows[n_readings:] @ rows[n_readings:]),
+            float(rows[n_readings:] @ rows[n_readings:]), tuple(r.observed.shape for r in self.records),
         )  # fmt: skip

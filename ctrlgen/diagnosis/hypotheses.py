@@ -27,8 +27,8 @@ HALF = 0.49  # of the sampling rate: frequencies beyond look like lower ones, an
 class Seen:
     """What the records show at one place, SI: the `most` that the signal ("channel"), the displacement ("travel") and its
     rate ("travel/s") reach, and a part of the records' time ("s"): a limit beyond shows nowhere. `suggested`: frequencies
-    ("lines") that stand out of what is left over, paths after which it repeats ("pitches"), times between which it may
-    change ("moments")."""
+    ("lines") that stand out of what is left over, paths after which it repeats ("pitches"), places of the path at which it
+    jumps ("places"), times between which it may change ("moments")."""
 
     most: dict[str, float] = field(default_factory=dict)
     suggested: dict[str, tuple[float, ...]] = field(default_factory=dict)

@@ -12,6 +12,7 @@ from ctrlgen.diagnosis.diagnosis import Diagnosis, Finding
 from ctrlgen.diagnosis.hypotheses import PARAMETER, numbers, written
 from ctrlgen.diagnosis.pictures import draw_all
 from ctrlgen.diagnosis.record import as_dict
+from ctrlgen.diagnosis.scatter import deviations
 from ctrlgen.diagnosis.words import gathered, hard, interval, next_steps, number, plain_name, sentence
 from ctrlgen.report import render
 from ctrlgen.units import show
@@ -105,9 +106,8 @@ def _changed(diagnosis: Diagnosis) -> list[dict[str, str]]:
     fit = diagnosis.search.chosen.fit
     known = {path: q for path, _, q in numbers(diagnosis.device)}
     rows = []
-    for i, (unknown, value) in enumerate(zip(fit.structure.unknowns, fit.theta, strict=True)):
+    for unknown, value, sd in zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
-        sd = float(np.sqrt(max(fit.covariance[i, i], 0.0)))
         own = cause is None or cause.effect == PARAMETER
         if own and abs(value - unknown.nominal) > NEGLIGIBLE * sd:
             spread = show(sd, unknown.unit, 2) if np.isfinite(sd) and unknown.unit not in ("degC", "degF") else ""

@@ -123,7 +123,7 @@ def _percent(value: float) -> str:
 
 def draw_profiles(diagnosis: Diagnosis) -> Figure | None:
     """How the objective rises when one number is held elsewhere and the others are fitted again."""
-    profiles = [p for p in plain(diagnosis.extra.get("profiles")) or [] if len(p["points"]) > 2][:PROFILES]
+    profiles = [p for p in plain(diagnosis.profiles) if len(p["points"]) > 2][:PROFILES]
     if not profiles:
         return None
     columns = min(3, len(profiles))

@@ -1,4 +1,4 @@
-"""Along the path: after which ways what is left over repeats, as fringes, teeth and screws do."""
+"""Along the path: after which ways what is left over repeats, as fringes, teeth and screws do, and where it jumps."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ FINER = 4  # padding: the way is then right to a sixteenth of a period over the 
 SLOW = 20  # periods in the path: longer ways are in the grids
 SURE = 1e-4  # p of one so conspicuous anywhere where nothing repeats
 MOST = 3
+NEAR = 512  # cells for jumps: both sides of a place are compared over SIDE of them
+SIDE = 16
 
 
 def pitches(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
@@ -29,3 +31,21 @@ def pitches(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     found, _ = find_peaks(spectrum[first:last], height=np.log((last - first) / SURE), distance=2 * FINER)
     best = found[np.argsort(-spectrum[first + found])][:MOST]
     return tuple(float(FINER * span / (first + k)) for k in best)
+
+
+def jumps(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
+    """The places [path's unit] at which the mean of `left` (n,) on both sides differs most, apart from its usual slope."""
+    span = float(np.ptp(path))
+    if span == 0:
+        return ()
+    cell = np.minimum(((path - path.min()) / span * NEAR).astype(int), NEAR - 1)
+    count = np.bincount(cell, minlength=NEAR)
+    total = np.bincount(cell, weights=left, minlength=NEAR)
+    read = np.flatnonzero(count)
+    mean = np.interp(np.arange(NEAR), read, total[read] / count[read])
+    sums = np.concatenate([[0.0], np.cumsum(mean)])
+    step = (sums[2 * SIDE :] - 2 * sums[SIDE:-SIDE] + sums[: -2 * SIDE]) / SIDE
+    step = np.abs(step - np.median(step))
+    found, _ = find_peaks(np.concatenate([[0.0], step, [0.0]]), distance=SIDE)
+    best = (found - 1)[np.argsort(-step[found - 1])][:MOST]
+    return tuple(float(path.min() + (k + SIDE) / NEAR * span) for k in best)

@@ -2,8 +2,7 @@
 
 Profile: the objective with one number held at distance t and all others fitted again; in a well-behaved problem it rises
 by (t/sd)^2. The 95 % interval ends where it has risen by 1.96^2; where it never does, the data do not bound the number.
-Sandwich: H^-1 B H^-1, B the sum of squared scores over blocks of time, holds where the residual is not as white as the
-noise model says (W. K. Newey, K. D. West, Econometrica 55 (1987) 703, with blocks); the larger interval is given.
+Where the residual is not as white as the noise model says, the interval is widened as the sandwich of `scatter` is.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter, _Problem
 from ctrlgen.diagnosis.hypotheses import PARAMETER
+from ctrlgen.diagnosis.scatter import DISAGREES, sandwich_over_model
 from ctrlgen.units import from_si
 
 FIRST = 2.0  # standard deviations at which the profile is looked at
@@ -22,9 +22,6 @@ STEEP = 1.4  # times the quadratic rise, above which the others are fitted once 
 OVERSHOT, SECANTS = 1.5, 4  # of CI, beyond which the end is looked for again, so many times at most
 COST = 2e7  # samples x states x slopes that all profiles together may take
 ADEQUATE = 2.0  # squares over the noise's, above which the objective is no likelihood and only the sandwich speaks
-BLOCKS = 40  # of the sandwich
-FEWEST_BLOCKS = 3  # times the free numbers: fewer blocks say nothing
-DISAGREES = 1.25  # sandwich over model deviation, above which the noise model is not believed
 BOUNDED, ABOVE, BELOW, FLAT = (
     "bounded", "not bounded above by these data", "not bounded below by these data", "not bounded by these data",
 )  # fmt: skip
@@ -32,10 +29,12 @@ BOUNDED, ABOVE, BELOW, FLAT = (
 
 @dataclass(frozen=True)
 class Profile:
-    """One number of one finding in `unit`: `ci95` the larger of profile and sandwich; `points` (value, rise of the
-    objective); `shape` says whether both sides are bounded; `verified` whether the profile was looked at or only its
-    curvature; the sandwich's deviation over the model's, None where there are too few samples for it."""
+    """One number of one finding, at `path` in the corrected device, in `unit`: `ci95` the larger of profile and sandwich;
+    `points` (value, rise of the objective); `shape` says whether both sides are bounded; `verified` whether the profile was
+    looked at or only its curvature; the sandwich's deviation over the model's, None where there are too few samples for it.
+    """
 
+    path: str
     effect: str
     location: str
     parameter: str
@@ -53,7 +52,7 @@ def profiles(fitter: Fitter, fit: Fit) -> tuple[Profile, ...]:
     if not fit.structure.causes:
         return ()
     surface = _Surface(fitter, fit)
-    ratio = sandwich_over_model(fitter, fit)
+    ratio = sandwich_over_model(fit)
     return tuple(_profile(surface, fit, i, ratio) for i, u in enumerate(fit.structure.unknowns) if u.cause is not None)
 
 
@@ -69,7 +68,7 @@ def _profile(surface: _Surface, fit: Fit, i: int, ratio: np.ndarray | None) -> P
     name = (cause.path if cause.effect == PARAMETER else unknown.path).rpartition(".")[2]
     shown = [float(from_si(x, unknown.unit)) for x in (value, *ends)]
     return Profile(
-        cause.effect, cause.location, name, shown[0], (shown[1], shown[2]), unknown.unit,
+        unknown.path, cause.effect, cause.location, name, shown[0], (shown[1], shown[2]), unknown.unit,
         tuple((float(from_si(x, unknown.unit)), float(rise)) for x, rise in points), shape[low.bounded, high.bounded],
         low.verified and high.verified, None if ratio is None else float(ratio[i]),
     )  # fmt: skip
@@ -161,25 +160,3 @@ class _Surface:
         self.left -= 1
         r, _ = self.problem.evaluate(x)
         return float(r @ r)
-
-
-def sandwich_over_model(fitter: Fitter, fit: Fit) -> np.ndarray | None:
-    """Per unknown, the deviation by block scores over that by curvature; None where there are too few blocks."""
-    n_y, lengths = len(fitter.recording.channels), [len(r.time) for r in fitter.to_fit]
-    size = max(sum(lengths) // BLOCKS, 1)
-    scale = np.linalg.norm(fit.J, axis=0)
-    scale[scale == 0] = 1.0
-    J, first, scores = fit.J / scale, 0, []
-    for n in lengths:
-        for a in range(0, n, size):
-            rows = slice(first + a * n_y, first + min(a + size, n) * n_y)
-            scores.append(J[rows].T @ fit.residual[rows])
-        first += n * n_y
-    k = len(fit.theta)
-    if len(scores) < FEWEST_BLOCKS * k:
-        return None
-    s, prior = np.array(scores), J[first:]
-    inverse = np.linalg.pinv(J.T @ J, rcond=1e-14)
-    B = (s - s.mean(axis=0)).T @ (s - s.mean(axis=0)) * len(s) / (len(s) - 1) + prior.T @ prior
-    sandwich = np.diag(inverse @ B @ inverse)[:k]
-    return np.sqrt(np.maximum(sandwich, 0.0) / np.maximum(np.diag(inverse)[:k], 1e-300))

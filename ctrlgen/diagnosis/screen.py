@@ -21,7 +21,7 @@ from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
 from ctrlgen.diagnosis.laws import Column, Peaks, peaks
-from ctrlgen.diagnosis.pitches import pitches
+from ctrlgen.diagnosis.pitches import jumps, pitches
 from ctrlgen.diagnosis.slopes import Slopes, Sums
 from ctrlgen.diagnosis.together import Suspect, Together
 from ctrlgen.effect import Place
@@ -89,13 +89,12 @@ class Screen:
         """What the records show at each place, after what `fit` explains."""
         if self.peaks is None:
             self.peaks = peaks(self.fitter, fit)
-        most, repeating = self.peaks, self._pitches(fit)
+        most, along = self.peaks, self._along_path(fit)
         moments, part = self._moments()
         common = {"lines": self._lines(fit), "moments": moments}
 
         def at(place: Place, i: int) -> Seen:
-            here = common | {"pitches": repeating[place, i]} if (place, i) in repeating else common
-            return Seen(most.get((place, i), {}) | {"s": part}, here)
+            return Seen(most.get((place, i), {}) | {"s": part}, common | along.get((place, i), {}))
 
         return at
 
@@ -121,8 +120,9 @@ class Screen:
         best = peaks[np.argsort(-power[peaks])[:LINES]]
         return tuple(float(f) for f in np.sort(best) / (ZEROS * len(left) * records[k].sample_time))
 
-    def _pitches(self, fit: Fit) -> dict[tuple[Place, int], tuple[float, ...]]:
-        """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does."""
+    def _along_path(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
+        """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does, and the
+        places at which it jumps most."""
         records = self.fitter.to_fit
         if self.fitter.recording.kind == "poses" or not records:
             return {}
@@ -131,7 +131,10 @@ class Screen:
         names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         return {
-            (Place.SENSOR, names.index(name)): pitches(record.observed[good, i], left[good, i])
+            (Place.SENSOR, names.index(name)): {
+                "pitches": pitches(record.observed[good, i], left[good, i]),
+                "places": jumps(record.observed[good, i], left[good, i]),
+            }
             for i, name in read
             if name in names and np.any(good := record.valid[:, i] & np.isfinite(left[:, i]))
         }

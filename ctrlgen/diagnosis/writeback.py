@@ -19,6 +19,7 @@ from tomlkit.items import AoT, Item, Table
 from ctrlgen._version import __version__
 from ctrlgen.diagnosis.diagnosis import UNEXPLAINED, Diagnosis
 from ctrlgen.diagnosis.hypotheses import PARAMETER, numbers
+from ctrlgen.diagnosis.scatter import deviations
 from ctrlgen.diagnosis.structure import Unknown
 from ctrlgen.diagnosis.words import HARD_SPACE, channel_sentence, hard, sentence
 from ctrlgen.files import read_text, write_text
@@ -38,8 +39,7 @@ def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
 def next_text(diagnosis: Diagnosis, original: str) -> str:
     """The text of the device file `original` with the findings in it."""
     fit = diagnosis.search.chosen.fit
-    sds = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if len(fit.theta) else np.zeros(0)
-    found = list(zip(fit.structure.unknowns, fit.theta, sds, strict=True))
+    found = list(zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True))
     document = tomlkit.parse(original)
     changed = _change_numbers(document, diagnosis, found)
     effects = _effects(diagnosis, found)
