@@ -323,6 +323,20 @@ def test_what_bends_a_reading_is_delayed_afterwards():
     assert np.abs(ends[delay, bow] - bent).max() < 0.02 * np.abs(bent - late).max()
 
 
+def test_fringes_count_in_what_a_bowed_scale_says():
+    bow, fringe = Hypothesis("bow", "sensor:axis", "axis"), Hypothesis("cyclic", "sensor:axis", "axis")
+    starts = {"curvature": 1e3}, {"amplitude": 3e-8, "period": 2e-6, "phase": 0.3}
+    both = Structure(AXIS, (bow, fringe), starts)
+    fitter = fitter_of()
+    plain = (
+        Structure(AXIS).responses(fitter.recording, {})[H, False].outputs(fitter.to_fit[0], Structure(AXIS).start)[:, 0]
+    )
+    read = both.responses(fitter.recording, {})[H, False].outputs(fitter.to_fit[0], both.start)[:, 0]
+    said = plain + 1e3 * plain**2
+    assert np.abs(said - plain).max() > 1e-7  # a twentieth of a fringe
+    assert read == pytest.approx(said + 3e-8 * np.sin(2 * np.pi * said / 2e-6 + 0.3), abs=1e-13)
+
+
 def test_fringes_that_the_records_cannot_part_are_one():
     """They must part by half a period over the path that was read."""
     fitter = fitter_of()
