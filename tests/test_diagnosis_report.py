@@ -15,7 +15,8 @@ from conftest import SCENARIOS
 
 import ctrlgen
 from ctrlgen.cli import execute
-from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, Estimate
+from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, Estimate, Finding
+from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.job import diagnose_into, unfinished
 from ctrlgen.diagnosis.page import Provenance, page
 from ctrlgen.diagnosis.pictures import POINTS, thinned
@@ -25,6 +26,8 @@ from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.words import gathered, interval, next_steps, sentence
 from ctrlgen.diagnosis.writeback import next_text
 from ctrlgen.effect import Effect
+from ctrlgen.effects.quantisation import Quantisation
+from ctrlgen.effects.saturation import Saturation
 from ctrlgen.units import from_si
 
 AXIS, MESO = SCENARIOS / "devices" / "flexure_axis.toml", SCENARIOS / "devices" / "meso_hexapod.toml"
@@ -175,6 +178,28 @@ def test_the_next_device_states_the_deviations_of_the_fit(found, tmp_path):
     stated = dict(device.quantities())
     for unknown, variance in zip(fit.structure.unknowns, np.diag(fit.covariance), strict=True):
         assert stated[unknown.path].sd == pytest.approx(np.sqrt(variance), rel=0.01), unknown.path
+
+
+def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(found, tmp_path, monkeypatch):
+    """A saturation clips or does not: its share is not fitted, and is written all the same; so are steps of a converter."""
+    for law in (Saturation, Quantisation):
+        monkeypatch.setitem(Effect.library, law.kind, law)
+    clip = Hypothesis("saturation", "actuator:axis", "axis")
+    trial = found.search.chosen
+    structure = trial.fit.structure.with_cause(clip, {"share": 1.0, "level": 2.0})
+    fit = found.fitter.fit(structure, steps=0)
+    steps = {"share": Estimate(1.0, (1.0, 1.0), "1"), "quantum": Estimate(0.01, (0.01, 0.01), "um")}
+    read = Finding("quantisation", "sensor:axis", steps, (), 0.0, "", Hypothesis("quantisation", "sensor:axis", "axis"))
+    told = replace(
+        found,
+        findings=(*found.findings, read),
+        search=replace(found.search, chosen=replace(trial, fit=fit)),
+    )
+    (tmp_path / "next.toml").write_text(next_text(told, AXIS.read_text()))
+    device = ctrlgen.load_device(tmp_path / "next.toml")
+    assert [e.kind for e in device.effect] == ["creep", "saturation", "quantisation"]
+    assert device.effect[1].values["share"].si == 1.0 and device.effect[1].values["level"].si == pytest.approx(2.0)
+    assert device.effect[2].values["quantum"].si == pytest.approx(1e-8)
 
 
 def test_an_effect_that_is_there_already_stays_and_the_new_one_follows(creeping, tmp_path):

@@ -11,13 +11,13 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import Adequacy
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, written
 from ctrlgen.diagnosis.profile import Profile
 from ctrlgen.diagnosis.scatter import deviations
 from ctrlgen.diagnosis.search import Search
 from ctrlgen.diagnosis.structure import Structure, changed
 from ctrlgen.recording import Recording
-from ctrlgen.units import difference, from_si
+from ctrlgen.units import difference, from_si, to_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 
@@ -87,11 +87,19 @@ class Diagnosis:
 
     @cached_property
     def corrected(self) -> Device:
-        """The device with all that was found in it, as device.next.toml describes it."""
+        """The device with all that was found in it, as device.next.toml describes it; what was read off stands last."""
         fit = self.search.chosen.fit
         own = {u.path: float(v) for u, v in zip(fit.structure.unknowns, fit.theta, strict=True) if u.cause is None}
         starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
-        return changed(Structure(fit.structure.device, fit.structure.causes, starts).described, own)
+        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).described, own)
+        beside = [f for f in self.findings if f.cause not in fit.structure.causes]
+        read = [
+            f.cause.law(
+                f.cause.at, {n: written(float(to_si(e.value, e.unit)), e.unit) for n, e in f.parameters.items()}
+            )
+            for f in beside
+        ]
+        return device.model_copy(update={"effect": (*device.effect, *read)})
 
 
 def verdict(search: Search, after: Adequacy, known: bool, seen: bool = False) -> str:

@@ -35,7 +35,8 @@ VAGUE = 5.0  # times as much may be the form of another law where a cause may as
 ABLE = 0.25  # of what a cause takes away: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
 MOSTLY = (
-    0.9  # of the excess over the noise: where less than three causes take it away, the rest is looked for from there
+    0.9  # of the excess over the noise: where less than three causes take it away, the rest of a series is looked for
+    # from there
 )
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
 
@@ -225,7 +226,7 @@ class Searcher:
         best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
         excess, trials = current.fit.objective - self.n_fit, []
         for size in (2, 3, 4):
-            if size > 2 and best > MOSTLY * excess:
+            if size > 2 and best > MOSTLY * excess and self.fitter.recording.kind == "series":
                 break
             tried, used = 0, {}
             enough = best + max(self._need(current, screened), 0.05 * (excess - best))

@@ -97,16 +97,18 @@ def _toml(value: str | dict[str, Any]) -> str:
 
 
 def _effects(diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]) -> list[dict[str, Any]]:
-    """One table a cause that is an effect; numbers as {value, sd} where the record holds them."""
-    structure, tables = diagnosis.search.chosen.fit.structure, []
-    for k, cause in enumerate(structure.causes):
-        if cause.effect == PARAMETER:
+    """One table an effect that was found; numbers as {value, sd} where the record holds them."""
+    fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in found}, []
+    for k, effect in enumerate(diagnosis.corrected.effect):
+        if k < len(diagnosis.device.effect):
             continue
-        table: dict[str, Any] = {"kind": cause.effect, "at": cause.at} | ({"of": cause.of} if cause.of else {})
-        for unknown, value, sd in found:
-            if unknown.cause == k:
+        table: dict[str, Any] = {"kind": effect.kind, "at": effect.at} | ({"of": effect.of} if effect.of else {})
+        for name, number in effect.values.items():
+            table[name] = number.text
+            if (path := f"effect[{k}].{name}") in fitted:
+                unknown, value, sd = fitted[path]
                 shown, spread = _within(value, unknown), _written_sd(sd, unknown.unit)
-                table[unknown.path.rpartition(".")[2]] = {"value": shown, "sd": spread} if spread else shown
+                table[name] = {"value": shown, "sd": spread} if spread else shown
         tables.append(table)
     return tables
 
