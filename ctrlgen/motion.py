@@ -11,10 +11,12 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from ctrlgen.exponential import steps_of
 from ctrlgen.model import Model
 
+CHAINED = 3  # memories on memories on heaters whose power depends on their temperature
 SETTLED = 14.0  # time constants: e^-14 is a millionth
 
 
@@ -46,7 +48,8 @@ def next_sample(model: Model, sample_time: float, linear: bool = False, newton_s
 
 
 def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = 4) -> ca.SX:
-    """The displacement that balances the forces at `x` and `u`, by Newton's method from model.z; one step if linear."""
+    """The displacement that balances the forces at `x`, a function of z or not, and `u`, by Newton's method from model.z; one
+    step if linear."""
     g = ca.substitute(ca.substitute(model.balance, model.x, x), model.u, u)
     slope = ca.jacobian(g, model.z)
     diagonal = slope.sparsity().is_diag()
@@ -58,15 +61,18 @@ def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = 4) -> ca.SX:
 
 
 def _settle(model: Model, u: ca.SX, newton_steps: int) -> tuple[ca.SX, ca.SX]:
-    """Actuators, then displacement, then memories at rest under `u`."""
+    """Actuators and memories at rest under `u`, as the displacement has it, and the displacement that balances with them."""
     rates = ca.substitute(model.rates, model.u, u)
     A = ca.jacobian(rates, model.x)
-    x, z = model.x, model.z
-    for _ in range(2):  # memories rest on the displacement, which rests on the actuators
-        slope, rate = (ca.substitute(ca.substitute(e, model.x, x), model.z, z) for e in (A, rates))
-        moved = [_rested(slope, rate, i, x) for i in range(model.x.numel())]
-        x = ca.vertcat(ca.SX(0, 1), *moved)
-        z = balanced(model, x, u, newton_steps)
+    x, groups = model.x, _together(A)
+    for _ in range(CHAINED):
+        slope, rate = (ca.substitute(e, model.x, x) for e in (A, rates))
+        moved = ca.SX(x)
+        for group in groups:
+            moved[group] = x[group] - ca.solve(slope[group, group], rate[group])
+        x = moved
+    z = balanced(model, x, u, newton_steps)
+    x = ca.substitute(x, model.z, z)
     for i in model.clocks:
         x[i] = model.x[i] + 1.0
     for i, value in model.stepped.items():
@@ -74,9 +80,14 @@ def _settle(model: Model, u: ca.SX, newton_steps: int) -> tuple[ca.SX, ca.SX]:
     return x, z
 
 
-def _rested(slope: ca.SX, rate: ca.SX, i: int, x: ca.SX) -> ca.SX:
-    own = slope[i, i]
-    return x[i] if own.is_zero() else x[i] - rate[i] / own
+def _together(A: ca.SX) -> list[list[int]]:
+    """The states that come to rest, those together that act on one another (the two of a second-order filter)."""
+    sparsity = A.sparsity()
+    acts = np.zeros(A.shape, dtype=bool)
+    acts[sparsity.row(), sparsity.get_col()] = True
+    count, label = connected_components(acts, connection="strong")
+    groups = [np.flatnonzero(label == k).tolist() for k in range(count)]
+    return [g for g in groups if len(g) > 1 or acts[g[0], g[0]]]
 
 
 def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) -> tuple[ca.SX, ca.SX]:

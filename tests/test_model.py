@@ -9,6 +9,7 @@ from scipy.linalg import expm
 from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.devices.mems_hexapod import matrices
 from ctrlgen.linearisation import equilibrium, linearise
+from ctrlgen.motion import next_sample
 from ctrlgen.physics import thermal_actuator, xy_stage
 
 POSE = np.array([0, 0, 0, 5e-6, -3e-6, 20e-6])
@@ -32,6 +33,24 @@ def test_the_steady_state_is_the_static_model_written_out_by_hand(device, model)
     assert np.abs(settled.signals["force"][-1] - F).max() < 1e-12  # N, of 0.1 N
     assert np.abs(settled.signals["displacement"][-1] - d).max() < 0.01 * NM  # 9 digits of K_t above
     assert np.abs(settled.signals["pose"][-1] - pose)[3:].max() < 0.01 * NM
+
+
+def test_a_settled_pose_is_where_a_long_simulation_ends():
+    """With memories in pairs (a second-order filter), in chains (creep behind the heaters) and all at once (crosstalk)."""
+    effects = (
+        {"kind": "low_pass", "at": "delta_z", "share": "1", "tau": "20 ms", "damping": "0.7"},
+        {"kind": "creep", "at": "1X", "gain": "0.05", "tau": "30 ms"},
+        {"kind": "heat_crosstalk", "at": "all", "share": "0.02"},
+    )
+    model = build_model(effect_device(*effects))
+    P = np.linspace(0.05, 0.3, 6)
+    long = simulate(model, np.tile(P, (800, 1)), 1e-3)  # 26 of the longest time constants
+    one = next_sample(model, np.inf)
+    f = ca.Function("settled", [model.x, model.z, one.u_next, model.p], [one.x, one.z])
+    x, z = model.rest, long.signals["displacement"][-1]
+    x, z = f(x, z, P, model.p_nominal)
+    read = ca.Function("read", [model.x, model.z, model.u, model.p], [model.signals["reading"].expr])
+    assert np.abs(read(x, z, P, model.p_nominal).full().ravel() - long.signals["reading"][-1])[3:].max() < 1e-3 * NM
 
 
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 2e-2])
