@@ -10,7 +10,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.fit import Fit
 
-BLOCKS = 40  # of the sandwich
+BLOCKS = 40  # of the sandwich, or more for many numbers
 FEWEST_BLOCKS = 3  # times the free numbers: fewer blocks say nothing
 DISAGREES = (
     1.25  # sandwich over model deviation, above which the noise model is not believed: 40 blocks know it within 11 %
@@ -28,7 +28,8 @@ def deviations(fit: Fit) -> np.ndarray:
 
 def sandwich_over_model(fit: Fit) -> np.ndarray | None:
     """Per unknown, the deviation by block scores over that by curvature; None where there are too few blocks."""
-    size = max(sum(n for n, _ in fit.shapes) // BLOCKS, 1)
+    k = len(fit.theta)
+    size = max(sum(n for n, _ in fit.shapes) // max(BLOCKS, FEWEST_BLOCKS * k), 1)
     scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
     J, first, scores = fit.J / scale, 0, []
@@ -37,7 +38,6 @@ def sandwich_over_model(fit: Fit) -> np.ndarray | None:
             rows = slice(first + a * n_y, first + min(a + size, n) * n_y)
             scores.append(J[rows].T @ fit.residual[rows])
         first += n * n_y
-    k = len(fit.theta)
     if len(scores) < FEWEST_BLOCKS * k:
         return None
     s, prior = np.array(scores), J[first:]
