@@ -104,7 +104,8 @@ def place_is_right(location: str, truth: dict[str, Any]) -> tuple[bool, bool]:
 
 @dataclass
 class Judgement:
-    """One case. `named`: (truth, name given or 'none'); `covered`: (name, parameter, inside); `places`: (channel, place) right."""
+    """One case. `named`: (truth, name given or 'none'); `covered`: (name, parameter, inside); `places`: (channel, place) right;
+    `bands`: whether a line's frequency lies in the band with the largest excess."""
 
     case: str
     kind: str
@@ -117,6 +118,7 @@ class Judgement:
     admitted: bool = False
     named: list[tuple[str, str]] = field(default_factory=list)
     places: list[tuple[bool, bool]] = field(default_factory=list)
+    bands: list[bool] = field(default_factory=list)
     covered: list[tuple[str, str, bool]] = field(default_factory=list)
     ratio: float | None = None
     seconds: float | None = None
@@ -162,6 +164,8 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
             left.remove(hit)
             j.places.append(place_is_right(_location(hit, truth), truth))
             j.covered += _covered(hit, truth)
+    if [t["name"] for t in truths] == ["vibration"]:  # other laws have no band of their own
+        j.bands = [_in_band(diagnosis.get("where", {}), truths[0]["shape"]["frequency"])]
     left = [f for f in left if not any(_harmonic(f, t) for t in truths)]
     spare = [f for f in left if not any(_among(f, t) for t in truths)]
     j.named += [("nothing", f["effect"]) for f in spare]
@@ -181,6 +185,13 @@ def _among(finding: dict[str, Any], truth: dict[str, Any], own: bool = False) ->
     """Whether an alternative of the finding is right (or, with `own`, the finding itself)."""
     rivals = [*finding.get("alternatives", []), *([finding] if own else [])]
     return any(is_right(r["effect"], r.get("location", ""), truth) for r in rivals)
+
+
+def _in_band(where: dict[str, Any], frequency: float) -> bool:
+    """Whether the band with the largest excess over the noise, before any correction, holds the frequency [Hz]."""
+    bands = where.get("nominal", {}).get("band", [])
+    largest = max(bands, key=lambda b: b["excess"] or 0.0, default={"low": math.inf, "high": -math.inf})
+    return largest["low"] <= frequency <= largest["high"]
 
 
 def _harmonic(finding: dict[str, Any], truth: dict[str, Any]) -> bool:

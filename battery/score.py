@@ -130,6 +130,7 @@ def table(judged: Sequence[Judgement]) -> list[Row]:
         _share("outside the library, 'unexplained'", [j.abstained for j in of("outside")], ">= 95 %", 0.95),
         _share("location, output or actuator", [c for c, _ in places], ">= 95 %", 0.95),
         _share("location, place", [p for _, p in places], ">= 85 %", 0.85),
+        _share("location, band of a line", [b for j in judged for b in j.bands], ">= 85 %", 0.85),
         _share("coverage of 95 % intervals", [c[2] for c in covered], "90-98 %", 0.90, 0.98),
         _share("coverage, autocorrelated noise", [c[2] for c in colour], "90-98 %", 0.90, 0.98),
         _number("held-out error / floor, median", ratios, 0.5, "<= 1.05", 1.05),

@@ -260,6 +260,17 @@ def test_sets_of_two_spare_names_and_places():
     assert judged(finding(truth, location="stage:2X")).places == [(False, True)]
 
 
+@pytest.mark.parametrize("frequency, right", [(47.0, True), (200.0, False)])
+def test_a_line_is_looked_for_in_the_band_with_the_largest_excess(frequency, right):
+    line = {"name": "vibration", "location": "disturbance:axis", "amplitude": 1.0, "shape": {"frequency": frequency}}
+    answer = {"case": "x", "class": "single", "planted": [line]}
+    bands = [{"low": 1.0, "high": 20.0, "excess": 0.1}, {"low": 20.0, "high": 100.0, "excess": 3.0}]
+    told = {"verdict": "explained", "findings": [], "where": {"nominal": {"band": bands}}}
+    assert judge.judge(answer, told).bands == [right]
+    assert judge.judge(answer, told | {"where": {}}).bands == [False]
+    assert judge.judge(answer | {"planted": [line, ANSWERS[0]]}, told).bands == []
+
+
 def test_a_crash_counts_against(tmp_path):
     j = judge.judge({"case": "x", "class": "clean", "planted": []}, None)
     assert j.alarmed and measured([j])["crashed, refused or out of time"].hits == 1
