@@ -8,6 +8,7 @@ import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.job import diagnose_into, unfinished
 from ctrlgen.diagnosis.page import Provenance, page
-from ctrlgen.diagnosis.pictures import POINTS, thinned
+from ctrlgen.diagnosis.pictures import POINTS, _density, thinned
 from ctrlgen.diagnosis.profile import BOUNDED, Profile
 from ctrlgen.diagnosis.record import as_dict, plain
 from ctrlgen.diagnosis.response import Response
@@ -316,6 +317,14 @@ def test_a_long_curve_keeps_its_peaks():
     y[31_234], y[100] = 40.0, np.nan
     x, thin = thinned(np.arange(50_000.0), y)
     assert len(x) <= 2 * POINTS and np.max(thin) == 40.0 and x[np.argmax(thin)] == 31_234 and np.all(np.diff(x) > 0)
+
+
+def test_the_spectrum_of_a_short_stretch_behind_a_long_lead_in_is_that_of_the_stretch():
+    """White noise of 3 nm at 1 kHz has the density 3 sqrt(2/1000) nm/sqrt(Hz), wherever in the record it is judged."""
+    white = np.concatenate([np.full(3100, np.nan), 3.0 * np.random.default_rng(1).standard_normal(1200)])[:, None]
+    left = SimpleNamespace(records=[SimpleNamespace(time=np.arange(4300) * 1e-3, sample_time=1e-3)])
+    f, density = _density(left, [white], [0], 0)
+    assert np.sqrt(np.mean(density[f > 20] ** 2)) == pytest.approx(3 * np.sqrt(2e-3), rel=0.1)
 
 
 def test_notes_alike_are_said_once():

@@ -45,7 +45,7 @@ def draw_where(diagnosis: Diagnosis) -> Figure | None:
         panel.axvline(0.0, color="#666666", lw=0.8)
         more = f", the {len(rows)} largest of {len(found)}" if len(rows) < len(found) else ""
         panel.set_title(name + more, fontsize=9, loc="left")
-    axes[-1, 0].set_xlabel("what is left, in squares over the noise's: 0 nothing, 1 as much again as the noise")
+    axes[-1, 0].set_xlabel("squares over the noise's: 0 nothing, 1 as much again as the noise")
     return figure
 
 

@@ -20,6 +20,7 @@ FIGURE_WIDTH = 8.6
 SUSPECTS = 8  # in the confusability matrix
 LABEL = 26  # characters of a label before it is broken
 PROFILES = 9
+WIDEST = 300.0  # percent: intervals are shown so far
 FOUND, ALIKE, WORSE = COLOURS[0], COLOURS[2], "#b0b0b0"
 
 
@@ -106,10 +107,10 @@ def draw_intervals(diagnosis: Diagnosis) -> Figure | None:
     for k, (_, (low, high)) in enumerate(rows):
         panel.plot([low, high], [k, k], color=FOUND, lw=3, solid_capstyle="butt")
         panel.plot(100, k, "o", color=FOUND, ms=6)
-        _beside(panel, max(high, 100), k, f"{_percent(low - 100)} ... {_percent(high - 100)}")
+        _beside(panel, min(max(high, 100), WIDEST), k, f"{_percent(low - 100)} ... {_percent(high - 100)}")
     panel.set_yticks(range(len(rows)), [label for label, _ in rows], fontsize=8)
     panel.set_ylim(len(rows) - 0.5, -0.5)
-    low, high = min(0.0, *(e[0] for _, e in rows)), max(100.0, *(e[1] for _, e in rows))
+    low, high = max(min(0.0, *(e[0] for _, e in rows)), -WIDEST), min(max(100.0, *(e[1] for _, e in rows)), WIDEST)
     panel.set_xlim(low - 0.03 * (high - low), high + 0.3 * (high - low))
     panel.axvline(0.0, color="#666666", lw=1)
     panel.set_xlabel("95 % interval in percent of the value found")

@@ -121,7 +121,7 @@ def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def draw_spectrum(left: Residuals) -> Figure | None:
     """Amplitude density of what is left, before and after, and of the noise; None for poses and short records."""
-    records = [k for k, r in enumerate(left.records) if len(r.time) >= 64]
+    records = [k for k, part in enumerate(left.before) if min(len(_judged(y)) for y in part.T) >= 64]
     if left.settled or not records:
         return None
     n = len(left.recording.channels)
@@ -147,15 +147,21 @@ def draw_spectrum(left: Residuals) -> Figure | None:
     return figure
 
 
+def _judged(values: np.ndarray) -> np.ndarray:
+    """From the first to the last sample that counts: without the lead-in."""
+    seen = np.flatnonzero(np.isfinite(values))
+    return values[seen[0] : seen[-1] + 1] if len(seen) else values[:0]
+
+
 def _density(left: Residuals, parts: list[np.ndarray], records: list[int], i: int) -> tuple[np.ndarray, np.ndarray]:
     """Welch's amplitude density over the held-out records of the longest one's sample time; marked samples count as zero."""
     longest = max(records, key=lambda k: len(left.records[k].time))
     h = left.records[longest].sample_time
     alike = [k for k in records if left.records[k].sample_time == h]
-    size = min(SEGMENT, *(len(left.records[k].time) for k in alike))
+    stretches = [_judged(parts[k][:, i]) for k in alike]
+    size = min(SEGMENT, *map(len, stretches))
     total, weight = 0.0, 0
-    for k in alike:
-        values = np.nan_to_num(parts[k][:, i])
+    for values in map(np.nan_to_num, stretches):
         f, power = welch(values, 1 / h, nperseg=size, detrend=False)
         total, weight = total + len(values) * power, weight + len(values)
     edges = np.geomspace(f[1], f[-1], max(2, int(BANDS * np.log10(f[-1] / f[1]))))

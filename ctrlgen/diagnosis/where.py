@@ -8,6 +8,7 @@ bands by chi^2. The coordinates that carry the excess in the fewest numbers say 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 
 import numpy as np
 from scipy import signal, stats
@@ -200,7 +201,9 @@ class _Maps:
                 mask = np.zeros(self.n, bool)
                 mask[first + part] = True
                 unit = "" if a.settled else " s"
-                cells.append((f"{a.record.name}: {t[part[0]]:.4g} ... {t[part[-1]]:.4g}{unit}", mask))
+                cells.append(
+                    (f"{PurePosixPath(a.record.name).name}: {t[part[0]]:.4g} ... {t[part[-1]]:.4g}{unit}", mask)
+                )
             first += n
         return cells
 
