@@ -16,6 +16,8 @@ from ctrlgen.model import Model
 
 SUBSTEP = 0.8  # step times the fastest nominal eigenvalue; what is not linear is then right to 1e-3 of itself
 FASTEST = 5.0  # eigenvalue times sample time beyond which a lag is over within a sample, and exact
+STIFFENED = 1.2  # times faster where the stage is far out than at home: it touches something
+CONTACT = 0.25  # step times the fastest eigenvalue there: an impact of some milliseconds is right to 1e-3
 REVERSING = 0.2  # the same where a reversal takes no time: what friction does is then right to 2 % of itself
 REVERSALS = 4  # steps a sample at least, for the same reason
 MOST_SUBSTEPS = 16
@@ -34,7 +36,7 @@ class Steps:
     LEAST = 1
 
     def __init__(self, model: Model, sample_time: float, A: np.ndarray, longest: float) -> None:
-        self.count = max(substeps(A, sample_time, longest), self.LEAST)
+        self.count = max(substeps(A, sample_time, longest), self.LEAST, contact_steps(model, sample_time))
         self.h = sample_time / self.count
         self.A = _sparse(A)
         rest = self._rest(model)
@@ -182,13 +184,24 @@ def _sparse(M: np.ndarray) -> ca.DM:
     return ca.sparsify(ca.DM(np.where(np.abs(M) < 1e-300, 0.0, M)))
 
 
-def home_slope(model: Model, moving: float = 0.0) -> np.ndarray:
+def contact_steps(model: Model, sample_time: float) -> int:
+    """Steps a sample that stay stable where the nominal stage is at either end of its typical travel, if it is stiffer there."""
+    first = model.x.numel() - model.v.numel()
+    home, *ends = (
+        np.abs(np.linalg.eigvals(home_slope(model, away=away)[first:, first:])).max(initial=0.0)
+        for away in (1e-3, 1.0, -1.0)
+    )
+    fastest = max(ends)
+    return int(min(np.ceil(sample_time * fastest / CONTACT), MOST_SUBSTEPS)) if fastest > STIFFENED * home else 1
+
+
+def home_slope(model: Model, moving: float = 0.0, away: float = 1e-3) -> np.ndarray:
     """df/dy of the nominal model near home, the drive held, where a law with a corner at home is on one side of it; at
-    standstill or `moving` at so many typical speeds."""
+    standstill or `moving` at so many typical speeds, `away` by so many typical displacements."""
     state = ca.vertcat(model.x, model.z)
     A = ca.jacobian(ca.vertcat(model.sampled_rates, model.v), state)
     at = ca.Function("A", [state, model.held, model.u, model.p, model.ambient_symbol], [A])
-    here = np.concatenate([model.rest, 1e-3 * model.z_scale])
+    here = np.concatenate([model.rest, away * model.z_scale])
     first = model.x.numel() - model.v.numel()
     here[first : model.x.numel()] += moving * model.x_scale[first:]
     return at(here, 0, 0, model.p_nominal, 0).full()

@@ -112,3 +112,21 @@ def test_bristles_bend_by_dahls_law(tmp_path):
     found, _ = simulated(rubbing(force, reach), ramp, tmp_path)
     held = MOTOR * ramp[100:] - STIFFNESS * found[101:]
     assert held == pytest.approx(force * (1 - np.exp(-found[101:] / reach)), rel=0.02)  # but for its inertia
+
+
+@pytest.mark.parametrize("stiffness, share", [(5e5, 0.01), (5e6, 0.01), (2e7, 0.02)])
+def test_an_impact_is_stable_and_right_to_a_hundredth_of_itself(tmp_path, stiffness, share):
+    """Hertz's contact 20 um out, up to a hundred times as stiff as the flexures: its period is half a sample."""
+    gap, soft = 20e-6, 1e-3 * 100e-6  # the device's typical travel is 100 um
+    text = f"kind = 'end_stop'\nstiffness = '{stiffness} N/m'\ngap = '20 um'\npower = '1.5'"
+    drive = 0.6 * DRIVES["several frequencies"]
+    found, steps = simulated(text, drive, tmp_path)
+
+    def touching(z, v, b):
+        x = max(z - gap, 0.0)
+        return -stiffness * x**2 / (x + soft) * np.sqrt(1 + x / soft), 0.0
+
+    exact, free = stepped(touching, drive, 200), stepped(nothing, drive, 200)
+    assert np.ptp(free) > 3 * gap and exact.max() < 1.5 * gap
+    assert np.sqrt(np.mean((found - exact) ** 2)) < share * np.sqrt(np.mean((exact - free) ** 2))
+    assert isinstance(steps, exponential.Exponential)
