@@ -1,12 +1,15 @@
 """A frame tilted about x against the drawing."""
 
+import casadi as ca
+
 from ctrlgen.effect import Effect, Param, Place
 
 
 class FrameTiltX(Effect):
-    """A frame turned by alpha about x: Delta delta_y = -alpha delta_z, Delta delta_z = alpha delta_y.
+    """A frame turned by alpha about x: Delta delta_y = (cos alpha - 1) delta_y - sin alpha delta_z, Delta delta_z =
+    (cos alpha - 1) delta_z + sin alpha delta_y.
 
-    The same holds for theta. First order in alpha; the error is alpha^2/2 of the motion.
+    The same holds for theta. At one channel, its axis alone is turned.
     """
 
     place = Place.POSE
@@ -16,4 +19,6 @@ class FrameTiltX(Effect):
 
     def term(self, s, p):
         across = {1: -s.all[2], 2: s.all[1], 4: -s.all[5], 5: s.all[4]}
-        return p.angle * across.get(s.index, 0.0)
+        if s.index not in across:
+            return 0.0
+        return ca.sin(p.angle) * across[s.index] + (ca.cos(p.angle) - 1) * s.value

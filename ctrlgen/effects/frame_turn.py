@@ -1,12 +1,15 @@
 """A platform frame turned against the drawing: one direction leaks into another."""
 
+import casadi as ca
+
 from ctrlgen.effect import Effect, Param, Place
 
 
 class FrameTurn(Effect):
-    """A frame turned by gamma about z: Delta delta_x = -gamma delta_y, Delta delta_y = gamma delta_x.
+    """A frame turned by gamma about z: Delta delta_x = (cos gamma - 1) delta_x - sin gamma delta_y, Delta delta_y =
+    (cos gamma - 1) delta_y + sin gamma delta_x.
 
-    The same holds for theta. First order in gamma; the error is gamma^2/2 of the motion.
+    The same holds for theta. At one channel, its axis alone is turned.
     """
 
     place = Place.POSE
@@ -16,4 +19,6 @@ class FrameTurn(Effect):
 
     def term(self, s, p):
         across = {0: -s.all[1], 1: s.all[0], 3: -s.all[4], 4: s.all[3]}
-        return p.angle * across.get(s.index, 0.0)
+        if s.index not in across:
+            return 0.0
+        return ca.sin(p.angle) * across[s.index] + (ca.cos(p.angle) - 1) * s.value
