@@ -130,7 +130,7 @@ class Searcher:
             better = [t for t in trials if self._justified(current, t)]
             if not better:
                 break
-            current = self._prune(self._swap(self._polished(self._plainest(better))))
+            current = self._prune(self._swap(self._best(better)))
             if frozenset(current.fit.structure.causes) in visited:
                 break
             visited.add(frozenset(current.fit.structure.causes))
@@ -161,6 +161,12 @@ class Searcher:
         c_held = max(best.held / max(self.n_held, 1), 1.0)
         gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
         return gained - SLACK * (self.n_fit * (1 - 1 / c_fit) + self.n_held * (1 - 1 / c_held))
+
+    def _best(self, better: list[Trial]) -> Trial:
+        """The plainest, once it and what is no worse so far are fitted to their end."""
+        first = self._plainest(better)
+        alike = [t for t in better if t is not first and self._ahead(first, t) <= 0]
+        return self._plainest(sorted(map(self._polished, [first, *alike[:ENDED]]), key=lambda t: t.total))
 
     def _plainest(self, better: list[Trial]) -> Trial:
         """The best trial, or one of as few numbers that is no worse beyond the slack and is less rare."""

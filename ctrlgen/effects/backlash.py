@@ -15,6 +15,7 @@ class Backlash(Effect):
 
     place = Place.DISPLACEMENT
     stage = 1
+    rough = 0.01  # of itself: reversals between samples are placed so well
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash"
     params = (Param("gap", "travel", (0.0, 1.0), "whole play", off=0.0, grid=(1e-4, 1e-3, 0.01, 0.1), level=True),)
     states = (
