@@ -143,26 +143,30 @@ def test_a_start_that_is_far_off_is_begun_again_near_off():
 
 
 @pytest.mark.parametrize(
-    "first, lost, sure, doubtful",
+    "first, lost, fitted, sure, doubtful",
     [
-        ("hysteresis", 0.3, 50.0, True),  # a law of hysteresis leaves a fiftieth of itself, 0.4 of 1000 squares
-        ("hysteresis", 0.5, 50.0, False),
-        ("drive_gain", 0.3, 50.0, False),  # a gain leaves nothing
-        ("hysteresis", 9.0, 1.5, True),  # where it may be nothing, a tenth of itself, 10 squares
-        ("hysteresis", 11.0, 1.5, False),
-        ("drive_gain", 0.05, 1.5, False),
+        ("hysteresis", 0.3, 0.3, 50.0, True),  # a law of hysteresis leaves a fiftieth of itself, 0.4 of 1000 squares
+        ("hysteresis", 0.5, 0.5, 50.0, False),
+        ("hysteresis", 0.3, 100.0, 50.0, False),  # a tenth of what was fitted is no matter of form
+        ("drive_gain", 0.3, 0.3, 50.0, False),  # a gain leaves nothing
+        ("hysteresis", 9.0, 9.0, 1.5, True),  # where it may be nothing, a tenth of itself, 10 squares
+        ("hysteresis", 11.0, 11.0, 1.5, False),
+        ("drive_gain", 0.05, 0.05, 1.5, False),
     ],
 )
-def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, first, lost, sure, doubtful):
+def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, first, lost, fitted, sure, doubtful):
     at = "actuator:axis" if first == "drive_gain" else "stage:axis"
     begin = {"gain": 0.1} if first == "drive_gain" else {"stiffness": 1e4, "reach": 3e-5, "taper": 0.5}
     structure = Structure(AXIS).with_cause(Hypothesis(first, at, "axis"), begin)
     structure = structure.with_cause(LATE, {"gain": 1.0, "tau": 1.0})
     theta = structure.start
-    fit = Fit(structure, theta, (), 0.0, 1500, np.zeros(0), sure * np.eye(len(theta)), 0.0)
+
+    def fit(left):
+        return Fit(structure, theta, (), left, 1500, np.zeros(0), sure * np.eye(len(theta)), 0.0)
+
     searcher = Searcher(fitter_of(), Screen(fitter_of(), [LIMIT]), lambda _: None)
-    monkeypatch.setattr(searcher, "trial", lambda *_, **__: Trial(fit, 1000.0, 0.0))
-    assert searcher._doubtful(Trial(fit, lost, 0.0), Trial(fit, 0.0, 0.0), 1) == doubtful
+    monkeypatch.setattr(searcher, "trial", lambda *_, **__: Trial(fit(1000.0), 1000.0, 0.0))
+    assert searcher._doubtful(Trial(fit(fitted), lost, 0.0), Trial(fit(0.0), 0.0, 0.0), 1) == doubtful
 
 
 def test_a_place_has_one_form_of_hysteresis():

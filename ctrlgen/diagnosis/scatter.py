@@ -12,9 +12,7 @@ from ctrlgen.diagnosis.fit import Fit
 
 BLOCKS = 40  # of the sandwich, or more for many numbers
 FEWEST_BLOCKS = 3  # times the free numbers: fewer blocks say nothing
-DISAGREES = (
-    1.25  # sandwich over model deviation, above which the noise model is not believed: 40 blocks know it within 11 %
-)
+DISAGREES = 1.25  # sandwich over model deviation, above which the noise model is not believed: 40 blocks know 11 %
 
 
 def deviations(fit: Fit) -> np.ndarray:

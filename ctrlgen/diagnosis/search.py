@@ -35,10 +35,8 @@ SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences
 VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
 ABLE = 0.25  # of what a cause takes away: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
-MOSTLY = (
-    0.9  # of the excess over the noise: where less than three causes take it away, the rest of a series is looked for
-    # from there
-)
+NEARLY = 0.9  # of what the best cause takes away: what takes so much is fitted to its end before both are compared
+MOSTLY = 0.9  # of the excess: where one or two causes take it away, a series' others are sought from there
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
 
 
@@ -130,7 +128,7 @@ class Searcher:
             better = [t for t in trials if self._justified(current, t)]
             if not better:
                 break
-            current = self._prune(self._swap(self._best(better)))
+            current = self._prune(self._swap(self._best(current, better)))
             if frozenset(current.fit.structure.causes) in visited:
                 break
             visited.add(frozenset(current.fit.structure.causes))
@@ -162,11 +160,16 @@ class Searcher:
         gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
         return gained - SLACK * (self.n_fit * (1 - 1 / c_fit) + self.n_held * (1 - 1 / c_held))
 
-    def _best(self, better: list[Trial]) -> Trial:
-        """The plainest, once it and what is no worse so far are fitted to their end."""
+    def _best(self, current: Trial, better: list[Trial]) -> Trial:
+        """The plainest, once it and what takes away nearly as much so far are fitted to their end."""
         first = self._plainest(better)
-        alike = [t for t in better if t is not first and self._ahead(first, t) <= 0]
-        return self._plainest(sorted(map(self._polished, [first, *alike[:ENDED]]), key=lambda t: t.total))
+        near = self._near(current.fit.objective, first, [t for t in better if t is not first])
+        return self._plainest(sorted(map(self._polished, [first, *near]), key=lambda t: t.total))
+
+    def _near(self, without: float, best: Trial, others: list[Trial]) -> list[Trial]:
+        """The first of those that take away nearly as much of an objective as the best one."""
+        least = NEARLY * (without - best.fit.objective)
+        return [t for t in others if without - t.fit.objective >= least][:ENDED]
 
     def _plainest(self, better: list[Trial]) -> Trial:
         """The best trial, or one of as few numbers that is no worse beyond the slack and is less rare."""
@@ -291,8 +294,7 @@ class Searcher:
     def _swap(self, current: Trial) -> Trial:
         """Each earlier cause against what would be suspected in its place, now that the others are there."""
         for k in range(len(current.fit.structure.causes) - 1):
-            rivals = self._replacements(current, k)
-            for rival in (*(self._polished(t) for t in rivals[:ENDED]), *rivals[ENDED:]):
+            for rival in self._replacements(current, k):
                 plainer = len(rival.fit.structure.unknowns) < len(current.fit.structure.unknowns)
                 ahead = current.total - rival.total if plainer else self._ahead(rival, current)
                 if ahead > RIVAL and self._meant(rival, current.fit.structure.causes):
@@ -315,7 +317,8 @@ class Searcher:
         for s in able[:REPLACEMENTS]:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
             trials += self._attempt(others.with_cause(s.hypothesis, s.start), s.hypothesis)
-        return sorted(trials, key=lambda t: t.total)
+        near = self._near(bare.objective, current, sorted(trials, key=lambda t: t.total))
+        return sorted((self._polished(t) if t in near else t for t in trials), key=lambda t: t.total)
 
     def _screened(self, trial: Trial) -> Screened:
         key = frozenset(trial.fit.structure.causes)
@@ -333,22 +336,22 @@ class Searcher:
         return current
 
     def _doubtful(self, bare: Trial, current: Trial, k: int) -> bool:
-        """Whether cause k takes away no more than the form of another's law may leave of what that one takes away; more,
-        where k may be nothing (the 95 % interval of its amplitude reaches off)."""
+        """Whether cause k takes away no more than the form of another's law may leave of what that one takes away, of the
+        records to fit and of those held out (geometric mean); more, where k may be nothing (the 95 % interval of its
+        amplitude reaches off)."""
         fit, causes = current.fit, current.fit.structure.causes
         own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
         vague = bool(own) and all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
-        lost = bare.held - current.held
-        most = self.trial(
-            Structure(fit.structure.device), steps=40
-        ).held  # without one alone a fit may leave the numbers
+        lost = max(bare.held - current.held, 0.0) * max(bare.fit.objective - current.fit.objective, 0.0)
+        most = self.trial(Structure(fit.structure.device), steps=40)  # without one alone a fit may leave the numbers
         for j, other in enumerate(causes):
             rough = 0.0 if j == k or other.effect == PARAMETER else other.law.rough
             if rough:
                 neither = self.trial(_cooled(bare.fit).without(j - (j > k)))  # beside k another may take j's place
-                taken = min(neither.held, most) - bare.held
-                if lost < (rough * (VAGUE if vague else 1.0)) ** 2 * taken:
+                held = min(neither.held, most.held) - bare.held
+                fitted = min(neither.fit.objective, most.fit.objective) - bare.fit.objective
+                if lost < (rough * (VAGUE if vague else 1.0)) ** 4 * max(held, 0.0) * max(fitted, 0.0):
                     return True
         return False
 
