@@ -311,6 +311,27 @@ def test_numbers_that_the_fit_leaves_open_are_not_held_against_a_structure():
     assert fitter.held_out(fit) < fitter.held_out(off)
 
 
+def test_a_fit_is_judged_where_the_records_leave_its_numbers_and_by_what_it_fitted():
+    fitter = fitter_of()
+    fit = fitter.fit(Structure(AXIS))
+    assert judge(fitter, fit).passed
+    off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
+    assert not judge(fitter, off).passed
+    assert judge(fitter, replace(off, J=off.J / 1e4)).passed  # as if nothing were known of it
+    assert not judge(fitter, replace(fit, chi2=1.5 * fit.n)).passed  # what shows in the records to fit alone
+
+
+def test_a_reading_that_moves_with_the_surroundings_at_rest_is_no_noise():
+    rng = np.random.default_rng(3)
+    ambient = 0.5 * np.sin(np.arange(1500) * H / 0.4)
+    y = NOISE * rng.standard_normal(1500) + 4e-8 * ambient
+    for warmth, told in ((None, 4.0), (ambient, 1.0)):
+        still = replace(record(np.zeros(1500), y, "rest"), ambient=warmth)
+        recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), (still,), ())
+        floor = estimate(recording, SETTLING).floor[0] / NOISE
+        assert floor == pytest.approx(1.0, rel=0.05) if told == 1.0 else floor > 1.5
+
+
 def test_what_bends_a_reading_is_delayed_afterwards():
     delay, bow = Hypothesis("delay", "sensor:axis", "axis"), Hypothesis("bow", "sensor:axis", "axis")
     ends = {}

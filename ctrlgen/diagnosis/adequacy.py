@@ -1,7 +1,8 @@
 """Steps 3 and 9: does a structure leave anything over? Judged on the held-out records, and on what is left at rest.
 
-The squares that must be expected there are those of the noise and of what the fit could not know better,
-n + trace(J_h C J_h'), with C the covariance of the fitted numbers. At rest, where the noise was learnt, its size says
+The numbers are judged where the held-out records are most likely, at the price of how well the fit knows them: then the
+squares are those of the noise alone, also of a stage that drifts or saturates, where a little uncertainty goes far. At rest,
+where the noise was learnt, its size says
 nothing; but stationary noise leaves neither memory nor heavy tails after whitening, and a stage that moves by itself does.
 """
 
@@ -16,6 +17,7 @@ from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.noise import without_lines
 from ctrlgen.lattice import lattice
 
+STEPS = 8  # to where the held-out records are most likely, as the numbers are known
 RATIO = 1.10  # held-out error over what is expected: the gate of the design
 SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
 NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
@@ -45,13 +47,14 @@ class Adequacy:
 def judge(fitter: Fitter, fit: Fit) -> Adequacy:
     """Ratio per channel, Ljung-Box (memory), McLeod-Li (size that comes and goes), correlation with the drive."""
     n_y = len(fitter.recording.channels)
-    squares, expected = np.zeros(n_y), np.zeros(n_y)
+    moved, price, _ = fitter.as_known(fit, STEPS)
+    squares, expected = np.full(n_y, price / n_y), np.zeros(n_y)
     p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
     for record in fitter.held:
-        white = fitter.whitened(fit, record)
+        white = fitter.whitened(moved, record)
         usable = fitter.noise.usable(record.valid)
         squares += np.sum(white**2, axis=0)
-        expected += usable.sum(axis=0) + _spread(fitter, fit, record)
+        expected += usable.sum(axis=0)
         if fitter.recording.kind == "series":
             for i in range(n_y):
                 e = white[usable[:, i], i]
@@ -66,6 +69,9 @@ def judge(fitter: Fitter, fit: Fit) -> Adequacy:
     chance = min(1.0, n_y * min(map(float, stats.chi2.sf(squares / doubt**2, np.maximum(expected, 1.0)))))
     smallest["size"] = chance
     above = any(r > RATIO * d for r, d in zip(ratio, doubt, strict=True)) and chance < SMALL_SAMPLE
+    free = max(fit.n - len(fit.theta), 1)  # what shows in the records to fit alone is no less left out
+    smallest["fitted"] = float(stats.chi2.sf(fit.chi2 / max(doubt) ** 2, free))
+    above |= np.sqrt(fit.chi2 / free) > RATIO * max(doubt) and smallest["fitted"] < SMALL_SAMPLE
     restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
     return Adequacy(ratio, smallest, not (above or rejected or restless), restless)
 
@@ -83,16 +89,6 @@ def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
         if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESTLESS:
             return True
     return False
-
-
-def _spread(fitter: Fitter, fit: Fit, record: object) -> np.ndarray:
-    """trace(J_h C J_h') per channel."""
-    if not len(fit.theta):
-        return np.zeros(len(fitter.recording.channels))
-    response = fit.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
-    _, slopes = response.sensitivities(record, fit.theta)
-    J = np.nan_to_num(fitter.noise.whiten(slopes[:, :, : len(fit.theta)], record.valid))
-    return np.einsum("nip,pq,niq->i", J, fit.covariance, J, optimize=True)
 
 
 def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:

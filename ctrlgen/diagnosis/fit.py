@@ -226,29 +226,50 @@ class Fitter:
     def held_out(self, fit: Fit) -> float:
         """-2 ln of how likely the held-out records are, as the numbers are known from the records to fit.
 
-        |r(p + dp)|^2 + dp' C^-1 dp + ln det(I + C J'J), C the covariance of the numbers p, r and J the whitened residual and
-        its slopes there, dp the step that is most likely: numbers that the records to fit leave open are not held against
-        their structure, and earn it nothing. Without numbers, or where the step does not help, |r(p)|^2.
+        |r(p + dp)|^2 + dp' C^-1 dp + ln det(I + C J'J), see `as_known`: numbers that the records to fit leave open are not
+        held against their structure, and earn it nothing.
         """
-        plain, sd = self._held_squares(fit), np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+        moved, price, spread = self.as_known(fit)
+        return self._held_squares(moved) + price + spread
+
+    def as_known(self, fit: Fit, steps: int = 1) -> tuple[Fit, float, float]:
+        """The fit with its numbers p moved to where the held-out records are most likely, as p is known from the records to
+        fit, by at most so many steps of Gauss and Newton; the price dp' C^-1 dp; ln det(I + C J'J). C the covariance of p,
+        r and J the whitened residual and its slopes there. The fit itself, at no price, where no step helps.
+        """
+        sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
         if not len(sd) or not np.all((sd > 0) & np.isfinite(sd)):
-            return plain
+            return fit, 0.0, 0.0
+        C = fit.covariance / np.outer(sd, sd)
+        inverse, best = np.linalg.pinv(C, rcond=1e-12), (fit, 0.0, 0.0)
+        low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
+        least = self._held_squares(fit)
+        for k in range(steps):
+            b, H = self._held_slopes(best[0], sd)
+            spread = np.eye(len(sd)) + C @ H
+            if not np.isfinite(spread).all() or not np.isfinite(b).all():
+                break
+            if k == 0:
+                best = fit, 0.0, float(np.linalg.slogdet(spread)[1])
+            away = (best[0].theta - fit.theta) / sd
+            theta = np.clip(best[0].theta + sd * np.linalg.solve(spread, C @ b - away), low, high)
+            away, moved = (theta - fit.theta) / sd, replace(fit, theta=theta)
+            price = float(away @ inverse @ away)
+            total = self._held_squares(moved) + price
+            if total > least:
+                break
+            best, least = (moved, price, best[2]), total
+        return best
+
+    def _held_slopes(self, fit: Fit, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """J'r and J'J of the held-out records, J by the numbers in units of `sd`."""
         b, H = np.zeros(len(sd)), np.zeros((len(sd), len(sd)))
         for record in self.held:
             response = fit.structure.responses(self.recording, self.cache)[record.sample_time, record.linear]
             J = self.noise.whiten(response.sensitivities(record, fit.theta)[1][:, :, : len(sd)], record.valid) * sd
             J = J.reshape(-1, len(sd))
             b, H = b + J.T @ self.whitened(fit, record).ravel(), H + J.T @ J
-        C = fit.covariance / np.outer(sd, sd)
-        spread = np.eye(len(sd)) + C @ H
-        if not np.isfinite(spread).all() or not np.isfinite(b).all():
-            return plain
-        step = np.linalg.solve(spread, C @ b)
-        low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
-        moved = np.clip(fit.theta + sd * step, low, high)
-        away = (moved - fit.theta) / sd
-        squares = self._held_squares(replace(fit, theta=moved)) + float(away @ np.linalg.pinv(C, rcond=1e-12) @ away)
-        return min(plain, squares) + float(np.linalg.slogdet(spread)[1])
+        return b, H
 
     def _held_squares(self, fit: Fit) -> float:
         return sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)

@@ -104,7 +104,7 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
     moving = [r for r in recording.records if r.role != "rest"]
     rounding = lattice(np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])) / np.sqrt(12.0)
     samples = {
-        "a record at rest": (1, [r.observed[r.valid[:, i], i] for r in recording.records if r.role == "rest"]),
+        "a record at rest": (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
         "repeated periods": (1, [e for r in moving for e in _repeats(r, i)]),
         "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
     }
@@ -121,6 +121,16 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
     sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), rounding, 1e-300)  # 1 + 9 + 9 + 1: third differences
     said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
     return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST, True
+
+
+def _at_rest(record: Record, i: int) -> np.ndarray:
+    """The valid readings of a channel without what goes with the recorded surroundings: that has a cause, and is no noise."""
+    good = record.valid[:, i]
+    y = record.observed[good, i]
+    if record.ambient is None or not len(y):
+        return y
+    T = record.ambient[good] - np.mean(record.ambient[good])
+    return y - T * (T @ y) / (T @ T) if T @ T > 0 else y
 
 
 def _flat(part: np.ndarray, degree: int) -> np.ndarray:
