@@ -121,6 +121,7 @@ def test_recordings_in_a_list_of_their_own_are_joined(jobs, tmp_path):
     assert task.name == "j--run0+run1" and len(task.recordings) == 2
 
 
+@pytest.mark.long
 def test_a_batch_that_is_stopped_goes_on_where_it_was(jobs, tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "ctrlgen", "batch", str(jobs), "--out", str(out), "--jobs", "1"]

@@ -217,6 +217,7 @@ def test_the_workspace_of_any_device_is_mapped_by_one_command(tmp_path, name, ac
     assert len(json.loads((out / "workspace.json").read_text())["alone"]) == 3
 
 
+@pytest.mark.long
 def test_a_workspace_is_sliced_where_it_is_asked_for(tmp_path):
     rrr = SCENARIOS / "devices" / "rrr_case2.toml"
     out = tmp_path / "w"
@@ -234,6 +235,7 @@ def test_an_expectation_out_of_range_gives_a_non_zero_status(scenario, tmp_path)
     assert done.returncode == 1 and "force.1X.max" in done.stdout and "out of tolerance" in done.stdout
 
 
+@pytest.mark.long
 def test_reproduce_prints_rows_as_a_table_and_as_json(tmp_path):
     done = ctrlgen("reproduce", "S1", "--out", tmp_path / "page.html")
     assert done.returncode == 0 and "reciprocity" in done.stdout
