@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from conftest import SCENARIOS
 
+import ctrlgen
 from ctrlgen import build_model, exponential, load_device, simulate
 
 AXIS = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
@@ -130,3 +132,16 @@ def test_an_impact_is_stable_and_right_to_a_hundredth_of_itself(tmp_path, stiffn
     assert np.ptp(free) > 3 * gap and exact.max() < 1.5 * gap
     assert np.sqrt(np.mean((found - exact) ** 2)) < share * np.sqrt(np.mean((exact - free) ** 2))
     assert isinstance(steps, exponential.Exponential)
+
+
+def test_a_law_that_ends_within_the_typical_travel_is_simulated_inside():
+    """sqrt(1 - d/0.8) has no value at the whole typical travel of 1 m: no steps are asked for there."""
+    device = ctrlgen.user_device(
+        "stub", parameters={"mass": "1 kg", "spring": "100 N"}, drive={"motor": "1 N"}, axes={"way": "1 m"},
+        mass=lambda p: p.mass, force=lambda u, p: u.motor,
+        resistance=lambda d, p: p.spring * (1 - ca.sqrt(1 - d.way / 0.8)),
+    )  # fmt: skip
+    model = build_model(device)
+    assert not np.isfinite(exponential.home_slope(model, away=1.0)).all()
+    found = simulate(model, np.full((200, 1), 0.5), H).signals["displacement"]
+    assert np.isfinite(found).all() and 0 < found.max() < 0.1

@@ -1,9 +1,9 @@
-"""Steps 3 and 9: does a structure leave anything over? Judged on the held-out records, and on what is left at rest.
+"""Steps 3 and 9: does a structure leave anything over? Judged on the held-out records, the fitted ones, and at rest.
 
 The numbers are judged where the held-out records are most likely, at the price of how well the fit knows them: then the
-squares are those of the noise alone, also of a stage that drifts or saturates, where a little uncertainty goes far. At rest,
-where the noise was learnt, its size says
-nothing; but stationary noise leaves neither memory nor heavy tails after whitening, and a stage that moves by itself does.
+squares are those of the noise alone, also of a stage that drifts or saturates, where a little uncertainty goes far. What is
+left of the records to fit must be noise in size too. At rest, where the noise was learnt, its size says nothing; but
+stationary noise leaves neither memory nor heavy tails after whitening, and a stage that moves by itself does.
 """
 
 from __future__ import annotations
