@@ -14,7 +14,7 @@ LAYERS = [
     "physics.screw", "physics.flexure", "physics.circular_hinge", "physics.circular_hinge_table",
     "physics.thermal_actuator", "physics.xy_stage physics.hexapod physics.meso_hexapod",
     "physics.piezo_stack", "physics.rrr_stage",
-    "effect lattice turning", "event", "effects",
+    "effect lattice turning", "event frame", "effects",
     "devices.section", "devices.ports", "devices.sensor", "devices.base", "devices.hinge",
     "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis devices.user", "devices",
     "calibration pose_errors",
@@ -89,7 +89,7 @@ def test_the_physics_knows_no_device_file(path):
     "path", [p for p in MODULES if p.parent.name == "effects" and p.stem != "__init__"], ids=lambda p: p.stem
 )
 def test_an_effect_needs_the_extension_point_and_nothing_else(path):
-    assert our_imports(path) - {"event", "lattice", "turning"} == {"effect"}  # what several laws have in common
+    assert our_imports(path) - {"event", "frame", "lattice", "turning"} == {"effect"}  # what several laws have in common
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)

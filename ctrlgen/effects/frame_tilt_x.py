@@ -1,8 +1,7 @@
 """A frame tilted about x against the drawing."""
 
-import casadi as ca
-
 from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.frame import turned
 
 
 class FrameTiltX(Effect):
@@ -18,7 +17,4 @@ class FrameTiltX(Effect):
     params = (Param("angle", "mrad", (-50.0, 50.0), "turn of the platform frame about x", off=0.0),)
 
     def term(self, s, p):
-        across = {1: -s.all[2], 2: s.all[1], 4: -s.all[5], 5: s.all[4]}
-        if s.index not in across:
-            return 0.0
-        return ca.sin(p.angle) * across[s.index] + (ca.cos(p.angle) - 1) * s.value
+        return turned(s, p.angle, 1, 2)

@@ -1,8 +1,7 @@
 """A frame tilted about y against the drawing."""
 
-import casadi as ca
-
 from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.frame import turned
 
 
 class FrameTiltY(Effect):
@@ -18,7 +17,4 @@ class FrameTiltY(Effect):
     params = (Param("angle", "mrad", (-50.0, 50.0), "turn of the platform frame about y", off=0.0),)
 
     def term(self, s, p):
-        across = {2: -s.all[0], 0: s.all[2], 5: -s.all[3], 3: s.all[5]}
-        if s.index not in across:
-            return 0.0
-        return ca.sin(p.angle) * across[s.index] + (ca.cos(p.angle) - 1) * s.value
+        return turned(s, p.angle, 2, 0)

@@ -1,8 +1,7 @@
 """A platform frame turned against the drawing: one direction leaks into another."""
 
-import casadi as ca
-
 from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.frame import turned
 
 
 class FrameTurn(Effect):
@@ -18,7 +17,4 @@ class FrameTurn(Effect):
     params = (Param("angle", "mrad", (-50.0, 50.0), "turn of the platform frame about z", off=0.0),)
 
     def term(self, s, p):
-        across = {0: -s.all[1], 1: s.all[0], 3: -s.all[4], 4: s.all[3]}
-        if s.index not in across:
-            return 0.0
-        return ca.sin(p.angle) * across[s.index] + (ca.cos(p.angle) - 1) * s.value
+        return turned(s, p.angle, 0, 1)
