@@ -89,7 +89,9 @@ def test_the_physics_knows_no_device_file(path):
     "path", [p for p in MODULES if p.parent.name == "effects" and p.stem != "__init__"], ids=lambda p: p.stem
 )
 def test_an_effect_needs_the_extension_point_and_nothing_else(path):
-    assert our_imports(path) - {"event", "frame", "lattice", "turning"} == {"effect"}  # what several laws have in common
+    assert our_imports(path) - {"event", "frame", "lattice", "turning"} == {
+        "effect"
+    }  # what several laws have in common
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
