@@ -7,7 +7,7 @@ them stays what it was.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+import scipy  # its parts take a while to import, and come when they are used
 
 ORDER = 4  # of the Butterworth filter, run forward and backward
 WIDEST = 0.9  # of the highest frequency that the kept rows can hold
@@ -15,7 +15,7 @@ WIDEST = 0.9  # of the highest frequency that the kept rows can hold
 
 def low_passed(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
     """`values` (n,) without what is above `cutoff` [Hz], without phase: 6 dB down there, 48 dB an octave beyond."""
-    return sosfiltfilt(butter(ORDER, cutoff, fs=1 / sample_time, output="sos"), values)
+    return scipy.signal.sosfiltfilt(scipy.signal.butter(ORDER, cutoff, fs=1 / sample_time, output="sos"), values)
 
 
 def shifted(values: np.ndarray, time: np.ndarray, lag: float) -> np.ndarray:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from ctrlgen.model import Model
 
@@ -219,4 +219,4 @@ def _phis(M: np.ndarray) -> list[np.ndarray]:
     large[:n, :n] = M
     for k in range(3):
         large[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
-    return np.split(expm(large)[:n], 4, axis=1)
+    return np.split(scipy.linalg.expm(large)[:n], 4, axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
+import scipy
 
 SPIKE = 8.0  # standard deviations of the local high-pass noise
 WIDEST = 3  # samples in a spike; what lasts longer may be motion
@@ -31,7 +31,7 @@ def spikes(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
     moved = _near_jump(drive)
     for width in range(1, WIDEST + 1):
         off = _off_chord(y, width)
-        sigma = 1.4826 * median_filter(np.abs(off.mean(1)), min(WINDOW, len(off)), mode="reflect")
+        sigma = 1.4826 * scipy.ndimage.median_filter(np.abs(off.mean(1)), min(WINDOW, len(off)), mode="reflect")
         size = np.abs(off).min(1)
         one_sided = np.abs(np.sign(off).sum(1)) == width
         for start in np.flatnonzero(one_sided & (size > SPIKE * np.maximum(sigma, floor))) + 1:

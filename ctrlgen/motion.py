@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from ctrlgen.exponential import steps_of
 from ctrlgen.model import Model
@@ -85,7 +85,7 @@ def _together(A: ca.SX) -> list[list[int]]:
     sparsity = A.sparsity()
     acts = np.zeros(A.shape, dtype=bool)
     acts[sparsity.row(), sparsity.get_col()] = True
-    count, label = connected_components(acts, connection="strong")
+    count, label = scipy.sparse.csgraph.connected_components(acts, connection="strong")
     groups = [np.flatnonzero(label == k).tolist() for k in range(count)]
     return [g for g in groups if len(g) > 1 or acts[g[0], g[0]]]
 

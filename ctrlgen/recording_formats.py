@@ -19,7 +19,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-import scipy.io
+import scipy
 
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.files import read_text

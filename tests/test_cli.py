@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from command_line import ctrlgen
 from conftest import DEVICE, SCENARIOS
 
 COMMANDS = (
@@ -27,11 +28,6 @@ COMMANDS = (
     "reproduce",
     "diagnose",
 )
-
-
-def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[str]:
-    env = {**os.environ, **environment, "COLUMNS": "200"}
-    return subprocess.run([sys.executable, "-m", "ctrlgen", *map(str, words)], capture_output=True, text=True, env=env)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -12,15 +12,17 @@ from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, re
 from ctrlgen.diagnosis.adequacy import judge
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.learnt import learn_guessed
 from ctrlgen.diagnosis.noise import coloured, estimate
 from ctrlgen.diagnosis.pitches import jumps, pitches
 from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen
-from ctrlgen.diagnosis.search import Searcher, Trial
+from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.diagnosis.trial import Trial
 from ctrlgen.lattice import lattice
 from ctrlgen.recording import Recording
 
@@ -159,14 +161,16 @@ def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, fi
     begin = {"gain": 0.1} if first == "drive_gain" else {"stiffness": 1e4, "reach": 3e-5, "taper": 0.5}
     structure = Structure(AXIS).with_cause(Hypothesis(first, at, "axis"), begin)
     structure = structure.with_cause(LATE, {"gain": 1.0, "tau": 1.0})
-    theta = structure.start
 
-    def fit(left):
-        return Fit(structure, theta, (), left, 1500, np.zeros(0), sure * np.eye(len(theta)), 0.0)
+    def fit(left, of=structure):
+        return Fit(of, of.start, (), left, 1500, np.zeros(0), sure * np.eye(len(of.start)), 0.0)
 
     searcher = Searcher(fitter_of(), Screen(fitter_of(), [LIMIT]), lambda _: None)
     monkeypatch.setattr(searcher, "trial", lambda *_, **__: Trial(fit(1000.0), 1000.0, 0.0))
-    assert searcher._doubtful(Trial(fit(fitted), lost, 0.0), Trial(fit(0.0), 0.0, 0.0), 1) == doubtful
+    assert (
+        searcher._doubtful(Trial(fit(fitted, structure.without(1)), lost, 0.0), Trial(fit(0.0), 0.0, 0.0), 1)
+        == doubtful
+    )
 
 
 def test_a_place_has_one_form_of_hysteresis():
@@ -203,7 +207,7 @@ def test_a_guessed_noise_is_refined_by_what_the_device_leaves():
         f.recording = replace(f.recording, records=tuple(r for r in f.recording.records if r.role != "rest"))
         f.noise = estimate(replace(f.recording, records=f.recording.records[:1]), SETTLING)
     assert guess.noise.guessed[0] and guess.noise.floor[0] > 3 * NOISE
-    fitter.learn_quiet(fitter.fit(Structure(AXIS)))
+    fitter.noise = learn_guessed(fitter, fitter.fit(Structure(AXIS)))
     assert fitter.noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in fitter.noise.said[0]
 
 

@@ -35,9 +35,10 @@ LAYERS = [
     "diagnosis.mapped diagnosis.equations", "diagnosis.carried",
     "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise diagnosis.pitches diagnosis.journal diagnosis.descent "
     "diagnosis.quiet diagnosis.spikes",
-    "diagnosis.structure", "diagnosis.fit",
+    "diagnosis.structure", "diagnosis.fit", "diagnosis.learnt",
     "diagnosis.laws diagnosis.scatter", "diagnosis.spread diagnosis.profile", "diagnosis.slopes", "diagnosis.together",
-    "diagnosis.screen diagnosis.adequacy diagnosis.resolved", "diagnosis.search", "diagnosis.diagnosis", "diagnosis.read_off",
+    "diagnosis.screen diagnosis.adequacy diagnosis.resolved", "diagnosis.trial", "diagnosis.search",
+    "diagnosis.diagnosis", "diagnosis.read_off",
     "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
     "diagnosis.empirical diagnosis.detectable diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
     "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",

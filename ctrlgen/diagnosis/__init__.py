@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.evidence import evidence
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses, nominal_links
 from ctrlgen.diagnosis.journal import Journal
+from ctrlgen.diagnosis.learnt import learn_guessed
 from ctrlgen.diagnosis.noise import estimate
 from ctrlgen.diagnosis.profile import profiles
 from ctrlgen.diagnosis.read_off import read_off
@@ -64,7 +65,7 @@ def _diagnose(
     noise = estimate(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
     fitter = Fitter(recording, noise, journal)
     for _ in range(GUESSES if noise.guessed.any() else 0):
-        fitter.learn_quiet(fitter.fit(Structure(device)))
+        fitter.noise = learn_guessed(fitter, fitter.fit(Structure(device)))
     noise = fitter.noise
     spikes = fitter.mark_spikes(fitter.fit(Structure(device)))
     acting = set(movable(device))
@@ -81,7 +82,7 @@ def _diagnose(
     step("judging")
     after = judge(fitter, found.chosen.fit)
     seen = read_off(fitter, found)
-    said = verdict(found, after, bool(noise.known.all()), bool(seen))
+    said = verdict(fitter, found, after, bool(seen))
     step("evidence")
     sure = profiles(fitter, found.chosen.fit)
     beside = evidence(fitter, found, after.passed, seed)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.noise import without_lines
+from ctrlgen.diagnosis.noise import LAGS, ljung_box, without_lines
 from ctrlgen.lattice import lattice
 
 STEPS = 8  # to where the held-out records are most likely, as the numbers are known
@@ -25,7 +25,6 @@ SIGMAS = 2.6  # standard deviations of the noise's own estimate that are granted
 RESTLESS = 1e-6  # p below which what is left at rest is no noise
 ROUNDED = 0.5  # of the noise: steps of the readings from which on these tests see the steps
 SMALL_SAMPLE = 0.001  # p of so large an error by chance, above which the gate's ratio says nothing
-LAGS = 20
 
 
 @dataclass(frozen=True)
@@ -89,16 +88,6 @@ def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
         if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESTLESS:
             return True
     return False
-
-
-def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
-    """p of the hypothesis that `e` has no autocorrelation up to `lags`. G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297."""
-    n, e = len(e), e - np.mean(e)
-    total = float(e @ e)
-    if total == 0:
-        return 1.0
-    r = np.array([float(e[k:] @ e[:-k]) / total for k in range(1, lags + 1)])
-    return float(stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))
 
 
 def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = LAGS) -> float:

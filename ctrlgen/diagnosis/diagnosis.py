@@ -14,12 +14,15 @@ from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, written
 from ctrlgen.diagnosis.profile import Profile
 from ctrlgen.diagnosis.scatter import deviations
-from ctrlgen.diagnosis.search import Search
 from ctrlgen.diagnosis.structure import Structure, changed
+from ctrlgen.diagnosis.trial import Search
 from ctrlgen.recording import Recording
 from ctrlgen.units import difference, from_si, to_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
+LITTLE = (
+    0.05  # of the mismatch: the form of a law is right to that in the worst case, and what leaves more is another law
+)
 
 
 @dataclass(frozen=True)
@@ -102,19 +105,32 @@ class Diagnosis:
         return device.model_copy(update={"effect": (*device.effect, *read)})
 
 
-def verdict(search: Search, after: Adequacy, known: bool, seen: bool = False) -> str:
+def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False) -> str:
     """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
 
-    Partly: causes are found, but nothing tells the noise, so that nobody can say whether all is explained.
+    Partly: causes are found, but they leave a little more than noise, or nothing tells the noise, so that nobody can say
+    whether all is explained.
     """
-    found = seen or search.chosen.fit.structure.causes
-    if not known:
-        return (AMBIGUOUS if any(search.rivals) else PARTLY) if found else CONSISTENT
-    if not after.passed:
+    found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
+    if known and not after.passed and remaining(fitter, search) > LITTLE:
         return UNEXPLAINED
     if not found:
         return CONSISTENT
-    return AMBIGUOUS if any(search.rivals) else EXPLAINED
+    if any(search.rivals):
+        return AMBIGUOUS
+    return EXPLAINED if known and after.passed else PARTLY
+
+
+def remaining(fitter: Fitter, search: Search) -> float:
+    """What the chosen causes leave beyond the noise, as a share of what the device as described leaves, both root mean
+    square; the larger one of the records to fit and of those held out."""
+    n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+    after, before = search.chosen, search.nominal
+    pairs = (
+        (after.fit.objective - after.fit.n, before.fit.objective - after.fit.n),
+        (after.held - n_held, before.held - n_held),
+    )
+    return max(float(np.sqrt(max(left, 0.0) / max(all_, 1e-300))) for left, all_ in pairs)
 
 
 def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:

@@ -12,7 +12,7 @@ from ctrlgen.diagnosis.detectable import detectable
 from ctrlgen.diagnosis.experiment import Experiment, next_experiment
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.proposal import files
-from ctrlgen.diagnosis.search import Round, Search, Trial
+from ctrlgen.diagnosis.trial import Round, Search, Trial
 from ctrlgen.diagnosis.unknown import unknown
 from ctrlgen.diagnosis.where import where
 

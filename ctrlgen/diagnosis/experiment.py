@@ -16,7 +16,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.drives import admissible, poses, shapes
 from ctrlgen.diagnosis.fit import START_SIZE, Fit, Fitter
-from ctrlgen.diagnosis.search import Search
+from ctrlgen.diagnosis.trial import Search
 from ctrlgen.recording import Record
 
 MOST_SAMPLES = 4000  # of a proposed series

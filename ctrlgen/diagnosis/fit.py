@@ -14,8 +14,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.journal import Journal, key_of
-from ctrlgen.diagnosis.noise import Noise, autoregression
-from ctrlgen.diagnosis.quiet import quiet_noise
+from ctrlgen.diagnosis.noise import Noise
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
@@ -23,7 +22,6 @@ from ctrlgen.recording import Record, Recording
 
 STEPS = 40
 CI = 1.959964  # standard deviations of a 95 % interval
-LITTLE = 1.3  # times the noise: what leaves more is not noise
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
@@ -99,6 +97,12 @@ class Fitter:
         again = self._optimum(problem, begin, steps)
         return min(found, again, key=lambda fit: fit.objective)
 
+    def begun(self, structure: Structure) -> float:
+        """The objective where a fit of the structure begins."""
+        problem = _Problem(self, structure)
+        rows = problem.residual(problem.inner(np.concatenate([structure.start, np.zeros(problem.n_starts)])))
+        return float(rows @ rows)
+
     def _optimum(self, problem: _Problem, begin: np.ndarray, steps: int) -> Fit:
         """From the journal, where it has been found before."""
         if self.journal is None:
@@ -132,65 +136,6 @@ class Fitter:
         self.to_fit = [r for r in records if r.role == "fit"]
         self.held = [r for r in records if r.role == "hold_out"]
         return f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
-
-    def learn_quiet(self, fit: Fit) -> None:
-        """Where the noise was guessed: from what `fit` leaves at the frequencies at which the readings move least."""
-        sd, ar, count, said = self.noise.sd.copy(), list(self.noise.ar), self.noise.count.copy(), list(self.noise.said)
-        for i in np.flatnonzero(self.noise.guessed):
-            parts = [p for r in self.to_fit if (p := self._quiet(fit, r, i)) is not None]
-            if not parts:
-                continue
-            weights = [c for *_, c in parts]
-            order = max(len(a) for _, a, _ in parts)
-            sd[i] = np.sqrt(np.average([s**2 for s, *_ in parts], weights=weights))
-            ar[i] = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in parts], axis=0, weights=weights)
-            count[i] = sum(weights)
-            said[i] = (
-                f"{self.recording.channels[i]}: from what the device as described leaves at the frequencies at which the "
-                f"readings move least, autoregressive of order {order}; record some rest to know it"
-            )
-        self.noise = replace(self.noise, sd=sd, ar=tuple(ar), count=count, said=tuple(said))
-
-    def _quiet(self, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
-        """On the longest stretch of valid samples of channel i."""
-        y = self.predicted(fit, record)[:, i]
-        good = np.flatnonzero(np.diff(np.concatenate([[False], record.valid[:, i] & np.isfinite(y), [False]])))
-        if not len(good):
-            return None
-        a, b = max(good.reshape(-1, 2), key=lambda run: run[1] - run[0])
-        return quiet_noise((record.observed[:, i] - y)[a:b], y[a:b])
-
-    def learn_colour(self, fit: Fit) -> bool:
-        """Where the noise was known from fewer samples than these: the colour of what `fit` leaves, if it leaves little.
-
-        Its size is not let grow beyond what the first estimate allows.
-        """
-        if self.recording.kind == "poses":
-            return False
-        sd, ar, floor = self.noise.sd.copy(), list(self.noise.ar), self.noise.floor
-        for i in np.flatnonzero(self.noise.count < sum(len(r.time) for r in self.to_fit)):
-            parts = [(r.observed - self.predicted(fit, r))[r.valid[:, i], i] for r in self.to_fit]
-            left = np.sqrt(np.mean(np.concatenate(parts) ** 2))
-            if left < LITTLE * floor[i]:
-                sd[i], ar[i] = autoregression(parts)
-                sd[i] *= min(1.0, floor[i] * (1 + 2.6 / np.sqrt(2 * self.noise.count[i])) / left)
-        self.noise = replace(self.noise, sd=sd, ar=tuple(ar))
-        return True
-
-    def learn_noise(self, fit: Fit) -> None:
-        """Where nothing but the misfit tells the noise: what `fit` leaves over, alike for all channels of one unit."""
-        channels = self.recording.channels
-        squares, count = np.zeros(len(channels)), np.zeros(len(channels))
-        for record in self.to_fit:
-            y = self.predicted(fit, record)
-            squares += np.sum(np.where(record.valid, record.observed - y, 0.0) ** 2, axis=0)
-            count += record.valid.sum(axis=0)
-        sd = self.noise.sd.copy()
-        used = len(fit.theta) / max(count.sum(), 1.0)
-        for i in np.flatnonzero(~self.noise.known):
-            alike = [k for k in range(len(channels)) if self.recording.units[k] == self.recording.units[i]]
-            sd[i] = np.sqrt(squares[alike].sum() / (count[alike].sum() * (1 - used)))
-        self.noise = replace(self.noise, sd=sd)
 
     def predicted(self, fit: Fit, record: Record) -> np.ndarray:
         """Readings (n, n_y) of a fitted structure on any record, started as the record itself says best."""

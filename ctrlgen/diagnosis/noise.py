@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from scipy import stats
 from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
@@ -24,6 +25,7 @@ LINES = 3  # at most, taken out of a rest
 NEAR_BINS = 15  # of the spectrum, over which noise is level
 OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
 LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
+LAGS = 20  # samples over which noise that was whitened is looked at for a memory
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
@@ -224,3 +226,13 @@ def autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
         if bic < best[0]:
             best = (bic, variance, a)
     return float(np.sqrt(best[1])), best[2]
+
+
+def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
+    """p of the hypothesis that `e` has no autocorrelation up to `lags`. G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297."""
+    n, e = len(e), e - np.mean(e)
+    total = float(e @ e)
+    if total == 0:
+        return 1.0
+    r = np.array([float(e[k:] @ e[:-k]) / total for k in range(1, lags + 1)])
+    return float(stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))

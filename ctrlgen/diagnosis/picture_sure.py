@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from ctrlgen.diagnosis.diagnosis import CI, Diagnosis
 from ctrlgen.diagnosis.record import plain
-from ctrlgen.diagnosis.search import RIVAL, Round
+from ctrlgen.diagnosis.search import RIVAL
+from ctrlgen.diagnosis.trial import Round
 from ctrlgen.diagnosis.words import hypothesis_name, number
 from ctrlgen.figures import COLOURS
 

@@ -11,7 +11,7 @@ from ctrlgen.chain import channels
 from ctrlgen.diagnosis.diagnosis import Estimate, Finding
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.hypotheses import DOMAIN, Hypothesis, nominal_links
-from ctrlgen.diagnosis.search import Search
+from ctrlgen.diagnosis.trial import Search
 from ctrlgen.effect import Effect, Place
 from ctrlgen.units import from_si
 

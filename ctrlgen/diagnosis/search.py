@@ -9,15 +9,17 @@ tenth of the noise), and if the held-out records gain.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.learnt import learn_colour, learn_size
 from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.diagnosis.trial import Round, Search, Trial
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
 DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
@@ -33,48 +35,11 @@ ENDED = 2  # trials a round that are fitted to the end although they look useles
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
 VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
-ABLE = 0.25  # of what a cause takes away: what its rival must promise; shapes between the grid's points lose that much
+ABLE = 0.5  # of what a cause takes away: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
 NEARLY = 0.9  # of what the best cause takes away: what takes so much is fitted to its end before both are compared
-MOSTLY = 0.9  # of the excess: where one or two causes take it away, a series' others are sought from there
+MOSTLY = 0.9  # of the mismatch: where causes take it away, a series' others are sought one or two at a time
 CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One structure fitted, with `held`, its -2 ln likelihood on the held-out records (`Fitter.held_out`), and its total T."""
-
-    fit: Fit
-    held: float
-    total: float
-    cause: Hypothesis | None = None
-
-    @property
-    def price(self) -> float:
-        """Of its numbers and of the rarity of its causes."""
-        return self.total - self.fit.objective - self.held
-
-
-@dataclass(frozen=True, eq=False)
-class Round:
-    """What one round saw: its screen and its trials, best first."""
-
-    screened: Screened
-    trials: tuple[Trial, ...]
-    before: Trial
-
-
-@dataclass(frozen=True, eq=False)
-class Search:
-    """The nominal fit, the chosen one, the chosen one without each of its causes, per cause the rivals that explain alike,
-    and the rounds in order."""
-
-    nominal: Trial
-    chosen: Trial
-    bare: tuple[Trial, ...]
-    rivals: tuple[tuple[Trial, ...], ...]
-    rounds: tuple[Round, ...]
-    last: Screened
 
 
 class Searcher:
@@ -86,6 +51,7 @@ class Searcher:
         self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
         self.known: dict[frozenset, tuple[Trial, int]] = {}
         self.screens: dict[frozenset, Screened] = {}
+        self.mismatch = np.inf  # objective of the described device beyond the noise
         self.trials = TRIALS * (3 if fitter.recording.kind == "poses" else 1)
 
     def trial(
@@ -95,10 +61,11 @@ class Searcher:
         steps: int = TRIAL_STEPS,
         nested: Fit | None = None,
     ) -> Trial:
-        """Fits one structure, which contains that of `nested`, and judges it on the held-out records."""
+        """Fits one structure, which contains that of `nested`, and judges it on the held-out records; not again where it was
+        fitted before and begins no better than that ended."""
         key = frozenset(structure.causes)
         known, done = self.known.get(key, (None, 0))
-        if known is not None and done >= steps:
+        if known is not None and done >= steps and known.fit.objective <= self.fitter.begun(structure):
             return replace(known, cause=cause)
         fit = self.fitter.fit(structure, steps=steps, nested=nested)
         if known is not None and known.fit.objective <= fit.objective:
@@ -114,12 +81,13 @@ class Searcher:
     def run(self, structure: Structure) -> Search:
         """Forward rounds until nothing more is justified, with swaps in between; then the rivals of each cause."""
         current = self._measured(self.trial(structure, steps=40))
+        self.mismatch = current.fit.objective - self.n_fit
         rounds: list[Round] = []
         visited = {frozenset(structure.causes)}
         while True:
             self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
             screened = self._screened(current)
-            if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind]:
+            if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind] or self._of_form(current):
                 break
             trials = self._try(current, self._conspicuous(current, screened))
             trials = (*trials, *self._together(current, screened, trials))
@@ -128,14 +96,18 @@ class Searcher:
             better = [t for t in trials if self._justified(current, t)]
             if not better:
                 break
-            current = self._prune(self._swap(self._best(current, better)))
+            best, n = self._best(current, better), len(current.fit.structure.causes)
+            current = self._prune(self._swap(best, n))
             if frozenset(current.fit.structure.causes) in visited:
                 break
             visited.add(frozenset(current.fit.structure.causes))
             current = self._measured(self._polished(current))
-        if self.fitter.learn_colour(current.fit):
-            self.known.clear()
-            self.screens.clear()
+        if self.fitter.recording.kind == "series":
+            noise = learn_colour(self.fitter, current.fit)
+            if noise is not self.fitter.noise:
+                self.fitter.noise = noise
+                self.known.clear()
+                self.screens.clear()
             current = self._prune(self._polished(current), least=0)
             screened = self._screened(current)
         nominal = self.trial(structure, steps=40)
@@ -192,7 +164,7 @@ class Searcher:
             return trial
         for _ in range(LEARNINGS):  # the numbers move as the noise that holds them shrinks
             before = self.fitter.noise.sd
-            self.fitter.learn_noise(trial.fit)
+            self.fitter.noise = learn_size(self.fitter, trial.fit)
             self.known.clear()
             self.screens.clear()
             trial = self.trial(_cooled(trial.fit), trial.cause, steps=40)
@@ -236,7 +208,7 @@ class Searcher:
         best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
         excess, trials = current.fit.objective - self.n_fit, []
         for size in (2, 3, 4):
-            if size > 2 and best > MOSTLY * excess and self.fitter.recording.kind == "series":
+            if size > 2 and excess - best < (1 - MOSTLY) * self.mismatch and self.fitter.recording.kind == "series":
                 break
             tried, used = 0, {}
             enough = best + max(self._need(current, screened), 0.05 * (excess - best))
@@ -291,9 +263,11 @@ class Searcher:
             return False
         return confirmed > max(CONFIRMED, WORTHWHILE * max(before.held - self.n_held, 0.0))
 
-    def _swap(self, current: Trial) -> Trial:
-        """Each earlier cause against what would be suspected in its place, now that the others are there."""
-        for k in range(len(current.fit.structure.causes) - 1):
+    def _swap(self, current: Trial, before: int) -> Trial:
+        """Each cause against what would be suspected in its place, now that the others are there; not what came alone to
+        those `before`, which has been compared already."""
+        causes = len(current.fit.structure.causes)
+        for k in range(before if causes == before + 1 else causes):
             for rival in self._replacements(current, k):
                 plainer = len(rival.fit.structure.unknowns) < len(current.fit.structure.unknowns)
                 ahead = current.total - rival.total if plainer else self._ahead(rival, current)
@@ -307,7 +281,8 @@ class Searcher:
         others = _cooled(current.fit).without(k)
         bare = self.fitter.fit(others, steps=0)
         screened = self.screen.run(bare)
-        gained = bare.objective - current.fit.objective
+        without = _freed(bare)
+        gained = without - current.fit.objective
         able = [
             s
             for s in self._loud(screened, self._need(current, screened))
@@ -317,7 +292,7 @@ class Searcher:
         for s in able[:REPLACEMENTS]:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
             trials += self._attempt(others.with_cause(s.hypothesis, s.start), s.hypothesis)
-        near = self._near(bare.objective, current, sorted(trials, key=lambda t: t.total))
+        near = self._near(without, current, sorted(trials, key=lambda t: t.total))
         return sorted((self._polished(t) if t in near else t for t in trials), key=lambda t: t.total)
 
     def _screened(self, trial: Trial) -> Screened:
@@ -339,19 +314,34 @@ class Searcher:
         """Whether cause k takes away no more than the form of another's law may leave of what that one takes away, of the
         records to fit and of those held out (geometric mean); more, where k may be nothing (the 95 % interval of its
         amplitude reaches off)."""
-        fit, causes = current.fit, current.fit.structure.causes
+        fit = current.fit
         own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
         vague = bool(own) and all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
         lost = max(bare.held - current.held, 0.0) * max(bare.fit.objective - current.fit.objective, 0.0)
-        most = self.trial(Structure(fit.structure.device), steps=40)  # without one alone a fit may leave the numbers
-        for j, other in enumerate(causes):
-            rough = 0.0 if j == k or other.effect == PARAMETER else other.law.rough
+        return self._may_be_form(lost, bare, VAGUE if vague else 1.0)  # beside k another may take a cause's place
+
+    def _of_form(self, current: Trial) -> bool:
+        """Whether all that is left is no more than the form of a cause's law may leave: what would be found in it, would be
+        doubtful. Not where the device hides something at a price."""
+        if current.fit.penalty > DEAR + 2 * len(current.fit.structure.unknowns):
+            return False
+        left = max(current.held - self.n_held, 0.0) * max(current.fit.objective - self.n_fit, 0.0)
+        return self._may_be_form(left, current)
+
+    def _may_be_form(self, squares: float, current: Trial, times: float = 1.0) -> bool:
+        """Whether the product of these squares, fitted and held out, is within what the form of a law is off, so many
+        `times`, of what its cause takes away."""
+        most = self.trial(
+            Structure(current.fit.structure.device), steps=40
+        )  # without one alone a fit may leave the numbers
+        for j, cause in enumerate(current.fit.structure.causes):
+            rough = 0.0 if cause.effect == PARAMETER else cause.law.rough
             if rough:
-                neither = self.trial(_cooled(bare.fit).without(j - (j > k)))  # beside k another may take j's place
-                held = min(neither.held, most.held) - bare.held
-                fitted = min(neither.fit.objective, most.fit.objective) - bare.fit.objective
-                if lost < (rough * (VAGUE if vague else 1.0)) ** 4 * max(held, 0.0) * max(fitted, 0.0):
+                without = self.trial(_cooled(current.fit).without(j))
+                held = min(without.held, most.held) - current.held
+                fitted = min(without.fit.objective, most.fit.objective) - current.fit.objective
+                if squares < (rough * times) ** 4 * max(held, 0.0) * max(fitted, 0.0):
                     return True
         return False
 
@@ -368,6 +358,12 @@ class Searcher:
 def _same(a: Hypothesis | None, b: Hypothesis) -> bool:
     """Whether two causes have one name, as harmonics do."""
     return a is not None and (a.effect, a.location, a.path) == (b.effect, b.location, b.path)
+
+
+def _freed(fit: Fit) -> float:
+    """The objective once the free numbers of a fit that is not at its optimum have moved there, to first order."""
+    step = np.linalg.lstsq(fit.J, fit.residual, rcond=None)[0]
+    return float(np.sum((fit.residual - fit.J @ step) ** 2))
 
 
 def _rarity(structure: Structure) -> float:

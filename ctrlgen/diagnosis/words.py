@@ -182,7 +182,11 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             "device.next.toml holds the best of them; it predicts records of this kind as well as any." + rest,
         ]
     if verdict == PARTLY:
-        left = "Something remains: see where below." if known else f"Whether something remains cannot be said.{rest}"
+        left = (
+            "A little remains above the noise, less than 5 % of what was wrong: see where below."
+            if known
+            else f"Whether something remains cannot be said.{rest}"
+        )
         return [f"{use} It is better than before.", left]
     return [
         "Not a cause I know. Look below at where the mismatch lives, and check the set-up: wiring, units, clocks.",

@@ -9,7 +9,7 @@ ELEMENTS = 8
 
 
 class Hysteresis(Effect):
-    """F = -k sum_j w_j e_j, j = 1..4: springs that slip at r_j = r j/4, e_j = d - (play of d with radius r_j).
+    """F = -k sum_j w_j e_j, j = 1..8: springs that slip at r_j = r j/8, e_j = d - (play of d with radius r_j).
 
     w_j ~ j^-q, sum w_j = 1: all alike for q = 0, more of the small ones for q > 0. Prandtl-Ishlinskii with stop
     operators (Iwan, Maxwell slip): independent of rate, dissipates. Holds for congruent loops.

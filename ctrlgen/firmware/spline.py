@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy.sparse as sparse
-from scipy.sparse.linalg import spsolve
+import scipy
 
 from ctrlgen.firmware.cprint import Real
 
@@ -225,21 +224,23 @@ def _control(drive: np.ndarray, segments: int, periodic: bool) -> np.ndarray:
     A, mean = _blending(len(drive), segments, periodic), drive.mean(axis=0)
     wrap = None
     if periodic:
-        wrap = sparse.csr_matrix((np.ones(segments + 3), (np.arange(segments + 3), np.arange(segments + 3) % segments)))
+        wrap = scipy.sparse.csr_matrix(
+            (np.ones(segments + 3), (np.arange(segments + 3), np.arange(segments + 3) % segments))
+        )
         A = A @ wrap
     if len(drive) <= DENSE:
         c = np.linalg.lstsq(A.toarray(), drive - mean, rcond=1e-12)[0]
     else:
-        c = spsolve((A.T @ A).tocsc(), A.T @ (drive - mean)).reshape(-1, drive.shape[1])
+        c = scipy.sparse.linalg.spsolve((A.T @ A).tocsc(), A.T @ (drive - mean)).reshape(-1, drive.shape[1])
     return (c if wrap is None else wrap @ c) + mean
 
 
-def _blending(n: int, segments: int, periodic: bool) -> sparse.csr_matrix:
+def _blending(n: int, segments: int, periodic: bool) -> scipy.sparse.csr_matrix:
     """(n, segments + 3): the blending functions at the samples."""
     k = np.arange(n)
     j = k * segments // n
     t = (k * segments - j * n) / n
     weights = np.stack([(1 - t) ** 3, 4 + 3 * t**2 * (t - 2), 1 + 3 * t * (1 + t * (1 - t)), t**3]) / 6
-    return sparse.csr_matrix(
+    return scipy.sparse.csr_matrix(
         (weights.ravel(), (np.tile(k, 4), np.concatenate([j, j + 1, j + 2, j + 3]))), (n, segments + 3)
     )

@@ -1,0 +1,46 @@
+"""What a search tries and finds: structures fitted and judged, round by round."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ctrlgen.diagnosis.fit import Fit
+from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.screen import Screened
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One structure fitted, with `held`, its -2 ln likelihood on the held-out records (`Fitter.held_out`), and its total T."""
+
+    fit: Fit
+    held: float
+    total: float
+    cause: Hypothesis | None = None
+
+    @property
+    def price(self) -> float:
+        """Of its numbers and of the rarity of its causes."""
+        return self.total - self.fit.objective - self.held
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What one round saw: its screen and its trials, best first."""
+
+    screened: Screened
+    trials: tuple[Trial, ...]
+    before: Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The nominal fit, the chosen one, the chosen one without each of its causes, per cause the rivals that explain alike,
+    and the rounds in order."""
+
+    nominal: Trial
+    chosen: Trial
+    bare: tuple[Trial, ...]
+    rivals: tuple[tuple[Trial, ...], ...]
+    rounds: tuple[Round, ...]
+    last: Screened
