@@ -18,6 +18,7 @@ from plants.loop import Loop, close
 from plants.mems_hexapod import MemsHexapod
 
 
+@pytest.mark.long
 def test_the_recording_is_one_that_ctrlgen_reads(tmp_path, device):
     poses = record(MemsHexapod(), tmp_path)
     recorded = load_recordings([tmp_path], build_model(device))

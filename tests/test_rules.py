@@ -168,7 +168,7 @@ def broken(folder, tmp_path_factory) -> dict[str, Check]:
     ("tool", "real", "rule"),
     [
         ("cppcheck --addon=misra", Real.FLOAT, "misra-c2012-15.1"),
-        ("cppcheck --addon=misra", Real.DOUBLE, "misra-c2012-13.6"),
+        pytest.param("cppcheck --addon=misra", Real.DOUBLE, "misra-c2012-13.6", marks=pytest.mark.long),
         ("cppcheck --addon=misra", Real.DOUBLE, "nullPointer"),
         ("clang-tidy", Real.DOUBLE, "clang-analyzer-core.NullDereference"),
         ("gcc -fanalyzer", Real.DOUBLE, "-Wanalyzer-null-dereference"),
@@ -202,6 +202,7 @@ def test_an_analyzer_that_gives_up_has_not_passed(folder):
     assert check.state == "not run" and ("gave up" in check.note or "missing" in check.note)
 
 
+@pytest.mark.long
 def test_hostile_calls_find_nothing(folder, stage):
     for check in check_hostile(folder, *stage, runs=3000):
         if check.state == "not run":

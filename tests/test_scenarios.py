@@ -19,7 +19,10 @@ def test_the_scenarios_of_the_papers_are_there():
     assert set(ALL) >= {"circle20", "coupled_dof", "xy_stage_force", "raster", "spiral", "unreachable"}
 
 
-@pytest.mark.parametrize("name", ALL)
+SLOW = ("raster", "spiral")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in ALL])
 def test_scenario_gives_what_it_expects(name, tmp_path, compiler):
     scenario = load_scenario(SCENARIOS / name)
     if scenario.file.outcome == "unreachable":

@@ -281,7 +281,7 @@ class Searcher:
         others = _cooled(current.fit).without(k)
         bare = self.fitter.fit(others, steps=0)
         screened = self.screen.run(bare)
-        without = _freed(bare)
+        without = freed(bare)
         gained = without - current.fit.objective
         able = [
             s
@@ -360,7 +360,7 @@ def _same(a: Hypothesis | None, b: Hypothesis) -> bool:
     return a is not None and (a.effect, a.location, a.path) == (b.effect, b.location, b.path)
 
 
-def _freed(fit: Fit) -> float:
+def freed(fit: Fit) -> float:
     """The objective once the free numbers of a fit that is not at its optimum have moved there, to first order."""
     step = np.linalg.lstsq(fit.J, fit.residual, rcond=None)[0]
     return float(np.sum((fit.residual - fit.J @ step) ** 2))

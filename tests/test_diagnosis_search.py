@@ -1,0 +1,117 @@
+"""How the search compares, what it tries, and when nothing more is sought."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from test_diagnosis_causes import BACKLASH, LATE, LIMIT, fitter_of, played
+from test_diagnosis_evidence import AXIS, NOISE
+
+from ctrlgen.diagnosis.adequacy import Adequacy
+from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, verdict
+from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.learnt import learn_colour
+from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
+from ctrlgen.diagnosis.search import Searcher, freed
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.diagnosis.trial import Search, Trial
+
+
+def searcher_of(fitter) -> Searcher:
+    return Searcher(fitter, Screen(fitter, [BACKLASH]), lambda _: None)
+
+
+def test_what_is_left_without_a_cause_is_what_the_free_numbers_cannot_take_over():
+    """A cause beside which the mass has moved by 0.2 %: without it the number moves back."""
+    fitter = fitter_of()
+    best = fitter.fit(Structure(AXIS))
+    off = fitter.fit(Structure(AXIS), theta=best.theta * np.array([1.002, *np.ones(len(best.theta) - 1)]), steps=0)
+    assert off.objective > 20 * best.objective
+    assert freed(off) == pytest.approx(best.objective, rel=0.1)
+
+
+def test_a_structure_is_fitted_again_from_a_better_start_only():
+    fitter = fitter_of()
+    searcher = searcher_of(fitter)
+    poor = searcher.trial(Structure(AXIS), steps=40)
+    poor = replace(poor, fit=replace(poor.fit, chi2=10 * poor.fit.chi2))  # as if it had ended in a far minimum
+    searcher.known[frozenset()] = poor, 40
+    again = searcher.trial(Structure(AXIS))
+    assert again.fit.objective < 0.2 * poor.fit.objective
+    assert searcher.trial(Structure(AXIS)).fit is again.fit
+
+
+@pytest.mark.parametrize("at_rest, learnt", [(0.6, True), (0.0, False)])
+def test_a_colour_that_the_rest_has_not_is_not_the_noises(at_rest, learnt):
+    rng = np.random.default_rng(5)
+
+    def coloured(n: int, a: float) -> np.ndarray:
+        return NOISE * np.sqrt(1 - a**2) * lfilter([1.0], [1.0, -a], rng.standard_normal(n))
+
+    fitter = fitter_of()
+    clean = fitter_of(after=lambda y: y, seed=4)
+    y = clean.predicted(clean.fit(Structure(AXIS)), clean.to_fit[0])
+    colours = {"rest": at_rest, "fit": 0.6, "hold_out": 0.6}
+    moved = {"rest": 0.0, "fit": y, "hold_out": fitter.held[0].observed}
+    records = tuple(
+        replace(r, observed=moved[r.role] + coloured(len(r.time), colours[r.role])[:, None])
+        for r in fitter.recording.records
+    )
+    fitter.recording = replace(fitter.recording, records=records)
+    fitter.to_fit = [r for r in records if r.role == "fit"]
+    noise = learn_colour(fitter, fitter.fit(Structure(AXIS)))
+    assert (noise is not fitter.noise) == learnt
+    assert not learnt or noise.ar[0][0] == pytest.approx(0.6, abs=0.08)
+
+
+@pytest.mark.parametrize(
+    "share, passed, rivals, says",
+    [(0.0, True, 0, EXPLAINED), (0.04, False, 0, PARTLY), (0.06, False, 0, UNEXPLAINED), (0.04, False, 1, AMBIGUOUS)],
+)
+def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, passed, rivals, says):
+    fitter = fitter_of(played)
+    nominal = fitter.fit(Structure(AXIS))
+    fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
+    left = fit.n + share**2 * (nominal.objective - fit.n)
+    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out(fit), 0.0)
+    search = Search(Trial(nominal, 1e9, 0.0), chosen, (), ((chosen,) * rivals,), (), None)
+    assert verdict(fitter, search, Adequacy((1.2,), {}, passed)) == says
+    nothing = replace(search, chosen=search.nominal, rivals=())
+    assert verdict(fitter, nothing, Adequacy((1.2,), {}, passed)) == (CONSISTENT if passed else UNEXPLAINED)
+
+
+@pytest.mark.parametrize("mismatch, sizes", [(2e4, {2, 3}), (2e6, {2})])
+def test_three_at_once_are_sought_only_while_most_is_unexplained(monkeypatch, mismatch, sizes):
+    searcher = searcher_of(fitter_of(played))
+    current = searcher.trial(Structure(AXIS))
+    excess = current.fit.objective - searcher.n_fit
+    assert excess > 1e4
+    searcher.mismatch, tried = mismatch, set()
+    monkeypatch.setattr(searcher, "_attempt", lambda structure, *_: tried.add(len(structure.causes)) or [])
+    starts = {BACKLASH: {"gap": 3e-8}, LATE: {"gain": 0.01, "tau": 1.0}, LIMIT: {"level": 0.5}}
+    three = tuple(Suspect(h, s, 100.0, 1.0, k) for k, (h, s) in enumerate(starts.items()))
+    together = ((0.8 * excess, three[:2]), (0.9 * excess, three))
+    searcher._together(current, Screened(tuple(three), np.eye(3), 4.0, {}, together), ())
+    assert tried == sizes
+
+
+def test_nothing_is_sought_in_what_the_form_of_a_law_leaves(monkeypatch):
+    """A law that is right to a hundredth of itself, which takes away 1e6 squares, may leave 100."""
+    fitter = fitter_of()
+    searcher = searcher_of(fitter)
+    fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
+    gain = fitter.fit(
+        Structure(AXIS).with_cause(Hypothesis("drive_gain", "actuator:axis", "axis"), {"gain": 0.1}), steps=0
+    )
+
+    def trial(left, of=fit):
+        return Trial(replace(of, chi2=searcher.n_fit + left, penalty=0.0), searcher.n_held + left, 0.0)
+
+    monkeypatch.setattr(searcher, "trial", lambda *_, **__: trial(1e6))
+    assert searcher._of_form(trial(60.0)) and not searcher._of_form(trial(150.0))
+    assert not searcher._of_form(trial(60.0, gain))  # its form is right
+    hidden = trial(60.0)
+    assert not searcher._of_form(replace(hidden, fit=replace(hidden.fit, penalty=100.0)))
