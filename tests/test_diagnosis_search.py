@@ -11,7 +11,7 @@ from test_diagnosis_causes import BACKLASH, LATE, LIMIT, fitter_of, played
 from test_diagnosis_evidence import AXIS, NOISE
 
 from ctrlgen.diagnosis.adequacy import Adequacy
-from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, verdict
+from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, unconfirmed, verdict
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.learnt import learn_colour
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
@@ -42,6 +42,15 @@ def test_a_structure_is_fitted_again_from_a_better_start_only():
     again = searcher.trial(Structure(AXIS))
     assert again.fit.objective < 0.2 * poor.fit.objective
     assert searcher.trial(Structure(AXIS)).fit is again.fit
+
+
+def test_the_price_of_a_number_is_what_the_fit_knows_of_it_and_never_negative():
+    fitter = fitter_of()
+    fit = fitter.fit(Structure(AXIS))
+    step = np.sqrt(np.diag(fit.covariance)) * np.array([0.5, -1.0, 2.0, 0.3])[: len(fit.theta)]
+    assert np.sum((fit.root @ step) ** 2) == pytest.approx(step @ np.linalg.solve(fit.covariance, step), rel=1e-3)
+    alike = replace(fit, J=np.column_stack([*[fit.J[:, 0]] * len(fit.theta), *fit.J[:, len(fit.theta) :].T]))
+    assert np.all(np.linalg.eigvalsh(alike.root.T @ alike.root) > -1e-9 * np.linalg.norm(alike.root) ** 2)
 
 
 @pytest.mark.parametrize("at_rest, learnt", [(0.6, True), (0.0, False)])
@@ -77,9 +86,10 @@ def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, pa
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
     left = fit.n + share**2 * (nominal.objective - fit.n)
     chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out(fit), 0.0)
-    search = Search(Trial(nominal, 1e9, 0.0), chosen, (), ((chosen,) * rivals,), (), None)
+    bare = Trial(nominal, 1e9, 0.0)
+    search = Search(bare, chosen, (bare,), ((chosen,) * rivals,), (), None)
     assert verdict(fitter, search, Adequacy((1.2,), {}, passed)) == says
-    nothing = replace(search, chosen=search.nominal, rivals=())
+    nothing = replace(search, chosen=search.nominal, bare=(), rivals=())
     assert verdict(fitter, nothing, Adequacy((1.2,), {}, passed)) == (CONSISTENT if passed else UNEXPLAINED)
 
 
@@ -115,3 +125,25 @@ def test_nothing_is_sought_in_what_the_form_of_a_law_leaves(monkeypatch):
     assert not searcher._of_form(trial(60.0, gain))  # its form is right
     hidden = trial(60.0)
     assert not searcher._of_form(replace(hidden, fit=replace(hidden.fit, penalty=100.0)))
+
+
+@pytest.mark.parametrize(
+    "left, held, before_held, worth",
+    [(0.0, 0.0, 0.0, True), (0.2, 0.0, 0.0, False), (0.0, 10.0, 0.0, False), (0.0, 1e4, 1e4, False)],
+)
+def test_what_no_held_out_record_reaches_is_named_where_it_explains_nearly_all(left, held, before_held, worth):
+    """Hit in the record to fit alone, where it leaves 1e4 squares beside 1500 of noise."""
+    searcher = searcher_of(fitter_of())
+    nominal = searcher.trial(Structure(AXIS), steps=40)
+    fit = searcher.fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
+
+    def trial(of, squares, held_squares):
+        return Trial(replace(of, chi2=searcher.n_fit + squares, penalty=0.0), searcher.n_held + held_squares, 0.0)
+
+    before, after = trial(nominal.fit, 1e4, before_held), trial(fit, 1e4 * left, held)
+    assert searcher._worth(before, after) == worth
+    search = Search(before, after, (before,), ((),), (), None)
+    assert unconfirmed(search) == (BACKLASH,)
+    assert verdict(searcher.fitter, search, Adequacy((1.0,), {}, True)) == PARTLY
+    shown = replace(search, bare=(trial(nominal.fit, 1e4, held + 50.0),))
+    assert unconfirmed(shown) == () and verdict(searcher.fitter, shown, Adequacy((1.0,), {}, True)) == EXPLAINED

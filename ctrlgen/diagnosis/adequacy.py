@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.noise import LAGS, ljung_box, without_lines
 from ctrlgen.lattice import lattice
 
-STEPS = 8  # to where the held-out records are most likely, as the numbers are known
+STEPS = 20  # at most, to where the held-out records are most likely, as the numbers are known
 RATIO = 1.10  # held-out error over what is expected: the gate of the design
 SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
 NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
@@ -72,7 +72,8 @@ def judge(fitter: Fitter, fit: Fit) -> Adequacy:
     smallest["fitted"] = float(stats.chi2.sf(fit.chi2 / max(doubt) ** 2, free))
     above |= np.sqrt(fit.chi2 / free) > RATIO * max(doubt) and smallest["fitted"] < SMALL_SAMPLE
     restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
-    return Adequacy(ratio, smallest, not (above or rejected or restless), restless)
+    passed = bool(np.isfinite(ratio).all()) and not (above or rejected or restless)
+    return Adequacy(ratio, smallest, passed, restless)
 
 
 def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:

@@ -15,7 +15,7 @@ from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, written
 from ctrlgen.diagnosis.profile import Profile
 from ctrlgen.diagnosis.scatter import deviations
 from ctrlgen.diagnosis.structure import Structure, changed
-from ctrlgen.diagnosis.trial import Search
+from ctrlgen.diagnosis.trial import CONFIRMED, Search
 from ctrlgen.recording import Recording
 from ctrlgen.units import difference, from_si, to_si
 
@@ -88,6 +88,11 @@ class Diagnosis:
         """
         return values(self.search.chosen.fit, self.profiles)
 
+    @property
+    def unconfirmed(self) -> tuple[Hypothesis, ...]:
+        """Causes that no held-out record shows."""
+        return unconfirmed(self.search)
+
     @cached_property
     def corrected(self) -> Device:
         """The device with all that was found in it, as device.next.toml describes it; what was read off stands last."""
@@ -108,8 +113,8 @@ class Diagnosis:
 def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False) -> str:
     """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
 
-    Partly: causes are found, but they leave a little more than noise, or nothing tells the noise, so that nobody can say
-    whether all is explained.
+    Partly: causes are found, but they leave a little more than noise, or no held-out record shows one of them, or nothing
+    tells the noise, so that nobody can say whether all is explained.
     """
     found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
     if known and not after.passed and remaining(fitter, search) > LITTLE:
@@ -118,7 +123,18 @@ def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False)
         return CONSISTENT
     if any(search.rivals):
         return AMBIGUOUS
-    return EXPLAINED if known and after.passed else PARTLY
+    return EXPLAINED if known and after.passed and not unconfirmed(search) else PARTLY
+
+
+def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
+    """The causes that no held-out record shows, and that nothing the device states of itself demands."""
+    chosen = search.chosen
+    return tuple(
+        cause
+        for cause, bare in zip(chosen.fit.structure.causes, search.bare, strict=True)
+        if bare.held - chosen.held < CONFIRMED
+        and bare.fit.penalty - chosen.fit.penalty < 0.5 * (bare.fit.objective - chosen.fit.objective)
+    )
 
 
 def remaining(fitter: Fitter, search: Search) -> float:

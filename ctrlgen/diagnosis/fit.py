@@ -26,7 +26,8 @@ WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
 LONGEST_STEP = 1.5  # of a logarithm
-HALVINGS = 6  # of a record's start that does not keep what its slopes promise
+HALVINGS = 6  # of a step that does not keep what its slopes promise
+SETTLED = 0.1  # squares: numbers that gain less have arrived
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
 
 
@@ -59,6 +60,15 @@ class Fit:
         inverse = np.linalg.pinv((self.J / scale).T @ (self.J / scale), rcond=1e-14)
         k = len(self.theta)
         return (inverse / np.outer(scale, scale))[:k, :k]
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """R (k, k) of the unknowns with |R dp|^2 = dp' C^-1 dp: what the readings say of them whatever the starts are."""
+        k = len(self.theta)
+        if self.J.shape[1] == k:
+            return np.linalg.qr(self.J, "r")
+        Q = np.linalg.qr(self.J[:, k:])[0]
+        return np.linalg.qr(self.J[:, :k] - Q @ (Q.T @ self.J[:, :k]), "r")
 
     def values(self, cause: int) -> dict[str, float]:
         """The parameters of one cause [SI]."""
@@ -186,7 +196,7 @@ class Fitter:
         if not len(sd) or not np.all((sd > 0) & np.isfinite(sd)):
             return fit, 0.0, 0.0
         C = fit.covariance / np.outer(sd, sd)
-        inverse, best = np.linalg.pinv(C, rcond=1e-12), (fit, 0.0, 0.0)
+        R, best = fit.root * sd, (fit, 0.0, 0.0)
         low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
         least = self._held_squares(fit)
         for k in range(steps):
@@ -196,14 +206,18 @@ class Fitter:
                 break
             if k == 0:
                 best = fit, 0.0, float(np.linalg.slogdet(spread)[1])
-            away = (best[0].theta - fit.theta) / sd
-            theta = np.clip(best[0].theta + sd * np.linalg.solve(spread, C @ b - away), low, high)
-            away, moved = (theta - fit.theta) / sd, replace(fit, theta=theta)
-            price = float(away @ inverse @ away)
-            total = self._held_squares(moved) + price
-            if total > least:
+            begin = best[0].theta
+            step = sd * np.linalg.solve(spread, C @ b - (begin - fit.theta) / sd)
+            before = least
+            for halved in range(HALVINGS if steps > 1 else 1):
+                moved = replace(fit, theta=np.clip(begin + step / 2**halved, low, high))
+                price = float(np.sum((R @ ((moved.theta - fit.theta) / sd)) ** 2))
+                total = self._held_squares(moved) + price
+                if total < least:
+                    best, least = (moved, price, best[2]), total
+                    break
+            if not least < before - SETTLED:
                 break
-            best, least = (moved, price, best[2]), total
         return best
 
     def _held_slopes(self, fit: Fit, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

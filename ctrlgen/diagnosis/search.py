@@ -19,21 +19,25 @@ from ctrlgen.diagnosis.learnt import learn_colour, learn_size
 from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.diagnosis.trial import Round, Search, Trial
+from ctrlgen.diagnosis.trial import CONFIRMED, Round, Search, Trial
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
+GROSS = (
+    1.10  # times the noise, the gate of adequacy: records that leave more show what those that leave less do not reach
+)
 DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
 MOST_CAUSES = {"poses": 24, "series": 8}
 WORTHWHILE = (
     0.05  # of the held-out excess over the noise: what a further cause must take away; patches of a wrong law do not
 )
-CONFIRMED = 2.0  # z^2 that the held-out records must show of a cause at least
 LEARNINGS = 8  # of the noise from what is left, at most
 TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
 TRIAL_STEPS = 8
 ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
 RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
 SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
+FORM = 0.25  # the same for the held-out records, where either explains all of the records to fit
+MET = 4.0  # standard deviations of the noise's own squares
 VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
 ABLE = 0.5  # of what a cause takes away: what its rival must promise; shapes between the grid's points lose that much
 REPLACEMENTS = 6  # rivals fitted for a cause
@@ -50,7 +54,7 @@ class Searcher:
         self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
         self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
         self.known: dict[frozenset, tuple[Trial, int]] = {}
-        self.screens: dict[frozenset, Screened] = {}
+        self.screens: dict[frozenset, tuple[Fit, Screened]] = {}
         self.mismatch = np.inf  # objective of the described device beyond the noise
         self.trials = TRIALS * (3 if fitter.recording.kind == "poses" else 1)
 
@@ -83,7 +87,7 @@ class Searcher:
         current = self._measured(self.trial(structure, steps=40))
         self.mismatch = current.fit.objective - self.n_fit
         rounds: list[Round] = []
-        visited = {frozenset(structure.causes)}
+        visited = {frozenset(structure.causes): current.fit.objective}
         while True:
             self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
             screened = self._screened(current)
@@ -98,17 +102,18 @@ class Searcher:
                 break
             best, n = self._best(current, better), len(current.fit.structure.causes)
             current = self._prune(self._swap(best, n))
-            if frozenset(current.fit.structure.causes) in visited:
+            key = frozenset(current.fit.structure.causes)
+            if current.fit.objective > visited.get(key, np.inf) - RIVAL:  # no better than when it was there before
                 break
-            visited.add(frozenset(current.fit.structure.causes))
             current = self._measured(self._polished(current))
+            visited[key] = current.fit.objective
         if self.fitter.recording.kind == "series":
             noise = learn_colour(self.fitter, current.fit)
             if noise is not self.fitter.noise:
                 self.fitter.noise = noise
                 self.known.clear()
                 self.screens.clear()
-            current = self._prune(self._polished(current), least=0)
+            current = self._prune(self._polished(current))
             screened = self._screened(current)
         nominal = self.trial(structure, steps=40)
         each = range(len(current.fit.structure.causes))
@@ -130,7 +135,12 @@ class Searcher:
         c_fit = max(best.fit.objective / max(self.n_fit, 1), 1.0)
         c_held = max(best.held / max(self.n_held, 1), 1.0)
         gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
-        return gained - SLACK * (self.n_fit * (1 - 1 / c_fit) + self.n_held * (1 - 1 / c_held))
+        worst = max(a.fit.objective, b.fit.objective)
+        met = worst < self.n_fit + MET * np.sqrt(
+            2 * self.n_fit
+        )  # alike on the records to fit, and neither law is right
+        slack = FORM if met else SLACK
+        return gained - SLACK * self.n_fit * (1 - 1 / c_fit) - slack * self.n_held * (1 - 1 / c_held)
 
     def _best(self, current: Trial, better: list[Trial]) -> Trial:
         """The plainest, once it and what takes away nearly as much so far are fitted to their end."""
@@ -259,9 +269,16 @@ class Searcher:
         needed = 12.0 + added * np.log(max(self.n_fit, 2))
         if before.fit.penalty - after.fit.penalty > 0.5 * gained:  # the device hid it at a price: it shows nowhere else
             return gained > needed and confirmed > -4.0
+        if self._out_of_reach(before) and gained > MOSTLY * (before.fit.objective - self.n_fit) and confirmed > -4.0:
+            return gained > needed
         if gained + min(confirmed, gained) <= needed + CONFIRMED or gained <= MATERIAL**2 * self.n_fit:
             return False
         return confirmed > max(CONFIRMED, WORTHWHILE * max(before.held - self.n_held, 0.0))
+
+    def _out_of_reach(self, trial: Trial) -> bool:
+        """Whether the records to fit show plainly what the held-out ones do not."""
+        most = GROSS**2 - 1
+        return trial.fit.objective - self.n_fit > most * self.n_fit and trial.held - self.n_held < most * self.n_held
 
     def _swap(self, current: Trial, before: int) -> Trial:
         """Each cause against what would be suspected in its place, now that the others are there; not what came alone to
@@ -297,14 +314,14 @@ class Searcher:
 
     def _screened(self, trial: Trial) -> Screened:
         key = frozenset(trial.fit.structure.causes)
-        if key not in self.screens:
-            self.screens[key] = self.screen.run(trial.fit)
-        return self.screens[key]
+        fit, screened = self.screens.get(key, (None, None))
+        if screened is None or fit is not trial.fit:
+            screened = self.screen.run(trial.fit)
+            self.screens[key] = trial.fit, screened
+        return screened
 
-    def _prune(self, current: Trial, least: int = 1) -> Trial:
+    def _prune(self, current: Trial) -> Trial:
         for k in reversed(range(len(current.fit.structure.causes))):
-            if len(current.fit.structure.causes) <= least:
-                break
             bare = self.trial(_cooled(current.fit).without(k))
             if not self._worth(bare, current) or self._doubtful(bare, current, k):
                 current = bare

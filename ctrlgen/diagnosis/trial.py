@@ -8,6 +8,8 @@ from ctrlgen.diagnosis.fit import Fit
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.screen import Screened
 
+CONFIRMED = 2.0  # z^2 that the held-out records must show of a cause at least
+
 
 @dataclass(frozen=True, eq=False)
 class Trial:

@@ -182,11 +182,12 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             "device.next.toml holds the best of them; it predicts records of this kind as well as any." + rest,
         ]
     if verdict == PARTLY:
-        left = (
-            "A little remains above the noise, less than 5 % of what was wrong: see where below."
-            if known
-            else f"Whether something remains cannot be said.{rest}"
-        )
+        left = f"Whether something remains cannot be said.{rest}"
+        if known:
+            left = "A little remains above the noise, less than 5 % of what was wrong: see where below."
+        if diagnosis.unconfirmed:
+            names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
+            left = f"No held-out record shows {names}: hold out one that goes where the record to fit went."
         return [f"{use} It is better than before.", left]
     return [
         "Not a cause I know. Look below at where the mismatch lives, and check the set-up: wiring, units, clocks.",
