@@ -178,7 +178,7 @@ def creeping(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         few = ("creep", "drive_gain", "stiffening")
         patch.setattr(Effect, "library", {kind: Effect.library[kind] for kind in few})
-        creep = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\n'
+        creep = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0"\n'
         return ctrlgen.diagnose(axis, axis_recording(tmp_path_factory.mktemp("axis"), axis.read_text() + creep))
 
 

@@ -265,7 +265,7 @@ def test_profiles_are_finite_and_cover():
 
 def test_a_shape_without_amplitude_is_not_bounded():
     fitter = axis_fitter(n=1500)
-    fit = fitter.fit(Structure(AXIS).with_cause(CREEP, {"gain": 1e-4, "tau": 0.3}))
+    fit = fitter.fit(Structure(AXIS).with_cause(CREEP, {"gain": 1e-4, "tau": 0.3, "slow": 0.1}))
     found = {p.parameter: p for p in profiles(fitter, fit)}
     assert found["tau"].shape != BOUNDED and found["tau"].verified
 
@@ -292,7 +292,7 @@ def rivals():
     """A short slow record of a stage that creeps, fitted with creep and with drift."""
     u = 1.5 * np.minimum(np.arange(600) * H / 0.05, 1.0)
     fitter = axis_fitter(lambda *a: creeping(*a, gain=4e-4, tau=2.0), u=u)
-    creep = fitter.fit(Structure(AXIS).with_cause(CREEP, {"gain": 1e-3, "tau": 1.0}))
+    creep = fitter.fit(Structure(AXIS).with_cause(CREEP, {"gain": 1e-3, "tau": 1.0, "slow": 0.0}))
     drift = fitter.fit(Structure(AXIS).with_cause(DRIFT, {"rate": 1e-8}))
     return fitter, creep, drift
 

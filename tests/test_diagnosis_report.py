@@ -32,7 +32,7 @@ from ctrlgen.effects.saturation import Saturation
 from ctrlgen.units import from_si
 
 AXIS, MESO = SCENARIOS / "devices" / "flexure_axis.toml", SCENARIOS / "devices" / "meso_hexapod.toml"
-CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\n'
+CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
 STEP = 1e-3
 RECORD = '[[record]]\nfile = "{0}.csv"\nrole = "{0}"\ntime = {{ column = "t", unit = "s" }}\n'
 

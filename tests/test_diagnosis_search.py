@@ -11,6 +11,7 @@ from test_diagnosis_causes import BACKLASH, LATE, LIMIT, fitter_of, played
 from test_diagnosis_evidence import AXIS, NOISE
 
 from ctrlgen.diagnosis.adequacy import Adequacy
+from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, unconfirmed, verdict
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.learnt import learn_colour
@@ -147,3 +148,19 @@ def test_what_no_held_out_record_reaches_is_named_where_it_explains_nearly_all(l
     assert verdict(searcher.fitter, search, Adequacy((1.0,), {}, True)) == PARTLY
     shown = replace(search, bare=(trial(nominal.fit, 1e4, held + 50.0),))
     assert unconfirmed(shown) == () and verdict(searcher.fitter, shown, Adequacy((1.0,), {}, True)) == EXPLAINED
+
+
+class Kinked:
+    """Two numbers; the slope by the second, which promises much, is that of another place."""
+
+    k, most, bounds = 2, np.full(2, np.inf), (np.full(2, -1e3), np.full(2, 1e3))
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        return np.array([x[0] - 7.0, 5.0 + abs(x[1])])
+
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.residual(x), np.array([[1.0, 0.0], [0.0, 1.0]])
+
+
+def test_a_number_that_lies_about_its_slope_does_not_hold_the_others():
+    assert levenberg_marquardt(Kinked(), np.zeros(2), 40)[0] == pytest.approx(7.0)

@@ -26,7 +26,7 @@ from fmpy.fmi2 import FMU2Slave  # noqa: E402
 from fmpy.fmi3 import FMU3Slave  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 
-CREEP = {"kind": "creep", "at": "all", "gain": "0.03", "tau": "20 ms"}
+CREEP = {"kind": "creep", "at": "all", "gain": "0.03", "tau": "20 ms", "slow": "0.3"}
 DELAY = {"kind": "delay", "at": "all", "delay": "2.5 ms"}
 
 

@@ -39,7 +39,7 @@ def test_a_settled_pose_is_where_a_long_simulation_ends():
     """With memories in pairs (a second-order filter), in chains (creep behind the heaters) and all at once (crosstalk)."""
     effects = (
         {"kind": "low_pass", "at": "delta_z", "share": "1", "tau": "20 ms", "damping": "0.7"},
-        {"kind": "creep", "at": "1X", "gain": "0.05", "tau": "30 ms"},
+        {"kind": "creep", "at": "1X", "gain": "0.05", "tau": "30 ms", "slow": "0"},
         {"kind": "heat_crosstalk", "at": "all", "share": "0.02"},
     )
     model = build_model(effect_device(*effects))
@@ -198,9 +198,9 @@ def test_a_device_that_softens_to_nothing_is_refused():
 
 
 def test_two_effects_of_one_kind_keep_their_own_states():
-    creep = {"kind": "creep", "gain": "0.1", "tau": "1 s"}
+    creep = {"kind": "creep", "gain": "0.1", "tau": "1 s", "slow": "0"}
     model = build_model(effect_device({**creep, "at": "1X"}, {**creep, "at": "all"}))
-    assert len(model.x_names) == 6 + 1 + 6 and len(set(model.x_names)) == 13
+    assert len(model.x_names) == 6 + 2 + 12 and len(set(model.x_names)) == 20
 
 
 @pytest.mark.parametrize("measures", ["reading", "displacement"])

@@ -115,7 +115,7 @@ def test_the_list_of_deviations_is_exact_with_a_player(circle, tmp_path):
 @pytest.mark.parametrize("kind", ["creep", "hysteresis"])
 def test_controllers_of_devices_with_effects_break_no_rule_and_survive_hostile_calls(kind, tmp_path):
     effects = {
-        "creep": {"kind": "creep", "at": "1X", "tau": "0.03 s", "gain": 0.02},
+        "creep": {"kind": "creep", "at": "1X", "tau": "0.03 s", "gain": 0.02, "slow": 0.3},
         "hysteresis": {"kind": "hysteresis", "at": "1X", "stiffness": "0.0015 N/um", "reach": "0.3 um", "taper": 0.0},
     }
     scenario = replace(load_scenario(SCENARIOS / "circle20"), device=effect_device(effects[kind]))

@@ -13,6 +13,7 @@ kind = "creep"
 at = "all"
 gain = "0.03"
 tau = "0.1 s"
+slow = "0.2"
 
 [[effect]]
 kind = "heat_crosstalk"

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 NEGLIGIBLE = 0.01  # of one squared standard deviation
+BEGIN, FAILED = 1e-6, 1e-2  # Marquardt's damping at first, and where a step has failed twice
 
 
 class Problem(Protocol):
@@ -30,12 +31,13 @@ class Problem(Protocol):
 def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
     """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431), steps clipped at the bounds.
 
-    A step that fails is tried without its part in the records' starts: those may bend within a gap or a fringe. Ends when
-    a step promises less than `NEGLIGIBLE` of one squared standard deviation.
+    A step that fails is tried without its part in the records' starts: those may bend within a gap or a fringe. One that
+    fails however short it is, without the number that promises most: the moment of an event between two samples lies about
+    its slope. Ends when a step promises less than `NEGLIGIBLE` of one squared standard deviation.
     """
     low, high = problem.bounds
     own = np.arange(len(x)) < problem.k
-    x, damping = np.clip(x, low, high), 1e-6
+    x, damping = np.clip(x, low, high), BEGIN
     r, J = problem.evaluate(x)
     for _ in range(steps):
         gradient, H = J.T @ r, J.T @ J
@@ -48,6 +50,11 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarr
         better = _better(problem, r, np.clip(x + step, low, high))
         if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
             step = _damped(H, gradient, open_ & own, damping, problem.most)
+            better = _better(problem, r, np.clip(x + step, low, high))
+        if better is None and damping > FAILED:
+            others = own & open_
+            others[np.argmax(np.where(others, np.abs(gradient * step), -1.0))] = False
+            step = _damped(H, gradient, others, BEGIN, problem.most)
             better = _better(problem, r, np.clip(x + step, low, high))
         if better is not None:
             x, damping = better, max(damping / 10, 1e-9)

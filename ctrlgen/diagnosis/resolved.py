@@ -9,14 +9,19 @@ import numpy as np
 
 from ctrlgen.diagnosis.fit import Fit
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.lattice import lattice
 from ctrlgen.recording import Recording
 
 APART = 0.5  # periods by which two lines must part over what the records to fit cover: nearer, they only beat as one
+STEPS = 3.0  # of a lattice of readings: a shorter period is that of their rounding
 
 
 def resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()) -> bool:
-    """Whether every two causes of one kind at one place part; those `accepted` are not compared with one another."""
+    """Whether every two causes of one kind at one place part, and none repeats with the rounding of its reading; those
+    `accepted` are not compared with one another."""
     causes = fit.structure.causes
+    if any(_on_the_lattice(recording, fit, k) for k, c in enumerate(causes) if c not in accepted):
+        return False
     for j, k in combinations(range(len(causes)), 2):
         a, b = causes[j], causes[k]
         if a.effect == PARAMETER or not a.law.several or (a.effect, a.location) != (b.effect, b.location):
@@ -27,6 +32,19 @@ def resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()
         if abs(lines[0] - lines[1]) * _covered(recording, a) < APART:
             return False
     return True
+
+
+def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> bool:
+    """Whether cause k is or repeats with the steps in which its channel is read: what the readings show by themselves."""
+    cause = fit.structure.causes[k]
+    channel = f"reading.{cause.at}"
+    if cause.effect == PARAMETER or channel not in recording.channels:
+        return False
+    i = recording.channels.index(channel)
+    values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
+    read, *_ = cause.law.read_off(values) or ({},)
+    steps = (p.name for p in cause.law.params if p.off is None and (p.seen == "pitches" or p.name in read))
+    return any(fit.values(k)[name] < STEPS * lattice(values) for name in steps)
 
 
 def _line(fit: Fit, k: int) -> float:

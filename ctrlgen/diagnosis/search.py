@@ -15,7 +15,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.learnt import learn_colour, learn_size
+from ctrlgen.diagnosis.learnt import learn_colour, learn_guessed, learn_size
 from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
@@ -31,6 +31,7 @@ WORTHWHILE = (
     0.05  # of the held-out excess over the noise: what a further cause must take away; patches of a wrong law do not
 )
 LEARNINGS = 8  # of the noise from what is left, at most
+SAME_NOISE = 0.05  # of itself: a noise that changes by less shows nothing new
 TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
 TRIAL_STEPS = 8
 ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
@@ -83,43 +84,51 @@ class Searcher:
         return found
 
     def run(self, structure: Structure) -> Search:
-        """Forward rounds until nothing more is justified, with swaps in between; then the rivals of each cause."""
-        current = self._measured(self.trial(structure, steps=40))
+        """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
+        current, rounds = self._measured(self.trial(structure, steps=40)), []
         self.mismatch = current.fit.objective - self.n_fit
-        rounds: list[Round] = []
-        visited = {frozenset(structure.causes): current.fit.objective}
+        for _ in range(LEARNINGS):
+            current = self._rounds(current, rounds)
+            before = self.fitter.noise
+            if self.fitter.recording.kind == "series":
+                learn = learn_guessed if before.guessed.any() else learn_colour
+                self.fitter.noise = learn(self.fitter, current.fit)
+            if self.fitter.noise is before:
+                break
+            self.known.clear()
+            self.screens.clear()
+            current = self._prune(self._polished(current))
+            if np.allclose(self.fitter.noise.floor, before.floor, rtol=SAME_NOISE):
+                break
+        current = self._prune(self._polished(current))
+        nominal = self.trial(structure, steps=40)
+        each = range(len(current.fit.structure.causes))
+        bare = tuple(self.trial(_cooled(current.fit).without(k)) for k in each)
+        rivals = tuple(self._rivals(current, k) for k in each)
+        return Search(nominal, current, bare, rivals, tuple(rounds), self._screened(current))
+
+    def _rounds(self, current: Trial, rounds: list[Round]) -> Trial:
+        """Forward rounds from `current`, with swaps in between, until nothing more is justified; appends each to `rounds`."""
+        visited = {frozenset(current.fit.structure.causes): current.fit.objective}
         while True:
             self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
             screened = self._screened(current)
             if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind] or self._of_form(current):
-                break
+                return current
             trials = self._try(current, self._conspicuous(current, screened))
             trials = (*trials, *self._together(current, screened, trials))
             trials = tuple(sorted(self._ended(current, trials), key=lambda t: t.total))
             rounds.append(Round(screened, trials, current))
             better = [t for t in trials if self._justified(current, t)]
             if not better:
-                break
+                return current
             best, n = self._best(current, better), len(current.fit.structure.causes)
             current = self._prune(self._swap(best, n))
             key = frozenset(current.fit.structure.causes)
             if current.fit.objective > visited.get(key, np.inf) - RIVAL:  # no better than when it was there before
-                break
+                return current
             current = self._measured(self._polished(current))
             visited[key] = current.fit.objective
-        if self.fitter.recording.kind == "series":
-            noise = learn_colour(self.fitter, current.fit)
-            if noise is not self.fitter.noise:
-                self.fitter.noise = noise
-                self.known.clear()
-                self.screens.clear()
-            current = self._prune(self._polished(current))
-            screened = self._screened(current)
-        nominal = self.trial(structure, steps=40)
-        each = range(len(current.fit.structure.causes))
-        bare = tuple(self.trial(_cooled(current.fit).without(k)) for k in each)
-        rivals = tuple(self._rivals(current, k) for k in each)
-        return Search(nominal, current, bare, rivals, tuple(rounds), screened)
 
     def _polished(self, trial: Trial) -> Trial:
         """The same fit driven to its end; trials stop early."""

@@ -2,25 +2,30 @@
 
 from ctrlgen.effect import Effect, Param, Place, State
 
+RATIO = 4.0  # of the two relaxation times: between them lie two octaves, which a mixture of both spans evenly
+
 
 class Creep(Effect):
-    """dz/dt = (d - z)/tau, Delta d = g z: one relaxation.
+    """dz/dt = (d - z)/tau, dw/dt = (d - w)/(4 tau), Delta d = g ((1 - s) z + s w): a chain of two relaxations.
 
-    Holds for holds between 0.1 tau and 10 tau; use several, a decade apart, for logarithmic creep.
+    Holds for holds between 0.1 tau and 10 tau; s = 0 is one relaxation alone. Over more decades creep is logarithmic.
     """
 
     place = Place.DISPLACEMENT
     rough = 0.01
     family = "creep"
-    source = "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), standard solid"
-    params = (
-        Param("gain", "1", (0.0, 0.2), "extra travel after infinite time, per travel", off=0.0),
-        Param("tau", "s", (1e-3, 1e5), "relaxation time", grid=(0.03, 0.3, 3.0, 30.0, 300.0)),
+    source = (
+        "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), chain of Kelvin solids"
     )
-    states = (State("z", "travel", 1.0),)
+    params = (
+        Param("gain", "1", (0.0, 1.0), "extra travel after infinite time, per travel", off=0.0),
+        Param("tau", "s", (1e-3, 1e5), "relaxation time", grid=(0.03, 0.3, 3.0, 30.0, 300.0)),
+        Param("slow", "1", (0.0, 0.5), "s: part of it that takes four times as long", grid=(0.0, 0.25)),
+    )
+    states = (State("z", "travel", 1.0), State("w", "travel", 1.0))
 
     def term(self, s, p):
-        return p.gain * s.z
+        return p.gain * ((1 - p.slow) * s.z + p.slow * s.w)
 
     def rates(self, s, p):
-        return {"z": (s.value - s.z) / p.tau}
+        return {"z": (s.value - s.z) / p.tau, "w": (s.value - s.w) / (RATIO * p.tau)}
