@@ -91,7 +91,10 @@ def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, pa
     search = Search(bare, chosen, (bare,), ((chosen,) * rivals,), (), None)
     assert verdict(fitter, search, Adequacy((1.2,), {}, passed)) == says
     nothing = replace(search, chosen=search.nominal, bare=(), rivals=())
-    assert verdict(fitter, nothing, Adequacy((1.2,), {}, passed)) == (CONSISTENT if passed else UNEXPLAINED)
+    for left in (nominal.chi2, 0.5 * nominal.n):  # also where only the rest is no noise
+        clean = Trial(replace(nominal, chi2=left, penalty=0.0), 0.0, 0.0)
+        said = verdict(fitter, replace(nothing, chosen=clean, nominal=clean), Adequacy((1.2,), {}, passed))
+        assert said == (CONSISTENT if passed else UNEXPLAINED)
 
 
 @pytest.mark.parametrize("mismatch, sizes", [(2e4, {2, 3}), (2e6, {2})])

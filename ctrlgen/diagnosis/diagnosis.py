@@ -117,7 +117,7 @@ def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False)
     tells the noise, so that nobody can say whether all is explained.
     """
     found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
-    if known and not after.passed and remaining(fitter, search) > LITTLE:
+    if known and not after.passed and not (found and remaining(fitter, search) <= LITTLE):
         return UNEXPLAINED
     if not found:
         return CONSISTENT
