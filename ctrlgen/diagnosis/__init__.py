@@ -95,7 +95,12 @@ def _diagnose(
         detectable=beside.detectable,
         next_experiment=beside.next_experiment,
         history=beside.history,
-        notes=(*recording.notes, *noise.said, *([spikes] if spikes else []), *map(RESTLESS.format, after.restless)),
+        notes=(
+            *recording.notes,
+            *fitter.noise.said,
+            *([spikes] if spikes else []),
+            *map(RESTLESS.format, after.restless),
+        ),
         device=device,
         recording=fitter.recording,
         search=found,

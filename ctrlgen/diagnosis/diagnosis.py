@@ -20,9 +20,8 @@ from ctrlgen.recording import Recording
 from ctrlgen.units import difference, from_si, to_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
-LITTLE = (
-    0.05  # of the mismatch: the form of a law is right to that in the worst case, and what leaves more is another law
-)
+LITTLE = 0.05  # of the mismatch: a law's form is right to that in the worst case, and what leaves more is another law
+CHANCE = 4.0  # standard deviations of the noise's own squares
 
 
 @dataclass(frozen=True)
@@ -139,14 +138,17 @@ def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
 
 def remaining(fitter: Fitter, search: Search) -> float:
     """What the chosen causes leave beyond the noise, as a share of what the device as described leaves, both root mean
-    square; the larger one of the records to fit and of those held out."""
+    square; the larger one of the records to fit and of those held out. By as much as `CHANCE` the noise itself may differ."""
     n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
     after, before = search.chosen, search.nominal
-    pairs = (
-        (after.fit.objective - after.fit.n, before.fit.objective - after.fit.n),
-        (after.held - n_held, before.held - n_held),
-    )
-    return max(float(np.sqrt(max(left, 0.0) / max(all_, 1e-300))) for left, all_ in pairs)
+    shares = [0.0]
+    for left, all_, n in (
+        (after.fit.objective, before.fit.objective, after.fit.n),
+        (after.held, before.held, n_held),
+    ):
+        if left - n > CHANCE * np.sqrt(2 * n):
+            shares.append(float(np.sqrt((left - n) / max(all_ - n, left - n))))
+    return max(shares)
 
 
 def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:

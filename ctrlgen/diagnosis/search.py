@@ -145,9 +145,8 @@ class Searcher:
         c_held = max(best.held / max(self.n_held, 1), 1.0)
         gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
         worst = max(a.fit.objective, b.fit.objective)
-        met = worst < self.n_fit + MET * np.sqrt(
-            2 * self.n_fit
-        )  # alike on the records to fit, and neither law is right
+        most = self.n_fit + MET * np.sqrt(2 * self.n_fit)
+        met = worst < most and self.fitter.noise.known.all()  # alike on the records to fit, and neither law is right
         slack = FORM if met else SLACK
         return gained - SLACK * self.n_fit * (1 - 1 / c_fit) - slack * self.n_held * (1 - 1 / c_held)
 
@@ -349,8 +348,9 @@ class Searcher:
 
     def _of_form(self, current: Trial) -> bool:
         """Whether all that is left is no more than the form of a cause's law may leave: what would be found in it, would be
-        doubtful. Not where the device hides something at a price."""
-        if current.fit.penalty > DEAR + 2 * len(current.fit.structure.unknowns):
+        doubtful. Not where the device hides something at a price, or where only what is left tells the noise."""
+        hidden = current.fit.penalty > DEAR + 2 * len(current.fit.structure.unknowns)
+        if hidden or not self.fitter.noise.known.all():
             return False
         left = max(current.held - self.n_held, 0.0) * max(current.fit.objective - self.n_fit, 0.0)
         return self._may_be_form(left, current)
