@@ -14,11 +14,11 @@ from ctrlgen.diagnosis.adequacy import Adequacy
 from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, unconfirmed, verdict
 from ctrlgen.diagnosis.hypotheses import Hypothesis
-from ctrlgen.diagnosis.learnt import learn_colour
+from ctrlgen.diagnosis.learnt import learn_colour, learn_more
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
-from ctrlgen.diagnosis.search import Searcher, freed
+from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.diagnosis.trial import Search, Trial
+from ctrlgen.diagnosis.trial import Search, Trial, freed
 
 
 def searcher_of(fitter) -> Searcher:
@@ -75,6 +75,17 @@ def test_a_colour_that_the_rest_has_not_is_not_the_noises(at_rest, learnt):
     noise = learn_colour(fitter, fitter.fit(Structure(AXIS)))
     assert (noise is not fitter.noise) == learnt
     assert not learnt or noise.ar[0][0] == pytest.approx(0.6, abs=0.08)
+
+
+@pytest.mark.parametrize("times, learnt", [(5.0, True), (0.2, False)])
+def test_a_guessed_noise_is_corrected_downward_alone(times, learnt):
+    fitter = fitter_of()
+    fit = fitter.fit(Structure(AXIS))
+    guessed = np.ones(1, bool)
+    fitter.noise = replace(fitter.noise, sd=times * fitter.noise.sd, ar=(np.zeros(0),), guessed=guessed)
+    noise = learn_more(fitter, fit)
+    assert (noise is not fitter.noise) == learnt
+    assert not learnt or (noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in noise.said[0])
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def learn_guessed(fitter: Fitter, fit: Fit) -> Noise:
         ar[i] = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in parts], axis=0, weights=weights)
         count[i] = sum(weights)
         said[i] = (
-            f"{channels[i]}: from what the device as described leaves at the frequencies at which the "
+            f"{channels[i]}: from what the fit leaves at the frequencies at which the "
             f"readings move least, autoregressive of order {order}; record some rest to know it"
         )
     return replace(noise, sd=sd, ar=tuple(ar), count=count, said=tuple(said))
@@ -45,6 +45,23 @@ def _quiet(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.
         return None
     a, b = max(good.reshape(-1, 2), key=lambda run: run[1] - run[0])
     return quiet_noise((record.observed[:, i] - y)[a:b], y[a:b])
+
+
+def learn_more(fitter: Fitter, fit: Fit) -> Noise:
+    """What a fit with causes tells of the noise: of one that was guessed, where it is smaller now, as physics left out only
+    adds to it; else its colour. The same noise where nothing is learnt."""
+    noise = fitter.noise
+    if not noise.guessed.any():
+        return learn_colour(fitter, fit)
+    found = learn_guessed(fitter, fit)
+    smaller = found.floor < noise.floor
+    if not smaller.any():
+        return noise
+    pairs = {name: (getattr(found, name), getattr(noise, name)) for name in ("sd", "count")}
+    rows = {
+        name: tuple(getattr(found if s else noise, name)[i] for i, s in enumerate(smaller)) for name in ("ar", "said")
+    }
+    return replace(noise, **{name: np.where(smaller, a, b) for name, (a, b) in pairs.items()}, **rows)
 
 
 def learn_colour(fitter: Fitter, fit: Fit) -> Noise:

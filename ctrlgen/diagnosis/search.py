@@ -15,11 +15,11 @@ import numpy as np
 
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.learnt import learn_colour, learn_guessed, learn_size
+from ctrlgen.diagnosis.learnt import learn_more, learn_size
 from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.diagnosis.trial import CONFIRMED, Round, Search, Trial
+from ctrlgen.diagnosis.trial import CONFIRMED, Round, Search, Trial, cooled, freed, warm
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
 GROSS = (
@@ -91,8 +91,7 @@ class Searcher:
             current = self._rounds(current, rounds)
             before = self.fitter.noise
             if self.fitter.recording.kind == "series":
-                learn = learn_guessed if before.guessed.any() else learn_colour
-                self.fitter.noise = learn(self.fitter, current.fit)
+                self.fitter.noise = learn_more(self.fitter, current.fit)
             if self.fitter.noise is before:
                 break
             self.known.clear()
@@ -103,7 +102,7 @@ class Searcher:
         current = self._prune(self._polished(current))
         nominal = self.trial(structure, steps=40)
         each = range(len(current.fit.structure.causes))
-        bare = tuple(self.trial(_cooled(current.fit).without(k)) for k in each)
+        bare = tuple(self.trial(cooled(current.fit).without(k)) for k in each)
         rivals = tuple(self._rivals(current, k) for k in each)
         return Search(nominal, current, bare, rivals, tuple(rounds), self._screened(current))
 
@@ -132,7 +131,7 @@ class Searcher:
 
     def _polished(self, trial: Trial) -> Trial:
         """The same fit driven to its end; trials stop early."""
-        return self.trial(_cooled(trial.fit), trial.cause, steps=40)
+        return self.trial(cooled(trial.fit), trial.cause, steps=40)
 
     def _ahead(self, a: Trial, b: Trial) -> float:
         """By how much `a` is better than `b`, and that is beyond what says nothing; negative where it is not.
@@ -185,7 +184,7 @@ class Searcher:
             self.fitter.noise = learn_size(self.fitter, trial.fit)
             self.known.clear()
             self.screens.clear()
-            trial = self.trial(_cooled(trial.fit), trial.cause, steps=40)
+            trial = self.trial(cooled(trial.fit), trial.cause, steps=40)
             if np.allclose(before, self.fitter.noise.sd, rtol=0.02):
                 break
         return trial
@@ -211,7 +210,7 @@ class Searcher:
         trials = []
         for s in suspects:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
-            trials += self._attempt(_warm(current.fit, s.hypothesis, s.start), s.hypothesis, current.fit)
+            trials += self._attempt(warm(current.fit, s.hypothesis, s.start), s.hypothesis, current.fit)
         return tuple(sorted(trials, key=lambda t: t.total))
 
     def _attempt(self, structure: Structure, cause: Hypothesis, nested: Fit | None = None) -> list[Trial]:
@@ -235,7 +234,7 @@ class Searcher:
                     continue
                 if max(used.get(s.hypothesis, 0) for s in suspects) >= max(2, self.trials // 2):
                     continue
-                structure = _cooled(current.fit)
+                structure = cooled(current.fit)
                 if len({(h.family, h.location) if h.family else h for h in (s.hypothesis for s in suspects)}) < size:
                     continue
                 for s in suspects:
@@ -303,7 +302,7 @@ class Searcher:
     def _replacements(self, current: Trial, k: int) -> list[Trial]:
         """What would be suspected instead of cause k, with all the rest as it is now: refitted, it may have gone astray."""
         structure = current.fit.structure
-        others = _cooled(current.fit).without(k)
+        others = cooled(current.fit).without(k)
         bare = self.fitter.fit(others, steps=0)
         screened = self.screen.run(bare)
         without = freed(bare)
@@ -330,7 +329,7 @@ class Searcher:
 
     def _prune(self, current: Trial) -> Trial:
         for k in reversed(range(len(current.fit.structure.causes))):
-            bare = self.trial(_cooled(current.fit).without(k))
+            bare = self.trial(cooled(current.fit).without(k))
             if not self._worth(bare, current) or self._doubtful(bare, current, k):
                 current = bare
         return current
@@ -364,7 +363,7 @@ class Searcher:
         for j, cause in enumerate(current.fit.structure.causes):
             rough = 0.0 if cause.effect == PARAMETER else cause.law.rough
             if rough:
-                without = self.trial(_cooled(current.fit).without(j))
+                without = self.trial(cooled(current.fit).without(j))
                 held = min(without.held, most.held) - current.held
                 fitted = min(without.fit.objective, most.fit.objective) - current.fit.objective
                 if squares < (rough * times) ** 4 * max(held, 0.0) * max(fitted, 0.0):
@@ -386,22 +385,5 @@ def _same(a: Hypothesis | None, b: Hypothesis) -> bool:
     return a is not None and (a.effect, a.location, a.path) == (b.effect, b.location, b.path)
 
 
-def freed(fit: Fit) -> float:
-    """The objective once the free numbers of a fit that is not at its optimum have moved there, to first order."""
-    step = np.linalg.lstsq(fit.J, fit.residual, rcond=None)[0]
-    return float(np.sum((fit.residual - fit.J @ step) ** 2))
-
-
 def _rarity(structure: Structure) -> float:
     return sum(c.law.rarity for c in structure.causes if c.effect != PARAMETER)
-
-
-def _cooled(fit: Fit) -> Structure:
-    """The structure with its causes and the device's own numbers starting where the fit ended."""
-    s = fit.structure
-    own = {u.path: float(v) for u, v in zip(s.unknowns, fit.theta, strict=True) if u.cause is None}
-    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))), own)
-
-
-def _warm(fit: Fit, cause: Hypothesis, start: dict[str, float]) -> Structure:
-    return _cooled(fit).with_cause(cause, start)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ctrlgen.diagnosis.fit import Fit
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.screen import Screened
+from ctrlgen.diagnosis.structure import Structure
 
 CONFIRMED = 2.0  # z^2 that the held-out records must show of a cause at least
 
@@ -46,3 +49,21 @@ class Search:
     rivals: tuple[tuple[Trial, ...], ...]
     rounds: tuple[Round, ...]
     last: Screened
+
+
+def freed(fit: Fit) -> float:
+    """The objective once the free numbers of a fit that is not at its optimum have moved there, to first order."""
+    step = np.linalg.lstsq(fit.J, fit.residual, rcond=None)[0]
+    return float(np.sum((fit.residual - fit.J @ step) ** 2))
+
+
+def cooled(fit: Fit) -> Structure:
+    """The structure with its causes and the device's own numbers starting where the fit ended."""
+    s = fit.structure
+    own = {u.path: float(v) for u, v in zip(s.unknowns, fit.theta, strict=True) if u.cause is None}
+    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))), own)
+
+
+def warm(fit: Fit, cause: Hypothesis, start: dict[str, float]) -> Structure:
+    """The same with another cause, begun at `start` [SI]."""
+    return cooled(fit).with_cause(cause, start)
