@@ -178,3 +178,15 @@ class Kinked:
 
 def test_a_number_that_lies_about_its_slope_does_not_hold_the_others():
     assert levenberg_marquardt(Kinked(), np.zeros(2), 40)[0] == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize("far", [True, False])
+def test_a_device_far_from_the_readings_is_fitted_from_several_starts(monkeypatch, far):
+    fitter, begun = fitter_of(), []
+    best = fitter.fit(Structure(AXIS))
+    stated = sum(u.sd is not None for u in best.structure.unknowns)
+    poor = replace(best, chi2=1e5 * best.chi2 if far else 2 * best.chi2)
+    monkeypatch.setattr(fitter, "fit", lambda s: begun.append(s.own) or (best if len(begun) == 4 else poor))
+    found = fitter.described(AXIS)
+    assert len(begun) == (1 + 2 * stated if far else 1) and stated >= 2
+    assert found is (best if far else poor) and begun[0] == {} and all(len(own) == 1 for own in begun[1:])

@@ -67,7 +67,7 @@ def _diagnose(
     for _ in range(GUESSES if noise.guessed.any() else 0):
         fitter.noise = learn_guessed(fitter, fitter.fit(Structure(device)))
     noise = fitter.noise
-    spikes = fitter.mark_spikes(fitter.fit(Structure(device)))
+    spikes = fitter.mark_spikes(fitter.described(device))
     acting = set(movable(device))
     sample_times = {r.sample_time for r in recording.records}
     links = nominal_links(device)

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ctrlgen.devices import Device
 from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.journal import Journal, key_of
 from ctrlgen.diagnosis.noise import Noise
@@ -24,6 +25,7 @@ STEPS = 40
 CI = 1.959964  # standard deviations of a 95 % interval
 WORST = 1e8  # whitened residual of a simulation that has left the numbers
 FAR = 1e30  # SI: a reading of a simulation that has left the numbers
+FAR_OFF = 100.0  # times the noise, root mean square: so large a mismatch may be for want of a good start
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
 LONGEST_STEP = 1.5  # of a logarithm
 HALVINGS = 6  # of a step that does not keep what its slopes promise
@@ -106,6 +108,17 @@ class Fitter:
         begin[problem.k :] = np.concatenate(nested.starts)
         again = self._optimum(problem, begin, steps)
         return min(found, again, key=lambda fit: fit.objective)
+
+    def described(self, device: Device) -> Fit:
+        """The device as described; where that leaves far more than noise, begun a deviation beside each stated number too:
+        what drifts, or saturates in a loop, bends too much for one start."""
+        found = self.fit(Structure(device))
+        if not self.noise.known.all() or found.objective < FAR_OFF**2 * found.n:
+            return found
+        for u in found.structure.unknowns:
+            for start in (u.nominal - u.sd, u.nominal + u.sd) if u.sd else ():
+                found = min(found, self.fit(Structure(device, own={u.path: start})), key=lambda fit: fit.objective)
+        return found
 
     def begun(self, structure: Structure) -> float:
         """The objective where a fit of the structure begins."""

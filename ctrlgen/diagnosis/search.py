@@ -85,7 +85,8 @@ class Searcher:
 
     def run(self, structure: Structure) -> Search:
         """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
-        current, rounds = self._measured(self.trial(structure, steps=40)), []
+        described = self.fitter.described(structure.device)
+        current, rounds = self._measured(self.trial(cooled(described), steps=40)), []
         self.mismatch = current.fit.objective - self.n_fit
         for _ in range(LEARNINGS):
             current = self._rounds(current, rounds)
