@@ -95,7 +95,8 @@ class Fitter:
     ) -> Fit:
         """The optimum from `theta`, or from the structure's own start.
 
-        What ends above a fit `nested` in it began too far away: it begins again there, its new causes all but off.
+        What ends above a fit `nested` in it began too far away: it begins again there, its new causes all but off, and once
+        more with the device's own numbers as stated, which that fit may have bent to stand in for the new causes.
         """
         problem = _Problem(self, structure)
         begin = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_starts)])
@@ -106,8 +107,12 @@ class Fitter:
             if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
                 begin[i] = u.nominal + NEAR_OFF * (begin[i] - u.nominal)
         begin[problem.k :] = np.concatenate(nested.starts)
-        again = self._optimum(problem, begin, steps)
-        return min(found, again, key=lambda fit: fit.objective)
+        stated = np.concatenate([structure.start, np.zeros(problem.n_starts)])
+        for i, u in enumerate(structure.unknowns):
+            if u.cause is None:
+                stated[i] = u.nominal
+        again = (self._optimum(problem, start, steps) for start in (begin, stated))
+        return min(found, *again, key=lambda fit: fit.objective)
 
     def described(self, device: Device) -> Fit:
         """The device as described; where that leaves far more than noise, begun a deviation beside each stated number too:
