@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, unconfirmed, verdict
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.learnt import learn_colour, learn_more
+from ctrlgen.diagnosis.resolved import resolved
 from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.structure import Structure
@@ -190,3 +191,14 @@ def test_a_device_far_from_the_readings_is_fitted_from_several_starts(monkeypatc
     found = fitter.described(AXIS)
     assert len(begun) == (1 + 2 * stated if far else 1) and stated >= 2
     assert found is (best if far else poor) and begun[0] == {} and all(len(own) == 1 for own in begun[1:])
+
+
+@pytest.mark.parametrize("steps, told", [(2.0, False), (8.0, True)])
+def test_fringes_as_short_as_the_steps_of_a_reading_are_its_rounding(steps, told):
+    step = 10 * NOISE
+    fitter = fitter_of(after=lambda y: step * np.round(y / step))
+    fringe = Hypothesis("cyclic", "sensor:axis", "axis")
+    start = {"amplitude": NOISE, "period": steps * step, "phase": 0.0}
+    fit = fitter.fit(Structure(AXIS).with_cause(fringe, start), steps=0)
+    assert resolved(fitter.recording, fit) == told
+    assert resolved(fitter.recording, fit, accepted=(fringe,))
