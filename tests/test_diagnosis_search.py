@@ -46,13 +46,11 @@ def test_a_structure_is_fitted_again_from_a_better_start_only():
     assert searcher.trial(Structure(AXIS)).fit is again.fit
 
 
-def test_the_price_of_a_number_is_what_the_fit_knows_of_it_and_never_negative():
+def test_the_price_of_a_number_is_what_the_fit_knows_of_it():
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
     step = np.sqrt(np.diag(fit.covariance)) * np.array([0.5, -1.0, 2.0, 0.3])[: len(fit.theta)]
     assert np.sum((fit.root @ step) ** 2) == pytest.approx(step @ np.linalg.solve(fit.covariance, step), rel=1e-3)
-    alike = replace(fit, J=np.column_stack([*[fit.J[:, 0]] * len(fit.theta), *fit.J[:, len(fit.theta) :].T]))
-    assert np.all(np.linalg.eigvalsh(alike.root.T @ alike.root) > -1e-9 * np.linalg.norm(alike.root) ** 2)
 
 
 @pytest.mark.parametrize("at_rest, learnt", [(0.6, True), (0.0, False)])

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctrlgen.diagnosis.adequacy import RATIO
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.learnt import learn_more, learn_size
@@ -22,9 +23,6 @@ from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.diagnosis.trial import CONFIRMED, Round, Search, Trial, cooled, freed, warm
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
-GROSS = (
-    1.10  # times the noise, the gate of adequacy: records that leave more show what those that leave less do not reach
-)
 DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
 MOST_CAUSES = {"poses": 24, "series": 8}
 WORTHWHILE = (
@@ -284,8 +282,8 @@ class Searcher:
         return confirmed > max(CONFIRMED, WORTHWHILE * max(before.held - self.n_held, 0.0))
 
     def _out_of_reach(self, trial: Trial) -> bool:
-        """Whether the records to fit show plainly what the held-out ones do not."""
-        most = GROSS**2 - 1
+        """Whether the records to fit show, by the gate of adequacy, what the held-out ones do not."""
+        most = RATIO**2 - 1
         return trial.fit.objective - self.n_fit > most * self.n_fit and trial.held - self.n_held < most * self.n_held
 
     def _swap(self, current: Trial, before: int) -> Trial:
