@@ -23,6 +23,7 @@ from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.diagnosis.trial import Trial
+from ctrlgen.diagnosis.weighing import Weighing
 from ctrlgen.lattice import lattice
 from ctrlgen.recording import Recording
 
@@ -156,7 +157,7 @@ def test_a_start_that_is_far_off_is_begun_again_near_off():
         ("drive_gain", 0.05, 0.05, 1.5, False),
     ],
 )
-def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, first, lost, fitted, sure, doubtful):
+def test_what_the_form_of_another_law_may_leave_is_given_no_name(first, lost, fitted, sure, doubtful):
     at = "actuator:axis" if first == "drive_gain" else "stage:axis"
     begin = {"gain": 0.1} if first == "drive_gain" else {"stiffness": 1e4, "reach": 3e-5, "taper": 0.5}
     structure = Structure(AXIS).with_cause(Hypothesis(first, at, "axis"), begin)
@@ -165,12 +166,9 @@ def test_what_the_form_of_another_law_may_leave_is_given_no_name(monkeypatch, fi
     def fit(left, of=structure):
         return Fit(of, of.start, (), left, 1500, np.zeros(0), sure * np.eye(len(of.start)), 0.0)
 
-    searcher = Searcher(fitter_of(), Screen(fitter_of(), [LIMIT]), lambda _: None)
-    monkeypatch.setattr(searcher, "trial", lambda *_, **__: Trial(fit(1000.0), 1000.0, 0.0))
-    assert (
-        searcher._doubtful(Trial(fit(fitted, structure.without(1)), lost, 0.0), Trial(fit(0.0), 0.0, 0.0), 1)
-        == doubtful
-    )
+    weigh = Weighing(fitter_of(), lambda *_, **__: Trial(fit(1000.0), 1000.0, 0.0))
+    without, chosen = Trial(fit(fitted, structure.without(1)), lost, 0.0), Trial(fit(0.0), 0.0, 0.0)
+    assert weigh.doubtful(without, chosen, 1) == doubtful
 
 
 def test_a_place_has_one_form_of_hysteresis():

@@ -37,7 +37,7 @@ LAYERS = [
     "diagnosis.quiet diagnosis.spikes",
     "diagnosis.structure", "diagnosis.fit", "diagnosis.learnt",
     "diagnosis.laws diagnosis.scatter", "diagnosis.spread diagnosis.profile", "diagnosis.slopes", "diagnosis.together",
-    "diagnosis.screen diagnosis.adequacy diagnosis.resolved", "diagnosis.trial", "diagnosis.search",
+    "diagnosis.screen diagnosis.adequacy diagnosis.resolved", "diagnosis.trial", "diagnosis.weighing", "diagnosis.search",
     "diagnosis.diagnosis", "diagnosis.read_off",
     "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
     "diagnosis.empirical diagnosis.detectable diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",

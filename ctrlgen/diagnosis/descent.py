@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 NEGLIGIBLE = 0.01  # of one squared standard deviation
 BEGIN, FAILED = 1e-6, 1e-2  # Marquardt's damping at first, and where a step has failed twice
@@ -29,7 +30,7 @@ class Problem(Protocol):
 
 
 def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
-    """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431), steps clipped at the bounds.
+    """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431).
 
     A step that fails is tried without its part in the records' starts: those may bend within a gap or a fringe. One that
     fails however short it is, without the number that promises most: the moment of an event between two samples lies about
@@ -41,20 +42,18 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarr
     r, J = problem.evaluate(x)
     for _ in range(steps):
         gradient, H = J.T @ r, J.T @ J
-        open_ = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))) & (np.diag(H) > 0)
-        if not open_.any():
-            break
-        step = _damped(H, gradient, open_, damping, problem.most)
+        least, most = np.maximum(low - x, -problem.most), np.minimum(high - x, problem.most)
+        step = _damped(H, gradient, least, most, damping)
         if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
             break
         better = _better(problem, r, np.clip(x + step, low, high))
         if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
-            step = _damped(H, gradient, open_ & own, damping, problem.most)
+            step = _damped(H, gradient, least, most, damping, own)
             better = _better(problem, r, np.clip(x + step, low, high))
         if better is None and damping > FAILED:
-            others = own & open_
+            others = own & (step != 0)
             others[np.argmax(np.where(others, np.abs(gradient * step), -1.0))] = False
-            step = _damped(H, gradient, others, BEGIN, problem.most)
+            step = _damped(H, gradient, least, most, BEGIN, others)
             better = _better(problem, r, np.clip(x + step, low, high))
         if better is not None:
             x, damping = better, max(damping / 10, 1e-9)
@@ -66,12 +65,25 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarr
     return x
 
 
-def _damped(H: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float, most: np.ndarray) -> np.ndarray:
-    """Marquardt's step of the numbers that are `open_`, none of them further than its `most`."""
-    step, scale = np.zeros_like(gradient), np.sqrt(np.diag(H)[open_])  # no number's unit decides what can be solved for
-    H = H[np.ix_(open_, open_)] / np.outer(scale, scale)
-    step[open_] = -np.linalg.lstsq(H + damping * np.eye(len(H)), gradient[open_] / scale, rcond=None)[0] / scale
-    return step / max(1.0, float(np.max(np.abs(step) / most)))
+def _damped(
+    H: np.ndarray,
+    gradient: np.ndarray,
+    least: np.ndarray,
+    most: np.ndarray,
+    damping: float,
+    movable: np.ndarray | bool = True,
+) -> np.ndarray:
+    """Marquardt's step of the `movable` numbers, the best in the box from `least` to `most`: a number that nothing holds, or
+    that meets its bound, does not shorten the step of the others."""
+    step = np.zeros_like(gradient)
+    open_ = (np.diag(H) > 0) & (least < most) & movable
+    if open_.any():
+        scale = np.sqrt(np.diag(H)[open_])  # no number's unit decides what can be solved for
+        w, V = np.linalg.eigh(H[np.ix_(open_, open_)] / np.outer(scale, scale))
+        root = np.sqrt(np.maximum(w, 0.0) + damping)
+        A, b = root[:, None] * V.T, -(V.T @ (gradient[open_] / scale)) / root
+        step[open_] = lsq_linear(A, b, (least[open_] * scale, most[open_] * scale), method="bvls").x / scale
+    return step
 
 
 def _better(problem: Problem, r: np.ndarray, tried: np.ndarray) -> np.ndarray | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ctrlgen.diagnosis.fit import Fit
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, numbers
 from ctrlgen.diagnosis.screen import Screened
-from ctrlgen.diagnosis.search import MATERIAL
+from ctrlgen.diagnosis.weighing import MATERIAL
 from ctrlgen.units import difference, written_unit
 
 ALIKE = 0.98  # |cos| from which two causes cannot be told apart

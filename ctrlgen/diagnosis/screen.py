@@ -12,7 +12,7 @@ largest |z| is judged against simulations of that. |cos| near one says what this
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -31,6 +31,7 @@ OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is 
 LINES = 3  # of the spectrum of what is left, tried as frequencies
 PARTS = 12  # of the records' time: an event is tried in the middle of each
 ZEROS = 8  # padding of that spectrum
+OTHERS = 8  # shapes of a law beside the best, in which it may be begun again
 NULLS = 2000  # simulated records without mismatch
 
 
@@ -154,13 +155,15 @@ class Screen:
         for j in seen:
             if columns[j].one_sided and z[j] * columns[j].one_sided < 0:
                 z[j] = 0.0
-        best: dict[Hypothesis, int] = {}
-        for j in seen:
-            h = columns[j].hypothesis
-            if h not in best or abs(z[j]) > abs(z[best[h]]):
-                best[h] = int(j)
-        order = sorted(best.values(), key=lambda j: -abs(z[j]))
-        suspects = tuple(self._suspect(columns[j], z[j], score[j] / own[j], left[j], j) for j in order)
+        ranked: dict[Hypothesis, list[int]] = {}
+        for j in sorted(seen, key=lambda j: -abs(z[j])):
+            ranked.setdefault(columns[j].hypothesis, []).append(int(j))
+        order = [js[0] for js in ranked.values()]
+        suspect = {j: self._suspect(columns[j], z[j], score[j] / own[j], left[j], j) for j in map(int, seen)}
+        suspects = tuple(
+            replace(suspect[j], others=tuple(suspect[i].start for i in others[:OTHERS]))
+            for j, *others in ranked.values()
+        )
         sds = {
             (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
             for j in order
@@ -168,7 +171,7 @@ class Screen:
         together = Together(columns, seen, score, own, left, cosine, self._suspect)
         resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
         hidden = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
-        hidden = {h: k for h, k in hidden.items() if h not in best}
+        hidden = {h: k for h, k in hidden.items() if h not in ranked}
         threshold = self._threshold(cosine[np.ix_(seen, seen)])
         return Screened(suspects, cosine, threshold, sds, together.search(), hidden)
 

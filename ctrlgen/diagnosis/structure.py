@@ -67,6 +67,15 @@ class Structure:
         keep = [k for k in range(len(self.causes)) if k != index]
         return replace(self, causes=tuple(self.causes[k] for k in keep), starts=tuple(self.starts[k] for k in keep))
 
+    def begun(self, index: int, start: dict[str, float]) -> Structure:
+        """The same with the fit of one cause begun elsewhere."""
+        return replace(self, starts=(*self.starts[:index], start, *self.starts[index + 1 :]))
+
+    @property
+    def rarity(self) -> float:
+        """Of its causes."""
+        return sum(c.law.rarity for c in self.causes if c.effect != PARAMETER)
+
     def usual(self, unknown: Unknown) -> tuple[float, float] | None:
         """The range [SI] outside of which an amplitude means something else than its effect's name says."""
         cause = self.causes[unknown.cause]

@@ -18,13 +18,14 @@ LOOSE = 0.35  # how far beyond its bounds a linear estimate of an amplitude may 
 @dataclass(frozen=True)
 class Suspect:
     """One hypothesis with the shape that fits best: its `z`, the amplitude that would explain it, its share of slope
-    left after projection, and its column in the correlation matrix."""
+    left after projection, and its column in the correlation matrix. `others`: the same for the next best shapes."""
 
     hypothesis: Hypothesis
     start: dict[str, float]
     z: float
     left: float
     column: int
+    others: tuple[dict[str, float], ...] = ()
 
 
 class Together:
