@@ -8,6 +8,9 @@ import scipy
 SPIKE = 8.0  # standard deviations of the local high-pass noise
 WIDEST = 3  # samples in a spike; what lasts longer may be motion
 WINDOW = 201  # samples over which noise is called local
+LEAST_AROUND = (
+    5  # samples beside a spike: two make the line and three tell whether it is one; records begin and end, too
+)
 AFTER_JUMP = 10  # samples after a jump of the drive in which the device may do anything
 STUCK = 8  # equal samples in a row
 RAIL_RUN = 5  # equal samples in a row at the end of the range
@@ -52,8 +55,8 @@ def _off_chord(y: np.ndarray, width: int) -> np.ndarray:
 
 def _isolated(y: np.ndarray, start: int, width: int, size: float) -> bool:
     """Whether the signal goes on after the stretch as it came: a step does not, nor does ringing."""
-    around = np.r_[start - 4 : start, start + width : start + width + 4]
-    if around[0] < 0 or around[-1] >= len(y):
+    around = np.r_[max(start - 4, 0) : start, start + width : min(start + width + 4, len(y))]
+    if len(around) < LEAST_AROUND:
         return False
     line = np.polyfit(around - start, y[around], 1)
     return bool(np.abs(y[around] - np.polyval(line, around - start)).max() < 0.3 * size)

@@ -415,52 +415,12 @@ def test_spikes_are_marked(tmp_path, model):
     assert "4 of 400 samples are spikes" in recording.notes[0]
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-3])
-@pytest.mark.parametrize("shape", ["steps", "pulse", "ringing", "staircase"])
-def test_motion_of_the_device_is_no_spike(shape, noise, rng):
-    n = 4000
-    u = np.repeat(rng.uniform(-1, 1, n // 200), 200)
-    if shape == "pulse":
-        u = (np.arange(n) % 400 < 2).astype(float)
-    y = np.zeros(n)
-    pole = {"steps": 0.3, "pulse": 0.3, "ringing": 0.97 * np.exp(0.9j), "staircase": 0.0}[shape]
-    state = 0j
-    for k in range(n):
-        state = pole * state + (1 - pole) * u[k - (k > 0)]
-        y[k] = state.real
-    assert not spikes(y + noise * rng.standard_normal(n), u[:, None]).any()
-
-
-def test_coloured_noise_has_no_spikes(rng):
-    from scipy.signal import lfilter
-
-    drive = np.sin(0.01 * np.arange(20_000))[:, None]
-    for denominator in ([1.0], [1, -0.95], [1, -1.9, 0.9025]):
-        assert not spikes(lfilter([1], denominator, rng.standard_normal(20_000)), drive).any()
-
-
 def test_frozen_stretches_are_marked(tmp_path, model):
     fit = samples()
     fit["x"][60:90] = fit["x"][60]
     recording = load_recordings([two(tmp_path, fit)], model)
     assert np.array_equal(np.flatnonzero(~recording.records[0].valid[:, 0]), np.arange(60, 90))
     assert "30 of 400 samples are in stretches that repeat themselves" in recording.notes[0]
-
-
-def test_a_channel_that_runs_into_its_end_is_clipped(rng):
-    t = np.arange(4000)
-    drive = np.sin(0.3 * t)[:, None]  # too fast to stay in the end for the eight samples of a frozen channel
-    reading = np.sin(0.3 * t) + 1e-3 * rng.standard_normal(4000)
-    clipped = np.minimum(reading, 0.7)
-    marked = stuck(clipped, drive)
-    assert not marked[reading < 0.7].any() and marked[reading >= 0.7].mean() > 0.6  # runs of four are left
-    assert not stuck(reading, drive).any()
-
-
-def test_a_coarse_sensor_at_rest_is_not_stuck():
-    drive = np.clip(np.sin(0.01 * np.arange(4000)), -0.5, 0.5)
-    reading = np.round(drive * 200 + 0.1 * np.random.default_rng(0).standard_normal(4000))
-    assert not stuck(reading, drive[:, None]).any()
 
 
 def test_a_dead_channel_is_kept_and_named(tmp_path, model):
