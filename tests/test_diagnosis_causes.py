@@ -92,7 +92,7 @@ def test_time_constants_are_found_decades_away():
     for tau in (0.01, 1.0):
         fit = fitter.fit(Structure(AXIS).with_cause(LATE, {"gain": 1e-3, "tau": tau}))
         assert fit.chi2 < 1.15 * fit.n
-        assert fit.theta[-1] == pytest.approx(0.03, rel=0.1)
+        assert fit.theta[-1] == pytest.approx(0.02, rel=0.15)  # the shortest; seven stand for ten
 
 
 def test_a_limit_is_tried_below_the_largest_drive_of_the_records():
@@ -311,6 +311,16 @@ def test_numbers_that_the_fit_leaves_open_are_not_held_against_a_structure():
     assert plain > 1.5 * n
     assert fitter.held_out(loose) < 0.7 * plain
     assert fitter.held_out(fit) < fitter.held_out(off)
+
+
+def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
+    fitter = fitter_of()
+    fit = fitter.fit(Structure(AXIS))
+    off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
+    loose = replace(off, J=off.J / 40 * (np.arange(off.J.shape[1]) != 1))
+    assert fitter.held_out(loose) < 0.7 * fitter.held_out(replace(off, J=1e4 * off.J))
+    moved, *_ = fitter.as_known(loose)
+    assert moved.theta[1] == off.theta[1] and np.all(moved.theta[[0, 2, 3]] != off.theta[[0, 2, 3]])
 
 
 def test_a_fit_is_judged_where_the_records_leave_its_numbers_and_by_what_it_fitted():

@@ -57,9 +57,27 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     others = tuple({**start, "frequency": f} for f in (100.0, 50.0, 33.0))
     screened = Screened((Suspect(hum, start, 100.0, 1.0, 0, others),), np.eye(1), 4.0, {})
     found = searcher._reshaped(stuck, nominal, screened)
-    assert not searcher.weigh.is_noise(stuck) and searcher.weigh.is_noise(found)
+    assert not stuck.fit.is_noise and found.fit.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
     assert searcher._reshaped(found, nominal, screened) is found
+
+
+def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():
+    dahl, other = (Hypothesis(effect, "stage:axis", "axis") for effect in ("stribeck", "coulomb"))
+    rubbing = {"force": 0.01, "breakaway": 1.0, "speed": 1e-4, "reach": 2e-8}
+    model = fitter_of()
+    fit = model.fit(Structure(AXIS).with_cause(dahl, rubbing), steps=0)
+    rubbed = replace(model.to_fit[0], observed=model.predicted(fit, model.to_fit[0]))
+    searcher = searcher_of(model)
+    model.to_fit = [rubbed]
+    far, bare = {"force": 0.001, "reach": 3e-6, "smoothing": 1e-9}, Structure(AXIS)
+    begun = searcher._in_place(fit, 0, bare, Suspect(other, far, 100.0, 1.0, 0)).starts[0]
+    assert begun == {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
+    elsewhere = Hypothesis("backlash", "stage:axis", "axis")
+    assert searcher._in_place(fit, 0, bare, Suspect(elsewhere, {"gap": 1e-8}, 100.0, 1.0, 0)).starts == ({"gap": 1e-8},)
+    near = {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
+    wrong = replace(fit, theta=fit.theta * np.array([*np.ones(len(fit.theta) - 1), 100.0]))
+    assert searcher._in_place(wrong, 0, bare, Suspect(other, near, 100.0, 1.0, 0)).starts[0] == near
 
 
 def test_the_price_of_a_number_is_what_the_fit_knows_of_it():

@@ -28,6 +28,8 @@ FAR = 1e30  # SI: a reading of a simulation that has left the numbers
 FAR_OFF = 100.0  # times the noise, root mean square: so large a mismatch may be for want of a good start
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
 LONGEST_STEP = 1.5  # of a logarithm
+MET = 4.0  # standard deviations of the noise's own squares
+HELD_STEPS = 4  # of numbers that only the held-out records decide
 HALVINGS = 6  # of a step that does not keep what its slopes promise
 SETTLED = 0.1  # squares: numbers that gain less have arrived
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
@@ -54,9 +56,14 @@ class Fit:
         """What was minimised."""
         return self.chi2 + self.penalty
 
+    @property
+    def is_noise(self) -> bool:
+        """Whether it leaves no more than noise."""
+        return self.objective < self.n + MET * np.sqrt(2 * self.n)
+
     @cached_property
     def covariance(self) -> np.ndarray:
-        """Of the unknowns [SI^2], from the slopes at the optimum; numbers that nothing holds get an infinite variance."""
+        """Of the unknowns [SI^2], from the slopes at the optimum."""
         scale = np.linalg.norm(self.J, axis=0)
         scale[scale == 0] = 1.0
         inverse = np.linalg.pinv((self.J / scale).T @ (self.J / scale), rcond=1e-14)
@@ -200,9 +207,10 @@ class Fitter:
         """-2 ln of how likely the held-out records are, as the numbers are known from the records to fit.
 
         |r(p + dp)|^2 + dp' C^-1 dp + ln det(I + C J'J), see `as_known`: numbers that the records to fit leave open are not
-        held against their structure, and earn it nothing.
+        held against their structure, and earn it nothing. One step there says enough of a structure that does not explain the
+        records to fit.
         """
-        moved, price, spread = self.as_known(fit)
+        moved, price, spread = self.as_known(fit, HELD_STEPS if fit.is_noise else 1)
         return self._held_squares(moved) + price + spread
 
     def as_known(self, fit: Fit, steps: int = 1) -> tuple[Fit, float, float]:
@@ -211,9 +219,10 @@ class Fitter:
         r and J the whitened residual and its slopes there. The fit itself, at no price, where no step helps.
         """
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-        if not len(sd) or not np.all((sd > 0) & np.isfinite(sd)):
+        sd[~fit.J[:, : len(sd)].any(axis=0) | ~np.isfinite(sd)] = 0.0  # what nothing holds stays where it is
+        if not sd.any():
             return fit, 0.0, 0.0
-        C = fit.covariance / np.outer(sd, sd)
+        C = fit.covariance / np.outer(unit := np.where(sd > 0, sd, 1.0), unit) * np.outer(sd > 0, sd > 0)
         R, best = fit.root * sd, (fit, 0.0, 0.0)
         low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
         least = self._held_squares(fit)
@@ -225,11 +234,11 @@ class Fitter:
             if k == 0:
                 best = fit, 0.0, float(np.linalg.slogdet(spread)[1])
             begin = best[0].theta
-            step = sd * np.linalg.solve(spread, C @ b - (begin - fit.theta) / sd)
+            step = sd * np.linalg.solve(spread, C @ b - (begin - fit.theta) / unit)
             before = least
             for halved in range(HALVINGS if steps > 1 else 1):
                 moved = replace(fit, theta=np.clip(begin + step / 2**halved, low, high))
-                price = float(np.sum((R @ ((moved.theta - fit.theta) / sd)) ** 2))
+                price = float(np.sum((R @ ((moved.theta - fit.theta) / unit)) ** 2))
                 total = self._held_squares(moved) + price
                 if total < least:
                     best, least = (moved, price, best[2]), total

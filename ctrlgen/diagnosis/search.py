@@ -129,7 +129,7 @@ class Searcher:
         noise is left: the shapes of one law may lie in several valleys."""
         others = {s.hypothesis: s.others for s in screened.suspects}
         for k, cause in enumerate(trial.fit.structure.causes):
-            if cause in before.fit.structure.causes or self.weigh.is_noise(trial):
+            if cause in before.fit.structure.causes or trial.fit.is_noise:
                 continue
             structure, starts = cooled(trial.fit), others.get(cause, ())
             size = cause.law.amplitude().name if starts else ""
@@ -246,9 +246,20 @@ class Searcher:
         trials = []
         for s in able[:REPLACEMENTS]:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
-            trials += self._attempt(others.with_cause(s.hypothesis, s.start), s.hypothesis)
+            trials += self._attempt(self._in_place(current.fit, k, others, s), s.hypothesis)
         near = self._near(without, current, sorted(trials, key=lambda t: t.total))
         return sorted((self._polished(t) if t in near else t for t in trials), key=lambda t: t.total)
+
+    def _in_place(self, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:
+        """The suspect beside the `others` in place of cause k of a fit; of its family, begun with that one's numbers where
+        that is better: what they have in common means the same."""
+        structure = others.with_cause(suspect.hypothesis, suspect.start)
+        cause = fit.structure.causes[k]
+        if cause.family is None or (cause.family, cause.at) != (suspect.hypothesis.family, suspect.hypothesis.at):
+            return structure
+        common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
+        kin = others.with_cause(suspect.hypothesis, suspect.start | common)
+        return min(structure, kin, key=self.fitter.begun)
 
     def _screened(self, trial: Trial) -> Screened:
         key = frozenset(trial.fit.structure.causes)

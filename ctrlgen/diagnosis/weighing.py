@@ -26,7 +26,6 @@ WORTHWHILE = (
 MOSTLY = 0.9  # of the mismatch: where causes take it away, a series' others are sought one or two at a time
 SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
 FORM = 0.25  # the same for the held-out records, where either explains all of the records to fit
-MET = 4.0  # standard deviations of the noise's own squares
 VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
 
 
@@ -45,10 +44,6 @@ class Weighing:
         price += 2 * structure.rarity
         return Trial(fit, held, fit.objective + price + held, cause)
 
-    def is_noise(self, trial: Trial) -> bool:
-        """Whether what is left of the records to fit is no more than noise."""
-        return trial.fit.objective < self.n_fit + MET * np.sqrt(2 * self.n_fit)
-
     def ahead(self, a: Trial, b: Trial) -> float:
         """By how much `a` is better than `b`, and that is beyond what says nothing; negative where it is not.
 
@@ -59,7 +54,7 @@ class Weighing:
         c_fit = max(best.fit.objective / max(self.n_fit, 1), 1.0)
         c_held = max(best.held / max(self.n_held, 1), 1.0)
         gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
-        met = self.is_noise(a) and self.is_noise(b) and self.fitter.noise.known.all()
+        met = a.fit.is_noise and b.fit.is_noise and self.fitter.noise.known.all()
         slack = FORM if met else SLACK  # alike on the records to fit, and neither law is right
         return gained - SLACK * self.n_fit * (1 - 1 / c_fit) - slack * self.n_held * (1 - 1 / c_held)
 

@@ -4,11 +4,11 @@ import casadi as ca
 
 from ctrlgen.effect import Effect, Param, Place, State
 
-ELEMENTS = 4
+ELEMENTS = 8
 
 
 class DriveHysteresis(Effect):
-    """Delta u = g (sum_j w_j P_j - u), j = 1..4: P_j the play of u with radius r j/4, w_j ~ j^-q, sum w_j = 1.
+    """Delta u = g (sum_j w_j P_j - u), j = 1..8: P_j the play of u with radius r j/8, w_j ~ j^-q, sum w_j = 1.
 
     Prandtl-Ishlinskii with play operators, independent of rate. Holds for congruent loops through the origin.
     """
