@@ -160,10 +160,12 @@ def print_diagnosis(found: Diagnosis) -> None:
                 first = (finding.effect, finding.location) if k == 0 else ("", "")
                 table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
         out.print(table)
-    table = table_of(("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"))
+    table = table_of(
+        ("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"), ("unsure", "right")
+    )
     for channel, e in found.held_out.items():
-        floor = "not known" if e.noise_floor is None else f"{number(e.noise_floor)} {e.unit}"
-        table.add_row(channel, f"{number(e.rms_before)} {e.unit}", f"{number(e.rms_after)} {e.unit}", floor)
+        values = (e.rms_before, e.rms_after, e.noise_floor, e.uncertainty)
+        table.add_row(channel, *("not known" if v is None else f"{number(v)} {e.unit}" for v in values))
     out.print(table)
     for note in gathered(found.notes):
         out.print(f"note: {note}", markup=False, soft_wrap=True)

@@ -11,6 +11,7 @@ from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, re
 
 from ctrlgen.diagnosis.adequacy import judge
 from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.forecast import uncertainty
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.learnt import learn_guessed
 from ctrlgen.diagnosis.noise import coloured, estimate
@@ -321,6 +322,15 @@ def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
     assert fitter.held_out(loose) < 0.7 * fitter.held_out(replace(off, J=1e4 * off.J))
     moved, *_ = fitter.as_known(loose)
     assert moved.theta[1] == off.theta[1] and np.all(moved.theta[[0, 2, 3]] != off.theta[[0, 2, 3]])
+
+
+def test_what_uncertain_numbers_leave_is_what_numbers_drawn_from_it_leave(rng):
+    fitter = fitter_of()
+    fit = fitter.fit(Structure(AXIS))
+    (record,) = fitter.held
+    drawn = rng.multivariate_normal(fit.theta, fit.covariance, 200)
+    off = [fitter.predicted(replace(fit, theta=theta), record) - fitter.predicted(fit, record) for theta in drawn]
+    assert uncertainty(fitter, fit) == pytest.approx(np.sqrt(np.mean(np.square(off), axis=(0, 1))), rel=0.15)
 
 
 def test_a_fit_is_judged_where_the_records_leave_its_numbers_and_by_what_it_fitted():

@@ -142,8 +142,9 @@ def test_the_json_is_the_contract(found):
     low, high = finding["parameters"]["gain"]["ci95"]
     assert low < finding["parameters"]["gain"]["value"] < high and low < 0.03 < high
     error = result["held_out"]["reading.axis"]
-    assert set(error) == {"rms_before", "rms_after", "noise_floor", "unit"} and error["unit"] == "nm"
+    assert set(error) == {"rms_before", "rms_after", "noise_floor", "unit", "uncertainty"} and error["unit"] == "nm"
     assert error["rms_before"] > 10 * error["rms_after"] and error["noise_floor"] == pytest.approx(5, rel=0.05)
+    assert 0 < error["uncertainty"] < error["noise_floor"]
 
 
 def test_the_json_lists_alternatives_by_name(found):

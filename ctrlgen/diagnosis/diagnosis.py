@@ -11,6 +11,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import Adequacy
 from ctrlgen.diagnosis.fit import CI, Fit, Fitter
+from ctrlgen.diagnosis.forecast import uncertainty
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, written
 from ctrlgen.diagnosis.profile import Profile
 from ctrlgen.diagnosis.scatter import deviations
@@ -51,12 +52,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class ChannelError:
-    """Held-out error of one channel before and after, and the noise, in `unit`."""
+    """Held-out error of one channel before and after, the noise, and what the uncertainty of the fitted numbers alone leaves
+    there (None where that is not known), in `unit`."""
 
     rms_before: float
     rms_after: float
     noise_floor: float | None
     unit: str
+    uncertainty: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,14 +157,16 @@ def remaining(fitter: Fitter, search: Search) -> float:
 def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:
     """Held-out root mean square of each channel, nominal and chosen."""
     found = {}
-    floor = fitter.noise.floor
+    floor, unsure = fitter.noise.floor, uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
         rms = []
         for trial in (search.nominal, search.chosen):
             squares = [((r.observed - fitter.predicted(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held]
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
-        found[channel] = ChannelError(rms[0], rms[1], float(floor[i] * scale) if known[i] else None, unit)
+        noise = float(floor[i] * scale) if known[i] else None
+        beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
+        found[channel] = ChannelError(*rms, noise, unit, beside)
     return found
 
 

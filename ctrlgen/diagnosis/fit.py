@@ -178,7 +178,7 @@ class Fitter:
         start = np.zeros(len(response.initial))
         if len(start) == 0:
             return response.outputs(record, fit.theta)
-        sizes = _start_sizes(response)
+        sizes = start_sizes(response)
         y, slopes = response.sensitivities(record, fit.theta, start, by_free=False)  # close to linear in the start
         white = self._white(record, y)
         J = self.noise.whiten(slopes, record.valid).reshape(len(white), len(start)) * sizes
@@ -265,7 +265,8 @@ def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), np.clip(values, -WORST, WORST), WORST)
 
 
-def _start_sizes(response: object) -> np.ndarray:
+def start_sizes(response: Response) -> np.ndarray:
+    """How far a record may start from rest, by state [SI]."""
     m = response.model
     return START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(response.initial)]
 
@@ -280,7 +281,7 @@ class _Problem:
         self.fitter, self.structure = fitter, structure
         self.responses = structure.responses(fitter.recording, fitter.cache)
         self.records = fitter.to_fit
-        self.sizes = [_start_sizes(self.responses[r.sample_time, r.linear]) for r in self.records]
+        self.sizes = [start_sizes(self.responses[r.sample_time, r.linear]) for r in self.records]
         self.n_starts = sum(map(len, self.sizes))
         self.k = len(structure.unknowns)
         self.scale = np.concatenate([[u.size for u in structure.unknowns], *self.sizes]).astype(float)

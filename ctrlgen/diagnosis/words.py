@@ -92,7 +92,10 @@ def channel_sentence(channel: str, error: ChannelError) -> str:
     """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm.'"""
     noise = "not known" if error.noise_floor is None else f"{number(error.noise_floor, 3)} {error.unit}"
     shown = [f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after)]
-    return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}."
+    unsure = ""
+    if error.uncertainty is not None and error.uncertainty > (error.noise_floor or 0.0):
+        unsure = f"; the numbers are known no better than to {number(error.uncertainty, 3)} {error.unit} there"
+    return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}{unsure}."
 
 
 def short(channel: str) -> str:
