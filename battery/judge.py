@@ -166,7 +166,7 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
             j.covered += _covered(hit, truth)
     if [t["name"] for t in truths] == ["vibration"]:  # other laws have no band of their own
         j.bands = [_in_band(diagnosis.get("where", {}), truths[0]["shape"]["frequency"])]
-    left = [f for f in left if not any(_harmonic(f, t) for t in truths)]
+    left = [f for f in left if not any(_harmonic(f, t) or _cubic(f, t) for t in truths)]
     spare = [f for f in left if not any(_among(f, t) for t in truths)]
     j.named += [("nothing", f["effect"]) for f in spare]
     j.wrong = bool(spare)
@@ -201,6 +201,16 @@ def _harmonic(finding: dict[str, Any], truth: dict[str, Any]) -> bool:
         return False
     half = truth["shape"]["period"] / 2
     return abs(in_si(float(period["value"]), period["unit"]) - half) < 0.01 * half
+
+
+def _cubic(finding: dict[str, Any], truth: dict[str, Any]) -> bool:
+    """Whether a further finding is the cubic part that the plant's bow has too, its interval over the planted one."""
+    curvature, shape = finding.get("parameters", {}).get("curvature"), truth.get("shape", {})
+    if (finding["effect"], truth["name"]) != ("cubic_sensor", "bow") or not shape.get("cubic") or curvature is None:
+        return False
+    planted = truth["amplitude"] * shape["cubic"] / shape["span"] ** 3
+    low, high = (in_si(float(end), curvature["unit"]) for end in curvature["ci95"])
+    return finding.get("location") == truth["location"] and low <= planted <= high
 
 
 def _location(finding: dict[str, Any], truth: dict[str, Any]) -> str:

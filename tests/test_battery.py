@@ -212,6 +212,22 @@ def test_the_second_harmonic_of_a_planted_fringe_is_no_further_cause():
     assert not judged("0.3").exact and not judged("0.2", second=0.0).exact
 
 
+def test_the_cubic_part_of_a_planted_bow_is_no_further_cause():
+    shape = {"span": 7e-5, "cubic": 0.08}
+    truth = {"name": "bow", "location": "sensor:axis", "amplitude": 2e-7, "shape": shape}  # 4.66e-8 1/um^2
+
+    def judged(low: float, high: float, at: str = "sensor:axis", **changed):
+        bow = {"effect": "bow", "location": "sensor:axis", "parameters": {}}
+        curvature = {"value": (low + high) / 2, "ci95": [low, high], "unit": "1/um^2"}
+        cubic = {"effect": "cubic_sensor", "location": at, "parameters": {"curvature": curvature}}
+        planted = [truth | {"shape": shape | changed}]
+        answer = {"case": "case_1", "class": "single", "planted": planted}
+        return judge.judge(answer, {"verdict": "explained", "findings": [bow, cubic]})
+
+    assert judged(4e-8, 5e-8).exact and not judged(4e-8, 5e-8).wrong
+    assert judged(5e-8, 6e-8).wrong and judged(4e-8, 5e-8, cubic=0.0).wrong and judged(4e-8, 5e-8, "sensor:x").wrong
+
+
 def measured(judged):
     return {row.what: row for row in score.table(judged)}
 

@@ -141,6 +141,19 @@ def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, pa
         assert said == (CONSISTENT if passed else UNEXPLAINED)
 
 
+@pytest.mark.parametrize("share, says", [(0.09, PARTLY), (0.11, UNEXPLAINED)])
+def test_a_law_that_says_how_rough_it_is_may_leave_as_much(share, says):
+    """What drifts wanders, by a tenth."""
+    drift = Hypothesis("drift", "sensor:axis", "axis")
+    fitter = fitter_of()
+    bare = Trial(replace(fitter.fit(Structure(AXIS)), chi2=1e7), 1e7, 0.0)
+    fit = fitter.fit(Structure(AXIS).with_cause(drift, {"rate": 1e-7}), steps=0)
+    left = fit.n + share**2 * (bare.fit.objective - fit.n)
+    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out(bare.fit), 0.0)
+    search = Search(bare, chosen, (bare,), ((),), (), None)
+    assert verdict(fitter, search, Adequacy((1.2,), {}, False)) == says
+
+
 @pytest.mark.parametrize("mismatch, sizes", [(2e4, {2, 3}), (2e6, {2})])
 def test_three_at_once_are_sought_only_while_most_is_unexplained(monkeypatch, mismatch, sizes):
     searcher = searcher_of(fitter_of(played))

@@ -21,7 +21,9 @@ from ctrlgen.recording import Recording
 from ctrlgen.units import difference, from_si, to_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
-LITTLE = 0.05  # of the mismatch: a law's form is right to that in the worst case, and what leaves more is another law
+LITTLE = (
+    0.05  # of the mismatch: a law that does not say how rough it is is right to that, and what leaves more is another
+)
 CHANCE = 4.0  # standard deviations of the noise's own squares
 
 
@@ -119,7 +121,7 @@ def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False)
     tells the noise, so that nobody can say whether all is explained.
     """
     found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
-    if known and not after.passed and not (found and remaining(fitter, search) <= LITTLE):
+    if known and not after.passed and not (found and remaining(fitter, search) <= tolerated(search)):
         return UNEXPLAINED
     if not found:
         return CONSISTENT
@@ -137,6 +139,12 @@ def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
         if bare.held - chosen.held < CONFIRMED
         and bare.fit.penalty - chosen.fit.penalty < 0.5 * (bare.fit.objective - chosen.fit.objective)
     )
+
+
+def tolerated(search: Search) -> float:
+    """The share of the mismatch that the chosen causes may leave: what the form of the roughest of their laws may."""
+    causes = search.chosen.fit.structure.causes
+    return max([LITTLE, *(c.law.rough for c in causes if c.effect != PARAMETER)])
 
 
 def remaining(fitter: Fitter, search: Search) -> float:

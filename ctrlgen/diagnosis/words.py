@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.diagnosis import (
     Diagnosis,
     Estimate,
     Finding,
+    tolerated,
 )
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.effect import Effect
@@ -140,7 +141,9 @@ def sentence(diagnosis: Diagnosis) -> str:
     found, verdict = diagnosis.findings, diagnosis.verdict
     head = HEADLINE[verdict]
     if verdict == CONSISTENT:
-        said = f"{head}: nothing that this recording can show is missing from the description of the {diagnosis.device.title}."
+        said = (
+            f"{head}: nothing that this recording can show is missing from the device file ({diagnosis.device.title})."
+        )
     elif not found:
         said = f"{head}: the recording differs from {diagnosis.device.title}, and no cause I know explains it."
     else:
@@ -187,7 +190,8 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     if verdict == PARTLY:
         left = f"Whether something remains cannot be said.{rest}"
         if known:
-            left = "A little remains above the noise, less than 5 % of what was wrong: see where below."
+            most = number(100 * tolerated(diagnosis.search))
+            left = f"A little remains above the noise, less than {most} % of what was wrong: see where below."
         if diagnosis.unconfirmed:
             names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
             left = f"No held-out record shows {names}: hold out one that goes where the record to fit went."
