@@ -15,7 +15,7 @@ from ctrlgen.diagnosis.forecast import uncertainty
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.learnt import learn_guessed
 from ctrlgen.diagnosis.noise import coloured, estimate
-from ctrlgen.diagnosis.pitches import jumps, pitches
+from ctrlgen.diagnosis.pitches import both, jumps, pitches
 from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.resolved import resolved
@@ -25,6 +25,7 @@ from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.diagnosis.trial import Trial
 from ctrlgen.diagnosis.weighing import Weighing
+from ctrlgen.effect import Place
 from ctrlgen.lattice import lattice
 from ctrlgen.recording import Recording
 
@@ -220,6 +221,23 @@ def test_a_pitch_is_found_that_is_a_thousandth_of_the_path():
     assert first == pytest.approx(pitch, rel=1e-4)
     assert pitches(path, noise) == ()
     assert pitches(np.ones(50), noise[:50]) == ()
+
+
+def test_fringes_that_bend_the_path_they_are_read_along_are_found_along_the_one_foreseen():
+    pitch = 4e-7
+
+    def fringed(u):
+        y = move(u)
+        return y + 0.3 * pitch * np.sin(2 * np.pi * y / pitch)
+
+    fitter = fitter_of(fringed)
+    fit = fitter.fit(Structure(AXIS))
+    read = fitter.to_fit[0].observed[:, 0]
+    foreseen = fitter.predicted(fit, fitter.to_fit[0])[:, 0]
+    near = pytest.approx(pitch, rel=1e-3)
+    assert near not in pitches(read, read - foreseen) and near in pitches(foreseen, read - foreseen)
+    suggested = Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["pitches"]
+    assert near in suggested and both([suggested, suggested]) == suggested
 
 
 @pytest.mark.parametrize("place", [-6e-6, 1.5e-6, 1.1e-5])

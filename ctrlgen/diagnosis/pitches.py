@@ -1,6 +1,12 @@
-"""Along the path: after which ways what is left over repeats, as fringes, teeth and screws do, and where it jumps."""
+"""Along the path: after which ways what is left over repeats, as fringes, teeth and screws do, and where it jumps.
+
+The path is what was read, which is right where the device is not yet understood, or what was foreseen, which does not
+drift with the sensor.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -9,6 +15,7 @@ CELLS = 2**14  # of the path read
 FINEST = 4  # cells of the shortest way
 FINER = 4  # padding: the way is then right to a sixteenth of a period over the whole path
 SLOW = 20  # periods in the path: longer ways are in the grids
+SAME = 1e-4  # of itself: ways so near are one
 SURE = 1e-4  # p of one so conspicuous anywhere where nothing repeats
 MOST = 3
 NEAR = 512  # cells for jumps: both sides of a place are compared over SIDE of them
@@ -31,6 +38,15 @@ def pitches(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     found, _ = find_peaks(spectrum[first:last], height=np.log((last - first) / SURE), distance=2 * FINER)
     best = found[np.argsort(-spectrum[first + found])][:MOST]
     return tuple(float(FINER * span / (first + k)) for k in best)
+
+
+def both(found: Iterable[tuple[float, ...]]) -> tuple[float, ...]:
+    """The ways along several paths, such as the one read and the one foreseen, each once."""
+    kept: list[float] = []
+    for way in (way for ways in found for way in ways):
+        if all(abs(way / other - 1) > SAME for other in kept):
+            kept.append(way)
+    return tuple(kept)
 
 
 def jumps(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:

@@ -21,7 +21,7 @@ from ctrlgen.chain import channels
 from ctrlgen.diagnosis.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
 from ctrlgen.diagnosis.laws import Column, Peaks, peaks
-from ctrlgen.diagnosis.pitches import jumps, pitches
+from ctrlgen.diagnosis.pitches import both, jumps, pitches
 from ctrlgen.diagnosis.slopes import Slopes, Sums
 from ctrlgen.diagnosis.together import Suspect, Together
 from ctrlgen.effect import Place
@@ -128,12 +128,13 @@ class Screen:
         if self.fitter.recording.kind == "poses" or not records:
             return {}
         record = max(records, key=lambda r: r.valid.size)
-        left = record.observed - self.fitter.predicted(fit, record)
+        foreseen = self.fitter.predicted(fit, record)
+        left = record.observed - foreseen
         names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         return {
             (Place.SENSOR, names.index(name)): {
-                "pitches": pitches(record.observed[good, i], left[good, i]),
+                "pitches": both(pitches(y[good, i], left[good, i]) for y in (record.observed, foreseen)),
                 "places": jumps(record.observed[good, i], left[good, i]),
             }
             for i, name in read

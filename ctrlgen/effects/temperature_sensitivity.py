@@ -10,6 +10,7 @@ class TemperatureSensitivity(Effect):
     """
 
     place = Place.SENSOR
+    stage = -1  # what warms or sags moves along the path: fringes count it
     needs = frozenset({"ambient"})
     source = "definition"
     params = (
