@@ -12,11 +12,12 @@ from scipy.signal import cont2discrete, lfilter
 from ctrlgen import build_model, load_device, load_scenario
 from ctrlgen.diagnosis.along import along
 from ctrlgen.diagnosis.detectable import detectable
+from ctrlgen.diagnosis.drives import admissible, shapes
 from ctrlgen.diagnosis.evidence import evidence, plain
 from ctrlgen.diagnosis.experiment import separate
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.free import free
-from ctrlgen.diagnosis.hypotheses import Hypothesis
+from ctrlgen.diagnosis.hypotheses import Hypothesis, written
 from ctrlgen.diagnosis.lines import lines
 from ctrlgen.diagnosis.noise import Noise, estimate
 from ctrlgen.diagnosis.profile import BOUNDED, profiles
@@ -311,6 +312,18 @@ def test_drift_and_creep_get_an_experiment_that_separates_them():
     both.cache = CACHE
     gained = both.fit(drift.structure).objective - both.fit(creep.structure).objective
     assert 0.7 < gained / found.after**2 < 1.4  # measured, the proposal settles it as far as was promised
+
+
+def test_a_drive_that_could_do_far_too_much_is_used_a_little():
+    """A limit of 400 V, of which the stage bears two volts."""
+    strong = AXIS.actuator.model_copy(update={"drive_limit": written(400.0, "V")})
+    structure = Structure(AXIS.model_copy(update={"actuator": strong}))
+    fitter = axis_fitter()
+    template = fitter.to_fit[0]
+    response = structure.responses(fitter.recording, {})[template.sample_time, template.linear]
+    for shape in shapes(2000, 1, 1 / H, 0):
+        record, strength = admissible(shape, response, structure.start, template, 0.0)
+        assert strength < 0.02 and 0.3 < np.abs(record.drive).max() < 4.0
 
 
 def test_the_proposal_is_a_recording_to_fill_in(tmp_path):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.devices import Links
-from ctrlgen.diagnosis.fit import START_SIZE, Fit, Fitter
+from ctrlgen.diagnosis.fit import Fit, Fitter, start_sizes
 from ctrlgen.diagnosis.hypotheses import nominal_links
 from ctrlgen.diagnosis.probe import with_probes
 from ctrlgen.diagnosis.response import Response
@@ -103,7 +103,7 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
     probes = m.device.effect[len(fit.structure.described.effect) :]
     placed = [probe for probe in probes if probe.place is place]
     sd = np.zeros(response.n_s)
-    sd[list(response.initial)] = START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(response.initial)]
+    sd[list(response.initial)] = start_sizes(response)
     return Along(
         record, place, tuple(probe.at for probe in placed),
         tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), links.travel_unit,

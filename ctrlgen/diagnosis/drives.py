@@ -15,7 +15,21 @@ from ctrlgen.diagnosis.along import motion
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.recording import Record
 
-STRENGTHS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)  # of the range of the drives; the largest that keeps every limit
+STRENGTHS = (
+    0.001,
+    0.002,
+    0.005,
+    0.01,
+    0.02,
+    0.05,
+    0.1,
+    0.2,
+    0.3,
+    0.4,
+    0.6,
+    0.8,
+    1.0,
+)  # of the range of the drives; the largest that keeps every limit
 SLACK = 1e-6  # of a limit's own size
 LINES = 15
 LEVELS = (0.0, 1.0, 0.0, -1.0, 0.0, 0.5, 0.0, -0.5)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.diagnosis.drives import admissible, poses, shapes
-from ctrlgen.diagnosis.fit import START_SIZE, Fit, Fitter
+from ctrlgen.diagnosis.fit import Fit, Fitter, start_sizes
 from ctrlgen.diagnosis.trial import Search
 from ctrlgen.recording import Record
 
@@ -146,8 +146,7 @@ class _Sums:
         other = truth.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
         delta = fitter.noise.whiten(other.outputs(record, truth.theta) - y, record.valid).ravel()
         J = fitter.noise.whiten(slopes, record.valid).reshape(len(delta), -1)
-        m = response.model
-        sizes = START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(response.initial)]
+        sizes = start_sizes(response)
         prior = np.hstack([np.zeros((len(sizes), len(refitted.theta))), np.diag(1 / sizes)])
         new = _Sums._of(np.vstack([J, prior]), np.concatenate([delta, np.zeros(len(sizes))]), len(refitted.theta))
         return _Sums(self.N + new.N, self.g + new.g, self.s + new.s)
