@@ -150,6 +150,7 @@ class Law:
 
     PER_CHANNEL, ALONE = 6, ("displacement", "velocity", "force", "state", "ambient", "time")
     REST, INDEX, PARTNER = 0.3, 4, 1  # as of delta_y and theta_y
+    STEPS = 4  # a sample: lags of a fifth of it are followed
 
     def __init__(self, effect: type[Effect], h: float, index: int = INDEX, still: bool = False) -> None:
         self.effect, self.h = effect, h
@@ -170,15 +171,20 @@ class Law:
         def f(m: ca.SX) -> ca.SX:
             return ca.vertcat(ca.SX(0, 1), *law(m)[1])
 
-        a = f(memory)
-        b = f(memory + h / 2 * a)
-        c = f(memory + h / 2 * b)
-        d = f(memory + h * c)
-        change = h / 6 * (a + 2 * b + 2 * c + d)
         if effect.sticks:  # bristles: linear in themselves, far faster than a sample
+            a = f(memory)
             slope = h * ca.diag(ca.jacobian(a, memory))
-            change = h * a * ca.if_else(slope < -1e-6, (ca.exp(slope) - 1) / slope, 1.0)
-        after = after + change
+            after = after + h * a * ca.if_else(slope < -1e-6, (ca.exp(slope) - 1) / slope, 1.0)
+        elif "rates" in vars(effect):
+            part = h / self.STEPS
+            moving = memory
+            for _ in range(self.STEPS):
+                a = f(moving)
+                b = f(moving + part / 2 * a)
+                c = f(moving + part / 2 * b)
+                d = f(moving + part * c)
+                moving = moving + part / 6 * (a + 2 * b + 2 * c + d)
+            after = after + moving - memory
         clocks = [i for i, s in enumerate(effect.states) if s.clock]
         for i in clocks:
             after[i] = held["time"] if still else memory[i] + h
