@@ -21,9 +21,7 @@ from ctrlgen.recording import Recording
 from ctrlgen.units import difference, from_si, to_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
-LITTLE = (
-    0.05  # of the mismatch: a law that does not say how rough it is is right to that, and what leaves more is another
-)
+LITTLE = 0.05  # of the mismatch: a law is right to that where it does not say how rough it is
 CHANCE = 4.0  # standard deviations of the noise's own squares
 
 

@@ -222,7 +222,8 @@ class Fitter:
         sd[~fit.J[:, : len(sd)].any(axis=0) | ~np.isfinite(sd)] = 0.0  # what nothing holds stays where it is
         if not sd.any():
             return fit, 0.0, 0.0
-        C = fit.covariance / np.outer(unit := np.where(sd > 0, sd, 1.0), unit) * np.outer(sd > 0, sd > 0)
+        unit = np.where(sd > 0, sd, 1.0)
+        C = fit.covariance / np.outer(unit, unit) * np.outer(sd > 0, sd > 0)
         R, best = fit.root * sd, (fit, 0.0, 0.0)
         low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
         least = self._held_squares(fit)
