@@ -92,9 +92,9 @@ def test_time_constants_are_found_decades_away():
 
     fitter = fitter_of(creeping)
     for tau in (0.01, 1.0):
-        fit = fitter.fit(Structure(AXIS).with_cause(LATE, {"gain": 1e-3, "tau": tau}))
+        fit = fitter.fit(Structure(AXIS).with_cause(LATE, {"gain": 1e-3, "tau": tau, "decades": 3.25}))
         assert fit.chi2 < 1.15 * fit.n
-        assert fit.theta[-1] == pytest.approx(0.02, rel=0.15)  # the shortest; seven stand for ten
+        assert fit.theta[-2:] == pytest.approx([0.02, 3.3], rel=0.2)  # two a decade stand for ten in three
 
 
 def test_a_limit_is_tried_below_the_largest_drive_of_the_records():
@@ -163,7 +163,7 @@ def test_what_the_form_of_another_law_may_leave_is_given_no_name(first, lost, fi
     at = "actuator:axis" if first == "drive_gain" else "stage:axis"
     begin = {"gain": 0.1} if first == "drive_gain" else {"stiffness": 1e4, "reach": 3e-5, "taper": 0.5}
     structure = Structure(AXIS).with_cause(Hypothesis(first, at, "axis"), begin)
-    structure = structure.with_cause(LATE, {"gain": 1.0, "tau": 1.0})
+    structure = structure.with_cause(LATE, {"gain": 1.0, "tau": 1.0, "decades": 3.0})
 
     def fit(left, of=structure):
         return Fit(of, of.start, (), left, 1500, np.zeros(0), sure * np.eye(len(of.start)), 0.0)

@@ -162,7 +162,7 @@ def test_three_at_once_are_sought_only_while_most_is_unexplained(monkeypatch, mi
     assert excess > 1e4
     searcher.mismatch, tried = mismatch, set()
     monkeypatch.setattr(searcher, "_attempt", lambda structure, *_: tried.add(len(structure.causes)) or [])
-    starts = {BACKLASH: {"gap": 3e-8}, LATE: {"gain": 0.01, "tau": 1.0}, LIMIT: {"level": 0.5}}
+    starts = {BACKLASH: {"gap": 3e-8}, LATE: {"gain": 0.01, "tau": 1.0, "decades": 3.0}, LIMIT: {"level": 0.5}}
     three = tuple(Suspect(h, s, 100.0, 1.0, k) for k, (h, s) in enumerate(starts.items()))
     together = ((0.8 * excess, three[:2]), (0.9 * excess, three))
     searcher._together(current, Screened(tuple(three), np.eye(3), 4.0, {}, together), ())

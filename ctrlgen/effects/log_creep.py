@@ -1,15 +1,17 @@
-"""Creep that never ends: as much in every decade of time."""
+"""Creep that is as much in every decade of time."""
+
+import casadi as ca
 
 from ctrlgen.effect import Effect, Param, Place, State
 
-TIMES = tuple(10 ** (j / 2) for j in range(7))  # of relaxation, per shortest one
+TIMES = tuple(10 ** (j / 2) for j in range(9))  # of relaxation, per shortest one
 
 
 class LogCreep(Effect):
-    """dz_j/dt = (d - z_j)/(10^(j/2) tau), Delta d = g/2 sum_j z_j, j = 0..6: from 3 tau to 100 tau after a step
-    d g (log10(t/tau) + 0.5), within one percent of a decade's.
+    """dz_j/dt = (d - z_j)/(10^(j/2) tau), Delta d = g/2 sum_j w_j z_j, w_j = min(max(2 D - j, 0), 1), j = 0..8.
 
-    Holds from tau to 1000 tau.
+    From 3 tau after a step d g (log10(t/tau) + 0.5), within one percent of a decade's, for D decades. Holds from tau to
+    10^4 tau.
     """
 
     place = Place.DISPLACEMENT
@@ -19,11 +21,13 @@ class LogCreep(Effect):
     params = (
         Param("gain", "1", (0.0, 0.1), "extra travel per decade of time, per travel", off=0.0),
         Param("tau", "s", (1e-3, 1e2), "shortest relaxation time", grid=(0.01, 0.1, 1.0)),
+        Param("decades", "1", (1.0, 4.5), "D: after so many it ends", grid=(3.25,)),
     )
     states = tuple(State(f"z{j}", "travel", 1.0) for j in range(len(TIMES)))
 
     def term(self, s, p):
-        return p.gain / 2 * sum(getattr(s, state.name) for state in self.states)
+        weights = [ca.fmin(ca.fmax(2 * p.decades - j, 0.0), 1.0) for j in range(len(TIMES))]
+        return p.gain / 2 * sum(w * getattr(s, z.name) for w, z in zip(weights, self.states, strict=True))
 
     def rates(self, s, p):
         slow = zip(self.states, TIMES, strict=True)
