@@ -71,7 +71,7 @@ def make_thermal_lag(scene: Scene, a: float, tau: float) -> Hooks:
             z[i] += (weight[i] * u - z[i]) * (1 - decay[i])
         return u + a * (out - u)
 
-    return Hooks(drive=drive)
+    return Hooks(drive=drive, direct=1 - a)
 
 
 def make_vibration(scene: Scene, a: float, frequency: float, phase: float) -> Hooks:

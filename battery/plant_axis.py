@@ -75,7 +75,8 @@ class Hooks:
     """Where a law acts, in the order in which the signal passes them; each is None where it does not.
 
     `drive(t, u)` -> u [V]; `force(t, q, v)` -> N, added; `carried(t, q, u)` -> what the sensor's target does [m], arrays on the fine grid;
-    `sensed(t, y, ambient)` -> y, the same; `digital(t, y)` -> y at the samples, after noise.
+    `sensed(t, y, ambient)` -> y, the same; `digital(t, y)` -> y at the samples, after noise. `direct`: the share of a change
+    of drive that passes at once, where `drive` remembers.
     """
 
     drive: Callable[[float, float], float] | None = None
@@ -83,6 +84,7 @@ class Hooks:
     carried: Callable[[Array, Array, Array], Array] | None = None
     sensed: Callable[[Array, Array, Array], Array] | None = None
     digital: Callable[[Array, Array], Array] | None = None
+    direct: float | None = None
 
 
 def exact_step(axis: Axis, h: float) -> tuple[float, ...]:
@@ -131,7 +133,7 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
     m, c, k, k_f, limit, loop = (
         axis.mass, axis.damping, axis.stiffness, axis.force_constant, axis.drive_limit, axis.loop,
     )  # fmt: skip
-    on_drive = [x.drive for x in hooks if x.drive]
+    on_drive = [(x.drive, x.direct) for x in hooks if x.drive]
     on_force = [x.force for x in hooks if x.force]
     q = v = summed = asked = 0.0
     t, half, F = start, h / 2, 0.0
@@ -146,7 +148,12 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
             summed += (u - q) * h
             u = asked
         u = min(max(u, -limit), limit)
-        for law in on_drive:
+        for law, direct in on_drive:
+            if rise:
+                if direct is None:
+                    rise = law(t + half, u + rise / 2) - law(t + half, u - rise / 2)
+                else:
+                    rise *= direct
             u = law(t + half, u)
         qs.append(q), vs.append(v), us.append(u)
         F = k_f * u

@@ -85,6 +85,16 @@ def test_a_digital_controller_reads_its_reference_at_the_sample_however_it_goes_
     assert np.array_equal(laws.simulate(axis, reference, linear=True), laws.simulate(axis, reference))
 
 
+@pytest.mark.parametrize("name, shape, passes", [("drive_gain", {}, 1.3), ("thermal_lag", {"tau": 1e9}, 0.7)])
+def test_a_drive_law_acts_on_the_rise_of_a_drive_that_is_linear_too(name, shape, passes):
+    """A gain is a stronger motor, and a share that comes never a weaker one."""
+    u = np.random.default_rng(2).standard_normal(400)
+    planted = Planted(name, abs(passes - 1), shape)
+    other = replace(AXIS, force_constant=passes * AXIS.force_constant)
+    y = laws.simulate(AXIS, u, [planted], SCENE, linear=True)
+    assert y == pytest.approx(laws.simulate(other, u, [], SCENE, linear=True), rel=1e-9, abs=1e-9 * np.ptp(y))
+
+
 @pytest.mark.parametrize("name", sorted(laws.DRAW))
 def test_a_law_is_absent_at_zero_and_present_otherwise(name):
     planted = laws.draw(name, np.random.default_rng(3), SCENE)

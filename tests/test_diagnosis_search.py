@@ -252,6 +252,23 @@ def test_a_number_that_meets_its_bound_stops_there_and_the_others_go_on():
     assert levenberg_marquardt(tight, np.ones(2), 1) == pytest.approx([0.0, 2.05 / 1.01], rel=1e-4)
 
 
+class Product:
+    """A force constant and a gain, of which the readings know the product and the data sheet the first."""
+
+    k, most, bounds = 2, np.full(2, np.inf), (np.full(2, -9.0), np.full(2, 9.0))
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        return np.array([3e4 * (x[0] * (1 + x[1]) - 1.2), (x[0] - 1) / 0.02])
+
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.residual(x), np.array([[3e4 * (1 + x[1]), 3e4 * x[0]], [50.0, 0.0]])
+
+
+def test_a_bent_valley_is_followed():
+    """From where the force constant bears it all, at a hundred squares."""
+    assert levenberg_marquardt(Product(), np.array([1.2, 0.0]), 20) == pytest.approx([1.0, 0.2], rel=0.02)
+
+
 @pytest.mark.parametrize("far", [True, False])
 def test_a_device_far_from_the_readings_is_fitted_from_several_starts(monkeypatch, far):
     fitter, begun = fitter_of(), []

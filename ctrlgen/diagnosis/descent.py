@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 NEGLIGIBLE = 0.01  # of one squared standard deviation
+PART = 0.1  # of a step, from which its curvature is taken
 BEGIN, FAILED = 1e-6, 1e-2  # Marquardt's damping at first, and where a step has failed twice
 
 
@@ -47,6 +48,8 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarr
         if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
             break
         better = _better(problem, r, np.clip(x + step, low, high))
+        if better is None:
+            better = _along_valley(problem, x, r, J, H, step, damping)
         if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
             step = _damped(H, gradient, least, most, damping, own)
             better = _better(problem, r, np.clip(x + step, low, high))
@@ -84,6 +87,21 @@ def _damped(
         A, b = root[:, None] * V.T, -(V.T @ (gradient[open_] / scale)) / root
         step[open_] = lsq_linear(A, b, (least[open_] * scale, most[open_] * scale), method="bvls").x / scale
     return step
+
+
+def _along_valley(
+    problem: Problem, x: np.ndarray, r: np.ndarray, J: np.ndarray, H: np.ndarray, step: np.ndarray, damping: float
+) -> np.ndarray | None:
+    """x + t step + t^2 bend, t = 1, 1/2, 1/4, the first that leaves less than `r`: the bend takes back the curvature of the
+    residual along the step, half its second derivative, from a small `PART` of it (geodesic acceleration, M. K. Transtrum,
+    J. P. Sethna, arXiv:1201.5885)."""
+    low, high = problem.bounds
+    curved = ((problem.residual(np.clip(x + PART * step, low, high)) - r) / PART - J @ step) / PART
+    if not np.isfinite(curved).all():
+        return None
+    bend = _damped(H, J.T @ curved, low - x, high - x, damping)
+    tried = (_better(problem, r, np.clip(x + t * step + t**2 * bend, low, high)) for t in (1.0, 0.5, 0.25))
+    return next((better for better in tried if better is not None), None)
 
 
 def _better(problem: Problem, r: np.ndarray, tried: np.ndarray) -> np.ndarray | None:
