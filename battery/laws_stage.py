@@ -66,19 +66,12 @@ def make_creep(scene: Scene, a: float, tau: float, second: float) -> Hooks:
 
 
 def make_backlash(scene: Scene, a: float) -> Hooks:
-    """The sensor's target is dragged through a gap a [m] by a soft contact: tau = 20 us, tau dx/dt = e - clip(e, +-a/2), e = q - x."""
+    """The sensor's target is dragged through a gap a [m]."""
 
     def carried(t: Array, q: Array, u: Array) -> Array:
-        if a == 0:
-            return q
-        gain, half = 1 - math.exp(-scene.step / 2e-5), a / 2
-        x, out = 0.0, []
+        half, x, out = a / 2, 0.0, []
         for target in q.tolist():
-            e = target - x
-            if e > half:
-                x += gain * (e - half)
-            elif e < -half:
-                x += gain * (e + half)
+            x = min(max(x, target - half), target + half)
             out.append(x)
         return np.array(out)
 

@@ -164,6 +164,7 @@ class Effect:
     )
     rough: ClassVar[float] = 0.0  # of itself: how far the form of the law, fitted, may be from nature
     family: ClassVar[str | None] = None  # forms of one physics, of which a place has one
+    special: ClassVar[tuple[str, str, float] | None] = None  # the effect that it is where a parameter has a value
     domain: ClassVar[str | None] = None  # where a report says it is; the place says it by default
 
     def __init__(self, at: str, values: dict[str, Quantity], of: str | None = None) -> None:

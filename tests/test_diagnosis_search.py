@@ -13,6 +13,7 @@ from test_diagnosis_evidence import AXIS, NOISE, H, move
 from ctrlgen.diagnosis.adequacy import Adequacy
 from ctrlgen.diagnosis.descent import levenberg_marquardt
 from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, unconfirmed, verdict
+from ctrlgen.diagnosis.fit import Fit
 from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.learnt import learn_colour, learn_more
 from ctrlgen.diagnosis.resolved import resolved
@@ -60,6 +61,16 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     assert not stuck.fit.is_noise and found.fit.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
     assert searcher._reshaped(found, nominal, screened) is found
+
+
+@pytest.mark.parametrize("breakaway, sd, special", [(1.0, 0.03, "coulomb"), (1.4, 0.03, None), (1.4, 0.3, "coulomb")])
+def test_a_law_may_as_well_be_its_special_case_where_the_fit_does_not_exclude_it(breakaway, sd, special):
+    stribeck = Hypothesis("stribeck", "stage:axis", "axis")
+    rubbing = {"force": 0.01, "breakaway": breakaway, "speed": 1e-4, "reach": 2e-8}
+    structure = Structure(AXIS).with_cause(stribeck, rubbing).with_cause(BACKLASH, {"gap": 6e-8})
+    J = np.eye(len(structure.unknowns)) / sd
+    fit = Fit(structure, structure.start, (), 0.0, 1500, np.zeros(0), J, 0.0)
+    assert fit.special(0) == special and fit.special(1) is None
 
 
 def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():

@@ -14,6 +14,7 @@ import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.descent import levenberg_marquardt
+from ctrlgen.diagnosis.hypotheses import PARAMETER
 from ctrlgen.diagnosis.journal import Journal, key_of
 from ctrlgen.diagnosis.noise import Noise
 from ctrlgen.diagnosis.response import Response
@@ -29,7 +30,8 @@ FAR_OFF = 100.0  # times the noise, root mean square: so large a mismatch may be
 NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
 LONGEST_STEP = 1.5  # of a logarithm
 MET = 4.0  # standard deviations of the noise's own squares
-HELD_STEPS = 4  # of numbers that only the held-out records decide
+NEARLY_NOISE = 2.0  # times its squares: what leaves less says enough for the held-out records to decide the rest
+HELD_STEPS = 4  # of numbers that only those decide
 HALVINGS = 6  # of a step that does not keep what its slopes promise
 SETTLED = 0.1  # squares: numbers that gain less have arrived
 START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
@@ -86,6 +88,16 @@ class Fit:
             if unknown.cause == cause:
                 found[unknown.name] = float(value)
         return found
+
+    def special(self, cause: int) -> str | None:
+        """The effect that a cause may as well be, its law's `special` case inside the 95 % interval."""
+        hypothesis = self.structure.causes[cause]
+        if hypothesis.effect == PARAMETER or hypothesis.law.special is None:
+            return None
+        effect, name, value = hypothesis.law.special
+        i = next(i for i, u in enumerate(self.structure.unknowns) if u.cause == cause and u.name == name)
+        sd = np.sqrt(max(self.covariance[i, i], 0.0))
+        return effect if abs(self.theta[i] - value) <= CI * sd else None
 
 
 class Fitter:
@@ -207,10 +219,10 @@ class Fitter:
         """-2 ln of how likely the held-out records are, as the numbers are known from the records to fit.
 
         |r(p + dp)|^2 + dp' C^-1 dp + ln det(I + C J'J), see `as_known`: numbers that the records to fit leave open are not
-        held against their structure, and earn it nothing. One step there says enough of a structure that does not explain the
-        records to fit.
+        held against their structure, and earn it nothing. One step there says enough of a structure that does not nearly
+        explain the records to fit.
         """
-        moved, price, spread = self.as_known(fit, HELD_STEPS if fit.is_noise else 1)
+        moved, price, spread = self.as_known(fit, HELD_STEPS if fit.objective < NEARLY_NOISE * fit.n else 1)
         return self._held_squares(moved) + price + spread
 
     def as_known(self, fit: Fit, steps: int = 1) -> tuple[Fit, float, float]:

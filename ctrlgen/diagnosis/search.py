@@ -258,8 +258,8 @@ class Searcher:
         if cause.family is None or (cause.family, cause.at) != (suspect.hypothesis.family, suspect.hypothesis.at):
             return structure
         common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
-        kin = others.with_cause(suspect.hypothesis, suspect.start | common)
-        return min(structure, kin, key=self.fitter.begun)
+        kin = (others.with_cause(suspect.hypothesis, s | common) for s in (suspect.start, *suspect.others))
+        return min((structure, *kin), key=self.fitter.begun)
 
     def _screened(self, trial: Trial) -> Screened:
         key = frozenset(trial.fit.structure.causes)
@@ -277,13 +277,11 @@ class Searcher:
         return current
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
-        there = current.fit.structure.causes
-        found = self._replacements(current, k)
-        return tuple(
-            t
-            for t in found
-            if t.total < current.total + RIVAL and self.weigh.meant(t, there) and not _same(t.cause, there[k])
-        )
+        """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude."""
+        there, special = current.fit.structure.causes, current.fit.special(k)
+        alike = [t for t in self._replacements(current, k) if not _same(t.cause, there[k])]
+        alike = [t for t in alike if t.total < current.total + RIVAL or (special and t.cause.effect == special)]
+        return tuple(t for t in alike if self.weigh.meant(t, there))
 
 
 def _same(a: Hypothesis | None, b: Hypothesis) -> bool:

@@ -15,6 +15,7 @@ class Stribeck(Effect):
     rough = 0.02
     rarity = 1.0  # dry friction that does not fall is the commoner
     family = "dry friction"
+    special = ("coulomb", "breakaway", 1.0)
     sticks = True
     needs = frozenset({"velocity"})
     source = "C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, eqs. (1)-(4)"
