@@ -33,9 +33,10 @@ class Problem(Protocol):
 def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
     """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431).
 
-    A step that fails is tried without its part in the records' starts: those may bend within a gap or a fringe. One that
-    fails however short it is, without the number that promises most: the moment of an event between two samples lies about
-    its slope. Ends when a step promises less than `NEGLIGIBLE` of one squared standard deviation.
+    A step that fails is tried along the valley that it left, then without its part in the records' starts: those may bend
+    within a gap or a fringe. One that fails however short it is, without the number that promises most: the moment of an
+    event between two samples lies about its slope. Ends when a step promises less than `NEGLIGIBLE` of one squared standard
+    deviation.
     """
     low, high = problem.bounds
     own = np.arange(len(x)) < problem.k
@@ -48,7 +49,7 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarr
         if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
             break
         better = _better(problem, r, np.clip(x + step, low, high))
-        if better is None:
+        if better is None and damping <= FAILED:
             better = _along_valley(problem, x, r, J, H, step, damping)
         if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
             step = _damped(H, gradient, least, most, damping, own)
@@ -92,7 +93,7 @@ def _damped(
 def _along_valley(
     problem: Problem, x: np.ndarray, r: np.ndarray, J: np.ndarray, H: np.ndarray, step: np.ndarray, damping: float
 ) -> np.ndarray | None:
-    """x + t step + t^2 bend, t = 1, 1/2, 1/4, the first that leaves less than `r`: the bend takes back the curvature of the
+    """x + t step + t^2 bend, t = 1 or 1/3, the first that leaves less than `r`: the bend takes back the curvature of the
     residual along the step, half its second derivative, from a small `PART` of it (geodesic acceleration, M. K. Transtrum,
     J. P. Sethna, arXiv:1201.5885)."""
     low, high = problem.bounds
@@ -100,7 +101,7 @@ def _along_valley(
     if not np.isfinite(curved).all():
         return None
     bend = _damped(H, J.T @ curved, low - x, high - x, damping)
-    tried = (_better(problem, r, np.clip(x + t * step + t**2 * bend, low, high)) for t in (1.0, 0.5, 0.25))
+    tried = (_better(problem, r, np.clip(x + t * step + t**2 * bend, low, high)) for t in (1.0, 1 / 3))
     return next((better for better in tried if better is not None), None)
 
 
