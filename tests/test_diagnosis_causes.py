@@ -349,6 +349,8 @@ def test_what_uncertain_numbers_leave_is_what_numbers_drawn_from_it_leave(rng):
     drawn = rng.multivariate_normal(fit.theta, fit.covariance, 200)
     off = [fitter.predicted(replace(fit, theta=theta), record) - fitter.predicted(fit, record) for theta in drawn]
     assert uncertainty(fitter, fit) == pytest.approx(np.sqrt(np.mean(np.square(off), axis=(0, 1))), rel=0.15)
+    fixed = replace(fit, theta=np.zeros(0), J=np.zeros((len(fit.J), 0)))
+    assert np.array_equal(uncertainty(fitter, fixed), [0.0])
 
 
 def test_a_fit_is_judged_where_the_records_leave_its_numbers_and_by_what_it_fitted():

@@ -16,7 +16,7 @@ def uncertainty(fitter: Fitter, fit: Fit) -> np.ndarray:
     """Root mean square (n_y,) [SI] of dy over the samples held out; infinite where the slopes leave the numbers."""
     squares = np.zeros(len(fitter.recording.channels))
     count = np.zeros_like(squares)
-    for record in fitter.held:
+    for record in fitter.held if len(fit.theta) else ():  # nothing is fitted, nothing is unsure
         Y = _following(fitter, fit, record)
         variance = np.einsum("nij,jk,nik->ni", Y, fit.covariance, Y)
         squares += np.sum(np.where(record.valid, np.maximum(variance, 0.0), 0.0), axis=0)
