@@ -8,9 +8,7 @@ import scipy
 SPIKE = 8.0  # standard deviations of the local high-pass noise
 WIDEST = 3  # samples in a spike; what lasts longer may be motion
 WINDOW = 201  # samples over which noise is called local
-LEAST_AROUND = (
-    5  # samples beside a spike: two make the line and three tell whether it is one; records begin and end, too
-)
+LEAST_AROUND = 5  # samples beside a spike, also where the record ends: two make a line, three tell whether it is one
 AFTER_JUMP = 10  # samples after a jump of the drive in which the device may do anything
 STUCK = 8  # equal samples in a row
 RAIL_RUN = 5  # equal samples in a row at the end of the range

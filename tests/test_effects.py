@@ -472,6 +472,25 @@ def test_has_an_equation_a_source_bounds_and_fits_on_a_screen(effect):
         assert not (state.clock and state.stepped) and where.si(state.scale, state) > 0
 
 
+@pytest.mark.parametrize("D", [2.0, 3.25, 4.5])
+def test_logarithmic_creep_follows_the_logarithm_for_so_many_decades(D):
+    """After a unit step, tau = 1 s; 3 % of a decade's, as its file says."""
+    law = Effect.library["log_creep"]("all", {})
+    one, p = (
+        SimpleNamespace(**{z.name: 0.0 for z in law.states}, value=1.0),
+        SimpleNamespace(gain=1.0, tau=1.0, decades=D),
+    )
+    rates = law.rates(one, p)
+
+    def after(t: float) -> float:
+        moved = {name: 1 - np.exp(-float(rate) * t) for name, rate in rates.items()}
+        return float(law.term(SimpleNamespace(**moved), p))
+
+    for t in np.geomspace(3.0, 10 ** (D - 1.5), 20):
+        assert after(t) == pytest.approx(np.log10(t) + 0.5, abs=0.03)
+    assert after(1e9) == pytest.approx(D)
+
+
 def test_the_library_is_the_folder():
     files = {path.stem for path in Path(ctrlgen.effects.__path__[0]).glob("*.py")} - {"__init__"}
     assert set(Effect.library) == files

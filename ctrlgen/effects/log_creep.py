@@ -10,8 +10,8 @@ TIMES = tuple(10 ** (j / 2) for j in range(9))  # of relaxation, per shortest on
 class LogCreep(Effect):
     """dz_j/dt = (d - z_j)/(10^(j/2) tau), Delta d = g/2 sum_j w_j z_j, w_j = min(max(2 D - j, 0), 1), j = 0..8.
 
-    From 3 tau after a step d g (log10(t/tau) + 0.5), within one percent of a decade's, for D decades. Holds from tau to
-    10^4 tau.
+    After a step d g (log10(t/tau) + 1/2) from 3 tau to 10^(D - 1.5) tau, within 3 % of a decade's, and D d g in the end.
+    Holds from tau to 10^4 tau.
     """
 
     place = Place.DISPLACEMENT
