@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.pitches import both, jumps, pitches
 from ctrlgen.diagnosis.quiet import quiet_noise
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.resolved import resolved
+from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher
 from ctrlgen.diagnosis.spikes import alone
@@ -340,6 +341,15 @@ def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
     assert fitter.held_out(loose) < 0.7 * fitter.held_out(replace(off, J=1e4 * off.J))
     moved, *_ = fitter.as_known(loose)
     assert moved.theta[1] == off.theta[1] and np.all(moved.theta[[0, 2, 3]] != off.theta[[0, 2, 3]])
+
+
+def test_what_slopes_that_left_the_numbers_say_is_not_called_sure(monkeypatch):
+    fitter = fitter_of()
+    fit = fitter.fit(Structure(AXIS))
+    (record,) = fitter.held
+    shape = (len(record.time), 1, len(fit.theta) + len(fit.starts[0]))
+    monkeypatch.setattr(Response, "sensitivities", lambda *_: (record.observed, np.full(shape, np.nan)))
+    assert np.array_equal(uncertainty(fitter, fit), [np.inf])
 
 
 def test_what_uncertain_numbers_leave_is_what_numbers_drawn_from_it_leave(rng):

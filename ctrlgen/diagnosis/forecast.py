@@ -29,7 +29,9 @@ def _following(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray:
     """How the readings (n, n_y, k) of a record change with the numbers, the record's start following."""
     response = fit.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
     k, n_i = len(fit.theta), len(response.initial)
-    slopes = np.nan_to_num(response.sensitivities(record, fit.theta, np.zeros(n_i))[1])
+    slopes = response.sensitivities(record, fit.theta, np.zeros(n_i))[1]
+    if not np.isfinite(slopes).all():
+        return np.full((*slopes.shape[:2], k), np.inf)
     Y, Y_s = slopes[:, :, :k], slopes[:, :, k:] * start_sizes(response)
     white = fitter.noise.whiten(np.concatenate([Y, Y_s], axis=2), record.valid).reshape(-1, k + n_i)
     WY, WY_s = white[:, :k], white[:, k:]

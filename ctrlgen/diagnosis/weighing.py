@@ -20,9 +20,7 @@ from ctrlgen.diagnosis.trial import CONFIRMED, Trial, cooled
 
 MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
 DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
-WORTHWHILE = (
-    0.05  # of the held-out excess over the noise: what a further cause must take away; a wrong law's patches do not
-)
+WORTHWHILE = 0.05  # of the held-out excess over the noise: what a further cause must take away
 MOSTLY = 0.9  # of the mismatch: where causes take it away, a series' others are sought one or two at a time
 SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
 FORM = 0.25  # the same for the held-out records, where either explains all of the records to fit
