@@ -1,8 +1,7 @@
-"""Recordings: six formats read alike, every fault at once, doubtful samples marked and never filled."""
+"""Recordings: every fault at once, doubtful samples marked and never filled, what is held out."""
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from pathlib import Path
@@ -10,177 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT, SCENARIOS
+from recorded import AXES, COLUMNS, N, csv_text, described, refused, samples, two
 
 from ctrlgen import build_model, load_device
-from ctrlgen.errors import InputError
 from ctrlgen.marking import spikes, stuck
 from ctrlgen.recording import load_recordings
-from ctrlgen.recording_formats import READERS, read_table
+from ctrlgen.recording_formats import read_table
 from ctrlgen.reproduce.s0_data import load_s0
 
 MEASURED = Path(os.environ.get("CTRLGEN_RECORDINGS", ROOT.parent / "shared" / "recordings"))
-AXES = ("1X", "1Y", "2X", "2Y", "3X", "3Y")
-N = 400
 
 
 @pytest.fixture(scope="module")
 def meso():
     return build_model(load_device(SCENARIOS / "devices" / "meso_hexapod.toml"))
-
-
-def samples(n: int = N, seed: int = 1) -> dict[str, np.ndarray]:
-    """Columns of a healthy record in reader's units: slow heater powers [W], a noisy reading [um], a temperature [degC]."""
-    rng = np.random.default_rng(seed)
-    t = 0.001 * np.arange(n)
-    drives = {f"u{a}": 0.2 + 0.1 * np.sin(2 * np.pi * (3 + k + 0.1 * seed) * t) for k, a in enumerate(AXES)}
-    read = 2 * np.sin(2 * np.pi * 3.3 * t + seed) + 0.01 * rng.standard_normal(n)
-    tilt = 1e-4 * np.cos(2 * np.pi * 5 * t) + 1e-6 * rng.standard_normal(n)
-    return {"t": t, **drives, "x": read, "tilt": tilt, "T": 23 + 0.001 * np.arange(n)}
-
-
-def csv_text(columns: dict[str, np.ndarray]) -> str:
-    cells = [["" if math.isnan(v) else repr(float(v)) for v in column] for column in columns.values()]
-    return "\n".join([",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]) + "\n"
-
-
-COLUMNS = {
-    **{f"drive.{a}": {"column": f"u{a}", "unit": "W"} for a in AXES},
-    "reading.delta_x": {"column": "x", "unit": "um", "noise": "10 nm"},
-}
-
-
-def toml(value) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{json.dumps(k)} = {toml(v)}" for k, v in value.items()) + " }"
-    return json.dumps(value)
-
-
-def described(folder, *records: dict, columns=COLUMNS, device="mems_hexapod", kind="series"):
-    """recording.toml in `folder`; a record without time gets the column t."""
-    lines = [f'title = "test"\ndevice = "{device}"\nkind = "{kind}"\n']
-    for record in records:
-        if kind == "series" and not {"time", "sample_rate"} & set(record):
-            record = {**record, "time": {"column": "t", "unit": "s"}}
-        lines += ["[[record]]", *(f"{k} = {toml(v)}" for k, v in record.items() if v is not None)]
-    lines += ["[columns]", *(f"{json.dumps(k)} = {toml(v)}" for k, v in columns.items())]
-    (folder / "recording.toml").write_text("\n".join(lines))
-    return folder
-
-
-def two(folder, fit: dict[str, np.ndarray], **record):
-    """A recording of `fit` and a healthy held-out record."""
-    (folder / "fit.csv").write_text(csv_text(fit))
-    (folder / "held.csv").write_text(csv_text(samples(seed=2)))
-    return described(folder, {"file": "fit.csv", "role": "fit", **record}, {"file": "held.csv", "role": "hold_out"})
-
-
-def refused(*arguments) -> dict[str, str]:
-    """Where -> what of the faults; load_recordings must refuse."""
-    with pytest.raises(InputError) as raised:
-        load_recordings(*arguments)
-    return {fault.where: fault.what for fault in raised.value.faults}
-
-
-# formats
-
-
-def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:
-    if ending == ".csv":
-        path.write_text(csv_text(columns))
-    elif ending == ".json":
-        path.write_text(json.dumps({k: [None if math.isnan(x) else x for x in v] for k, v in columns.items()}))
-    elif ending == ".mat":
-        from scipy.io import savemat
-
-        savemat(path, {**{k: v[:, None] for k, v in columns.items()}, "gain": 3.0})
-    elif ending in (".h5", ".hdf5"):
-        h5py = pytest.importorskip("h5py", reason="h5py is not installed: HDF5 was not read")
-        with h5py.File(path, "w") as file:
-            for name, column in columns.items():
-                file["log/" + name] = column
-            file["log/x"].attrs["unit"] = "um"
-    elif ending == ".tdms":
-        nptdms = pytest.importorskip("nptdms", reason="npTDMS is not installed: TDMS was not read")
-        with nptdms.TdmsWriter(path) as writer:
-            writer.write_segment([nptdms.ChannelObject("log", name, column) for name, column in columns.items()])
-    else:
-        asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: MDF4 was not read")
-        with asammdf.MDF(version="4.10") as file:
-            rest = {name: column for name, column in columns.items() if name != "t"}
-            file.append([asammdf.Signal(c, columns["t"], name=n, unit="um" * (n == "x")) for n, c in rest.items()])
-            file.save(path)
-
-
-@pytest.mark.parametrize("ending", list(READERS))
-def test_every_format_gives_the_same_record(ending, tmp_path, model):
-    columns = samples()
-    write_as(ending, tmp_path / f"run{ending}", columns)
-    clock = {"column": "time" if ending == ".mf4" else "t", "unit": "s"}
-    described(tmp_path, {"file": f"run{ending}", "role": "fit", "time": clock})
-    fit, held = load_recordings([tmp_path], model).records
-    assert np.allclose(np.vstack([fit.drive, held.drive])[:, 2], columns["u2X"], rtol=1e-15)
-    assert np.allclose(np.vstack([fit.observed, held.observed])[:, 0], 1e-6 * columns["x"], rtol=1e-15)
-    assert fit.sample_time == pytest.approx(1e-3, rel=1e-9)
-
-
-def test_a_matlab_file_of_version_7_3_is_hdf5_turned(tmp_path):
-    h5py = pytest.importorskip("h5py", reason="h5py is not installed: MATLAB 7.3 was not read")
-    with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as file:
-        file["log/u"] = np.arange(5.0)[None, :]
-        file["both"] = np.arange(10.0).reshape(2, 5)
-    with open(tmp_path / "run.mat", "r+b") as file:  # the header by which MATLAB tells the version
-        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
-    table = read_table(tmp_path / "run.mat")
-    assert np.array_equal(table.numbers("log.u"), np.arange(5))
-    assert np.array_equal(table.numbers("both[1]"), np.arange(5, 10))
-
-
-def test_structures_and_matrices_have_named_columns(tmp_path):
-    (tmp_path / "a.json").write_text('{"dt": 0.1, "log": {"m": [[1, 2], [3, null], [5, 6]], "text": ["a", "b"]}}')
-    table = read_table(tmp_path / "a.json")
-    assert list(table.columns) == ["log.m[0]", "log.m[1]"]
-    assert table.find("m[1]") == table.find(1) == "log.m[1]"
-    assert np.array_equal(table.numbers("log.m[1]"), [2, np.nan, 6], equal_nan=True)
-    (tmp_path / "b.json").write_text('[{"t": 0, "u": 1}, {"t": 1}]')
-    assert np.array_equal(read_table(tmp_path / "b.json").numbers("u"), [1, np.nan], equal_nan=True)
-
-
-def test_a_csv_may_lack_a_header_or_use_the_decimal_comma(tmp_path):
-    (tmp_path / "a.csv").write_text("# made by hand\n0;1,5\n1;2,5\n2;\n")
-    table = read_table(tmp_path / "a.csv")
-    assert np.array_equal(table.numbers(table.find(1)), [1.5, 2.5, np.nan], equal_nan=True)
-
-
-def test_bad_cells_are_listed_by_line(tmp_path):
-    (tmp_path / "a.csv").write_text("t,u\n0,1\n1,OVER\n2,x\n")
-    with pytest.raises(InputError, match=r"line 3 'OVER', line 4 'x'"):
-        read_table(tmp_path / "a.csv").numbers("u")
-
-
-@pytest.mark.parametrize(("ending", "package"), [(".h5", "h5py"), (".tdms", "npTDMS"), (".mf4", "asammdf")])
-def test_a_missing_package_is_named_with_its_command(ending, package, tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, package.lower(), None)
-    (tmp_path / f"a{ending}").write_bytes(b"")
-    with pytest.raises(InputError, match=f"pip install {package} "):
-        read_table(tmp_path / f"a{ending}")
-
-
-@pytest.mark.parametrize("ending", list(READERS))
-def test_a_damaged_file_is_an_input_error(ending, tmp_path):
-    (tmp_path / f"a{ending}").write_bytes(b"\x00\x01 no such thing {")
-    with pytest.raises(InputError):
-        table = read_table(tmp_path / f"a{ending}")
-        table.numbers(table.find("u"))
-
-
-def test_channels_of_mdf_on_different_clocks_are_not_mixed(tmp_path):
-    asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: MDF4 was not read")
-    with asammdf.MDF(version="4.10") as file:
-        for name, start in (("u", 0.0), ("y", 0.5)):
-            file.append([asammdf.Signal(np.arange(9.0), start + np.arange(9.0), name=name)])
-        file.save(tmp_path / "a.mf4")
-    with pytest.raises(InputError, match="different times"):
-        read_table(tmp_path / "a.mf4")
 
 
 # what a record holds
