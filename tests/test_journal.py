@@ -10,7 +10,7 @@ import pytest
 from test_batch import SERVO, servo_poses
 
 from ctrlgen.diagnosis import fit
-from ctrlgen.diagnosis.job import diagnose_into, unfinished
+from ctrlgen.diagnosis.job import Replicates, diagnose_into, digests, unfinished
 from ctrlgen.diagnosis.journal import Journal, key_of
 
 MADE_FROM = {"version": "1", "seed": 0, "files": {"a": "b"}}
@@ -87,3 +87,28 @@ def test_a_line_that_was_not_written_to_its_end_does_not_count(tmp_path):
 def test_a_key_tells_values_and_order():
     a, b = np.array([1.0, 2.0]), np.array([2.0, 1.0])
     assert len({key_of(a, b), key_of(b, a), key_of(a), key_of(a, 1), key_of(a + 1e-16 * a, b + 1e-15)}) == 5
+
+
+def test_what_is_stopped_among_its_replicates_keeps_its_fits(asked, tmp_path):
+    out = tmp_path / "out"
+
+    def stop(said: str) -> None:
+        if said.startswith("bootstrap"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_into(*asked, out, progress=stop, replicates=Replicates(20, jobs=0))
+    assert not out.exists() and unfinished(out).exists()
+
+
+def test_recordings_of_one_name_are_told_apart(asked, tmp_path):
+    device, _ = asked
+    days = [servo_poses(tmp_path / day / "run", 1e-3, k) for k, day in enumerate(("day1", "day2"))]
+    before = digests(device, days)
+    assert list(before) == [
+        "table.toml",
+        *(f"{day}/run/{f}" for day in ("day1", "day2") for f in ("recording.toml", "poses.csv")),
+    ]
+    (days[0] / "poses.csv").write_text("r,y\n1,1\n")
+    after = digests(device, days)
+    assert {name for name in before if before[name] != after[name]} == {"day1/run/poses.csv"}

@@ -45,6 +45,10 @@ def diagnose(
     """
     from ctrlgen.diagnosis.job import Replicates, diagnose_into, unfinished
 
+    if (scheduler is not None or jobs is not None) and not bootstrap:
+        raise typer.BadParameter(
+            "only the replicates of --bootstrap run elsewhere; add --bootstrap 200, or leave it out"
+        )
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         with progress() as advance:

@@ -30,7 +30,7 @@ def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca
         return sum((V @ slope for V, slope in zip((T, seed), slopes, strict=False)))
 
     if not several(q):
-        one = ca.Function("one", q.given, [q.following, q.y, *_slopes([q.following, q.y], by)], {"cse": True})
+        one = ca.Function("one", q.given, [q.following, q.y, *_slopes([q.following, q.y], by)])
         following, y, *slopes = one(*given)
         return following, slope(*slopes[: len(by)]), y, slope(*slopes[len(by) :])
     m = q.model

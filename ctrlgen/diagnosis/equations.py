@@ -56,6 +56,7 @@ def equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> Equat
         following = ca.vertcat(after.x, after.z)
     else:
         following, y = moving
+    following, y = ca.cse([following, y])  # before they are differentiated: afterwards it takes ten times as long
     given = [ca.vertcat(model.x, model.z), model.u, after.u_next, model.ambient_symbol, c]
     steps = steps_of(model, sample_time) if model.inertial else None
     return Equations(constants, model, steps, linear, following, y, given)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,7 +81,13 @@ def diagnose_into(
     """
     step = progress or (lambda _: None)
     with whole_folder(Path(out)) as draft:
-        found = _diagnosed(device, recordings, unfinished(Path(out)), seed, step)
+        model = build_model(load_device(device))
+        step("reading")
+        recording = load_recordings(list(recordings), model)
+        journal = _journal(Path(out), device, recordings, seed)
+        if journal.known:
+            step(f"going on after {journal.known} fits")
+        found = diagnose(model.device, recording, seed, step, journal)
         if replicates is not None:
             found.extra["bootstrap"] = replicates.of(found, seed, step)
             write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
@@ -91,6 +98,7 @@ def diagnose_into(
             write_text(draft / "next_experiment" / name, content)
         write_text(draft / "diagnosis.json", json.dumps(as_dict(found), indent=1, allow_nan=False) + "\n")
         write_text(draft / "report.html", page(found, Provenance(digests(Path(device), recordings), seed)))
+    journal.done()  # not before: what is stopped among its replicates need not fit anew
     return found
 
 
@@ -100,20 +108,9 @@ def unfinished(out: Path) -> Path:
     return out.with_name(f"{out.name}.unfinished")
 
 
-def _diagnosed(
-    device: Path | str, recordings: Sequence[Path | str], kept: Path, seed: int, step: Progress
-) -> Diagnosis:
-    """The diagnosis, its fits `kept` in a file meanwhile."""
-    model = build_model(load_device(device))
-    step("reading")
-    recording = load_recordings(list(recordings), model)
-    made_from = {"version": __version__, "seed": seed, "files": digests(Path(device), recordings)}
-    journal = Journal(kept, made_from)
-    if journal.known:
-        step(f"going on after {journal.known} fits")
-    found = diagnose(model.device, recording, seed, step, journal)
-    journal.done()
-    return found
+def _journal(out: Path, device: Path | str, recordings: Sequence[Path | str], seed: int) -> Journal:
+    """Of the fits of a diagnosis into `out`."""
+    return Journal(unfinished(out), {"version": __version__, "seed": seed, "files": digests(Path(device), recordings)})
 
 
 def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:
@@ -126,12 +123,14 @@ def _digest(path: Path) -> str:
 
 
 def _files(device: Path, recordings: Sequence[Path | str]) -> Iterator[tuple[str, Path]]:
-    """Name and path of every file that was read; a recording's are named with its folder."""
+    """Name and path of every file that was read; recordings' are named from the folder that all of theirs stand in."""
     yield device.name, device
-    for given in map(Path, recordings):
-        path = given / FILE if given.is_dir() else given
-        for name in dict.fromkeys([path.name, *_named(read_toml(path))]):
-            yield f"{path.resolve().parent.name}/{name}", path.parent / name
+    tables = [given / FILE if given.is_dir() else given for given in map(Path, recordings)]
+    above = os.path.commonpath([table.resolve().parent.parent for table in tables])
+    for table in tables:
+        folder = Path(os.path.relpath(table.resolve().parent, above)).as_posix()
+        for name in dict.fromkeys([table.name, *_named(read_toml(table))]):
+            yield f"{folder}/{name}", table.parent / name
 
 
 def _named(node: Any) -> Iterator[str]:

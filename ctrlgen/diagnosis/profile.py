@@ -49,7 +49,7 @@ class Profile:
 
 def profiles(fitter: Fitter, fit: Fit) -> tuple[Profile, ...]:
     """Of every number of every cause, in the order of the unknowns."""
-    if not fit.structure.causes:
+    if all(u.cause is None for u in fit.structure.unknowns):
         return ()
     surface = _Surface(fitter, fit)
     ratio = sandwich_over_model(fit)

@@ -76,7 +76,7 @@ class Response:
         """`given` of the equations -> F_S, F_c, H_S, H_c."""
         q = self._equations
         slopes = [ca.jacobian(a, b) for a in (q.following, q.y) for b in (q.given[0], q.given[4])]
-        return ca.Function("sloped", q.given, slopes, {"cse": True})
+        return ca.Function("sloped", q.given, slopes)
 
     def _stepped(self, pattern: ca.Sparsity) -> ca.Function:
         """`given` of the equations, dc/df of some `pattern` -> F_S, F_f, H_S, H_f where a sample takes several steps."""
@@ -132,7 +132,7 @@ class Response:
     def _moving(self) -> Recursion:
         """The sample map."""
         q = self._equations
-        return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)], {"cse": True}))
+        return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)]))
 
     def _carrying(self, by_free: bool) -> Recursion:
         """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
