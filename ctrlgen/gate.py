@@ -97,8 +97,12 @@ def _empty(record: Record, kind: str, names: Names, where: str, spoken: np.ndarr
             what = f"has no number in row {lost[0]} ({len(lost)} of {n}); leave those poses out of the file or by rows"
             faults.append(Fault(f"{where}.columns.{name!r}", what))
     for i, name in enumerate(names.observed):
-        if spoken[i] and not np.isfinite(record.observed[:, i]).any():
-            faults.append(Fault(f"{where}.columns.{name!r}", "holds no number at all; leave this channel out"))
+        count = int(np.isfinite(record.observed[:, i]).sum())
+        if spoken[i] and count < SHORTEST[kind]:
+            what = (
+                f"has {count} numbers in {n} rows of {record.name}, {SHORTEST[kind]} are needed; leave this channel out"
+            )
+            faults.append(Fault(f"{where}.columns.{name!r}", what))
     if record.ambient is not None and not np.isfinite(record.ambient).all():
         k = int(np.flatnonzero(~np.isfinite(record.ambient))[0])
         what = f"has no number in row {k}; give a constant, or a column without holes"
@@ -259,7 +263,7 @@ def _mark(record: Record, kind: str, names: Names, spoken: np.ndarray) -> tuple[
             value = y[np.isfinite(y)]
             reads = "has no valid sample" if not len(value) else f"reads {show(value[0], names.units[i])} throughout"
             if record.role != "rest":
-                notes.append(f"{title}: {reads}; a dead channel? Kept.")
+                notes.append(f"{title}: {reads}; a dead channel?")
         elif kind == "series":
             frozen = stuck(y, record.drive)
             found["in stretches that repeat themselves to the last bit (stuck or clipped)"] = frozen

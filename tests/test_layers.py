@@ -39,7 +39,7 @@ LAYERS = [
     "diagnosis.laws diagnosis.scatter", "diagnosis.spread diagnosis.profile", "diagnosis.slopes", "diagnosis.together",
     "diagnosis.screen diagnosis.adequacy diagnosis.resolved diagnosis.forecast", "diagnosis.trial", "diagnosis.weighing",
     "diagnosis.search",
-    "diagnosis.diagnosis", "diagnosis.read_off",
+    "diagnosis.diagnosis", "diagnosis.read_off", "diagnosis.dead",
     "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
     "diagnosis.empirical diagnosis.detectable diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
     "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",

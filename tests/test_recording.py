@@ -272,7 +272,7 @@ def test_a_dead_channel_is_kept_and_named(tmp_path, model):
     columns = {**COLUMNS, "reading.theta_y": {"column": "tilt", "unit": "rad"}}
     described(tmp_path, {"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}, columns=columns)
     recording = load_recordings([tmp_path], model)
-    assert recording.notes == ("fit.csv, reading.theta_y: reads 0.0002 rad throughout; a dead channel? Kept.",)
+    assert recording.notes == ("fit.csv, reading.theta_y: reads 0.0002 rad throughout; a dead channel?",)
     assert recording.records[0].valid.all()
 
 

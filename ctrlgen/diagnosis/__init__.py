@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import judge
+from ctrlgen.diagnosis.dead import alive
 from ctrlgen.diagnosis.diagnosis import Diagnosis, errors, findings, verdict
 from ctrlgen.diagnosis.evidence import evidence
 from ctrlgen.diagnosis.fit import Fitter
@@ -62,6 +63,8 @@ def _diagnose(
     if missing:
         raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
     step("noise")
+    live = alive(device, recording)
+    recording = live.recording
     noise = estimate(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
     fitter = Fitter(recording, noise, journal)
     for _ in range(GUESSES if noise.guessed.any() else 0):
@@ -81,7 +84,7 @@ def _diagnose(
     found = Searcher(fitter, Screen(fitter, open_, seed), step).run(Structure(device))
     step("judging")
     after = judge(fitter, found.chosen.fit)
-    seen = read_off(fitter, found)
+    seen = (*live.findings, *read_off(fitter, found))
     said = verdict(fitter, found, after, bool(seen))
     step("evidence")
     sure = profiles(fitter, found.chosen.fit)
@@ -97,6 +100,7 @@ def _diagnose(
         history=beside.history,
         notes=(
             *recording.notes,
+            *live.said,
             *fitter.noise.said,
             *([spikes] if spikes else []),
             *map(RESTLESS.format, after.restless),

@@ -82,8 +82,9 @@ def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
         if record.role != "rest" or fitter.recording.kind != "series":
             continue
         e = fitter.whitened(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
-        step = lattice(record.observed[record.valid[:, i], i])
-        if len(e) < 5 * LAGS or np.ptp(e) == 0 or step > ROUNDED * fitter.noise.floor[i]:
+        read = record.observed[record.valid[:, i], i]
+        step = lattice(read)
+        if len(e) < 5 * LAGS or np.ptp(read) == 0 or step > ROUNDED * fitter.noise.floor[i]:
             continue
         e = without_lines(e)  # a vibration is looked for by itself
         if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESTLESS:

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.adequacy import Adequacy
@@ -22,6 +23,8 @@ from ctrlgen.units import difference, from_si, to_si
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 LITTLE = 0.05  # of the mismatch: a law is right to that where it does not say how rough it is
+IMPOSSIBLE = 1e-6  # p of the device's own numbers so far off by chance
+FAR_OFF = 2.0  # stated deviations: numbers that are named where they are so far off together
 CHANCE = 4.0  # standard deviations of the noise's own squares
 
 
@@ -116,9 +119,12 @@ def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False)
     """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
 
     Partly: causes are found, but they leave a little more than noise, or no held-out record shows one of them, or nothing
-    tells the noise, so that nobody can say whether all is explained.
+    tells the noise, so that nobody can say whether all is explained. Unexplained, too, where it takes numbers that the
+    device file excludes: a wrong unit, sign or gain of a column looks like that.
     """
     found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
+    if excluded(search.chosen.fit):
+        return UNEXPLAINED
     if known and not after.passed and not (found and remaining(fitter, search) <= tolerated(search)):
         return UNEXPLAINED
     if not found:
@@ -126,6 +132,20 @@ def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False)
     if any(search.rivals):
         return AMBIGUOUS
     return EXPLAINED if known and after.passed and not unconfirmed(search) else PARTLY
+
+
+def excluded(fit: Fit) -> dict[str, float]:
+    """The device's uncertain numbers, by path, that stand more than `FAR_OFF` stated deviations off, in deviations; empty
+    where all of them together are as far off as chance puts them."""
+    off = {
+        u.path: float((value - u.nominal) / u.sd)
+        for u, value in zip(fit.structure.unknowns, fit.theta, strict=True)
+        if u.sd
+    }
+    if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > IMPOSSIBLE:
+        return {}
+    least = min(FAR_OFF, max(map(abs, off.values())))
+    return {path: z for path, z in off.items() if abs(z) >= least}
 
 
 def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:

@@ -2,6 +2,7 @@
 
 In order of trust: a record at rest, repeated periods of the drive, dwells, the stated deviation, and last, saying so,
 the fastest part of the readings, which `quiet` then refines. Its colour is an autoregressive model, order by BIC.
+Of settled poses: the stated deviation, then what repeated poses differ by, which a lost motion or creep widens.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ NEAR_BINS = 15  # of the spectrum, over which noise is level
 OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
 LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
 LAGS = 20  # samples over which noise that was whitened is looked at for a memory
+SAME = 1e-9  # of its range: drives so near are one pose
+LEAST = 6  # repeated poses that tell a deviation, to 30 %
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
@@ -95,14 +98,12 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
     if recording.kind == "poses":
         if stated:
             return stated, none, True, f"{name}: as stated", np.inf, False
-        return (
-            1.0,
-            none,
-            False,
-            f"{name}: not stated and no pose repeats; taken from what the best model leaves",
-            np.inf,
-            False,
-        )
+        sd, count = _scatter(recording.records, i)
+        if count >= LEAST and sd > 0:
+            return sd, none, True, f"{name}: from repeated poses, {count} beyond the first of each", float(count), False
+        few = f"only {count} repeat others" if count else "no pose repeats"
+        said = f"{name}: not stated and {few}; taken from what the best model leaves"
+        return 1.0, none, False, said, np.inf, False
     moving = [r for r in recording.records if r.role != "rest"]
     rounding = lattice(np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])) / np.sqrt(12.0)
     samples = {
@@ -111,7 +112,8 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
     }
     for source, (degree, parts) in samples.items():
-        parts = _quiet([without_lines(_flat(part, degree)) for part in parts if len(part) >= SHORTEST_REST])
+        parts = [part for part in parts if len(part) >= SHORTEST_REST and np.ptp(part) > 0]  # one number alone tells none
+        parts = _quiet([without_lines(_flat(part, degree)) for part in parts])
         if parts:
             sd, a = _with_rounding(*autoregression(parts), rounding)
             n = sum(map(len, parts))
@@ -123,6 +125,18 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
     sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), rounding, 1e-300)  # 1 + 9 + 9 + 1: third differences
     said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
     return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST, True
+
+
+def _scatter(records: tuple[Record, ...], i: int) -> tuple[float, int]:
+    """Standard deviation of channel i among poses of one drive, and how many there are beyond the first of each."""
+    drive = np.concatenate([r.drive[r.valid[:, i]] for r in records])
+    y = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
+    span = np.ptp(drive, axis=0)
+    _, group = np.unique(np.round(drive / np.where(span > 0, SAME * span, 1.0)), axis=0, return_inverse=True)
+    group = group.ravel()
+    mean = np.bincount(group, y) / np.bincount(group)
+    count = len(y) - len(mean)
+    return float(np.sqrt(np.sum((y - mean[group]) ** 2) / max(count, 1))), count
 
 
 def _at_rest(record: Record, i: int) -> np.ndarray:

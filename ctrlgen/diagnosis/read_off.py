@@ -12,7 +12,7 @@ from ctrlgen.diagnosis.diagnosis import Estimate, Finding
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.hypotheses import DOMAIN, Hypothesis, nominal_links
 from ctrlgen.diagnosis.trial import Search
-from ctrlgen.effect import Effect, Place
+from ctrlgen.effect import Effect, Place, Where
 from ctrlgen.units import from_si
 
 NOTICED = 0.5  # of the noise, root mean square
@@ -39,11 +39,16 @@ def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
                 or {(law.kind, where.channel), (law.kind, "all")} & known
             ):
                 continue
-            parameters = {}
-            for p in law.params:
-                unit = where.unit_of(p)
-                value = float(from_si(seen[0][p.name], unit))
-                parameters[p.name] = Estimate(value, (value, value), unit)
-            cause = Hypothesis(law.kind, f"{DOMAIN[Place.SENSOR]}:{where.channel}", where.channel)
-            found.append(Finding(law.kind, cause.location, parameters, (), 0.0, law.source, cause))
+            found.append(named(law, where, seen[0]))
     return tuple(found)
+
+
+def named(law: type[Effect], where: Where, values: dict[str, float]) -> Finding:
+    """A sensor's law with parameters [SI] that were not fitted."""
+    parameters = {}
+    for p in law.params:
+        unit = where.unit_of(p)
+        value = float(from_si(values[p.name], unit))
+        parameters[p.name] = Estimate(value, (value, value), unit)
+    cause = Hypothesis(law.kind, f"{DOMAIN[Place.SENSOR]}:{where.channel}", where.channel)
+    return Finding(law.kind, cause.location, parameters, (), 0.0, law.source, cause)

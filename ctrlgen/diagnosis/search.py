@@ -98,7 +98,9 @@ class Searcher:
                 current
             ):
                 return current
-            trials = self._try(current, self._conspicuous(current, screened))
+            trials = self._try(current.fit, self._conspicuous(current, screened))
+            if self.weigh.hides(current.fit):
+                trials = (*trials, *self._as_stated(current))
             trials = (*trials, *self._together(current, screened, trials))
             trials = tuple(sorted(self._ended(current, trials), key=lambda t: t.total))
             rounds.append(Round(screened, trials, current))
@@ -178,12 +180,19 @@ class Searcher:
                 chosen.append(s)
         return chosen
 
-    def _try(self, current: Trial, suspects: list[Suspect]) -> tuple[Trial, ...]:
+    def _try(self, fit: Fit, suspects: list[Suspect]) -> tuple[Trial, ...]:
+        """Each suspect beside what is fitted."""
         trials = []
         for s in suspects:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
-            trials += self._attempt(warm(current.fit, s.hypothesis, s.start), s.hypothesis, current.fit)
+            trials += self._attempt(warm(fit, s.hypothesis, s.start), s.hypothesis, fit)
         return tuple(sorted(trials, key=lambda t: t.total))
+
+    def _as_stated(self, current: Trial) -> tuple[Trial, ...]:
+        """What is suspected of the device with its own numbers as stated: a fit that bends them so far sees what they hide
+        no more."""
+        stated = self.fitter.fit(replace(cooled(current.fit), own={}), steps=0)
+        return self._try(stated, self._conspicuous(current, self.screen.run(stated)))
 
     def _attempt(self, structure: Structure, cause: Hypothesis, nested: Fit | None = None) -> list[Trial]:
         """The trial; none where no device can be built with the numbers suspected."""

@@ -65,10 +65,16 @@ class Weighing:
         alike = [t for t in better if self.ahead(first, t) <= 0 and len(t.fit.structure.unknowns) <= numbers]
         return min(alike, key=lambda t: (t.fit.structure.rarity, t.total), default=first)
 
+    @staticmethod
+    def hides(fit: Fit) -> bool:
+        """Whether the device's own numbers stand so far off that they may hide a cause, at a price."""
+        return fit.penalty > DEAR + 2 * len(fit.structure.unknowns)
+
     def need(self, current: Trial, screened: Screened) -> float:
         """The z^2 that a cause must show: of its own size in the readings, or of the price at which the device hides it."""
-        hidden = current.fit.penalty > DEAR + 2 * len(current.fit.structure.unknowns)
-        return screened.threshold**2 if hidden else max(screened.threshold**2, MATERIAL**2 * self.n_fit)
+        return (
+            screened.threshold**2 if self.hides(current.fit) else max(screened.threshold**2, MATERIAL**2 * self.n_fit)
+        )
 
     def meant(self, trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
         """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one, and is no double."""
@@ -126,8 +132,7 @@ class Weighing:
     def of_form(self, current: Trial) -> bool:
         """Whether all that is left is no more than the form of a cause's law may leave: what would be found in it, would be
         doubtful. Not where the device hides something at a price, or where only what is left tells the noise."""
-        hidden = current.fit.penalty > DEAR + 2 * len(current.fit.structure.unknowns)
-        if hidden or not self.fitter.noise.known.all():
+        if self.hides(current.fit) or not self.fitter.noise.known.all():
             return False
         left = max(current.held - self.n_held, 0.0) * max(current.fit.objective - self.n_fit, 0.0)
         return self._may_be_form(left, current)

@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.diagnosis import (
     Diagnosis,
     Estimate,
     Finding,
+    excluded,
     tolerated,
 )
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
@@ -65,6 +66,8 @@ def interval(e: Estimate) -> str:
     value, low, high = (v * (100 if percent else 1) for v in ends)
     if not math.isfinite(high - low):
         return f"{number(value)}{unit} (this record does not hold it)"
+    if high == low:  # it is so, or it was read off
+        return f"{number(value)}{unit}"
     shown = [_to_width(v, high - low) for v in (value, low, high)]
     edge = EDGE * (high - low)
     bound = ", at the end of its range" if value - low <= edge or high - value <= edge else ""
@@ -142,14 +145,36 @@ def sentence(diagnosis: Diagnosis) -> str:
     head = HEADLINE[verdict]
     if verdict == CONSISTENT:
         said = (
-            f"{head}: nothing that this recording can show is missing from the device file ({diagnosis.device.title})."
+            f"{head}: nothing that this recording can show is missing from the device file ({diagnosis.device.title})"
         )
+        said += f"{_blind(diagnosis)}."
+    elif far := excluded(diagnosis.search.chosen.fit):
+        said = f"{head}: {_beyond(diagnosis, far)}{f'; what helps is {named(found)}' if found else ''}."
     elif not found:
         said = f"{head}: the recording differs from {diagnosis.device.title}, and no cause I know explains it."
     else:
         said = f"{head}: {LEAD[verdict]}{named(found)}{_rivals(diagnosis)}."
     channel = worst_channel(diagnosis)
     return f"{said} {channel_sentence(channel, diagnosis.held_out[channel])}"
+
+
+def _blind(diagnosis: Diagnosis) -> str:
+    """'; nothing below 3.6 um can be judged', of the channels whose noise nothing tells."""
+    sizes = [f"{number(e.rms_after, 3)} {e.unit}" for e in diagnosis.held_out.values() if e.noise_floor is None]
+    return f"; the noise is not known, so nothing below {', '.join(sizes)} can be judged" if sizes else ""
+
+
+def _beyond(diagnosis: Diagnosis, far: dict[str, float]) -> str:
+    """What it takes to agree, where the device file excludes that."""
+    numbers = ", ".join(
+        f"{path} = {number(e.value)} {e.unit} ({z:+.0f} stated deviations)"
+        for path, z in far.items()
+        for e in [diagnosis.values[path]]
+    )
+    return (
+        f"the recording agrees with {diagnosis.device.title} only by numbers that its file excludes: {numbers}; "
+        "units, sign or gain of a column may be wrong"
+    )
 
 
 LEAD = {
