@@ -11,6 +11,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from battery import cases, score
 
+EXAMPLE = """\
+  python -m battery make --out out/battery --seed 7
+  python -m battery score out/battery --run "ctrlgen diagnose"
+
+A case takes some 20 s; what was stopped goes on with the cases that are left."""
+SIZES = ", ".join(f"{name}: {sum(counts)} cases" for name, counts in cases.COUNTS.items())
+
 
 def _progress(console: Console) -> Progress:
     return Progress(
@@ -20,21 +27,26 @@ def _progress(console: Console) -> Progress:
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit 0 when the table was made, whatever it says; --strict: 1 where a goal is missed."""
-    parser = argparse.ArgumentParser(prog="python -m battery", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m battery",
+        description=__doc__,
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="draw cases into a folder, answers sealed")
-    make.add_argument("--out", type=Path, required=True)
-    make.add_argument("--seed", type=int, default=1)
-    make.add_argument("--size", choices=sorted(cases.COUNTS), default="small")
+    make.add_argument("--out", type=Path, required=True, help="gets cases/ and answers/")
+    make.add_argument("--seed", type=int, default=1, help="of everything drawn; a seed not seen before proves most")
+    make.add_argument("--size", choices=sorted(cases.COUNTS), default="small", help=SIZES)
     run = commands.add_parser("score", help="run the diagnosis over a folder and print the table")
-    run.add_argument("folder", type=Path)
+    run.add_argument("folder", type=Path, help="what make left")
     run.add_argument("--run", default="ctrlgen diagnose", help="the command under test")
     run.add_argument("--timeout", type=float, default=600.0, help="seconds a case may take")
     run.add_argument("--opponents", type=int, default=0, metavar="N", help="opponents on N cases of each class")
     run.add_argument("--again", action="store_true", help="run cases that already have a diagnosis again")
     run.add_argument("--strict", action="store_true", help="exit 1 where a goal is missed")
     for each in (make, run):
-        each.add_argument("--jobs", type=int, default=2)
+        each.add_argument("--jobs", type=int, default=2, help="cases at a time")
     a = parser.parse_args(arguments)
     console = Console()
     with _progress(console) as bar:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import warnings
 from collections.abc import Callable
 
@@ -16,6 +18,9 @@ from ctrlgen.terminal import (
     err,
     show_warning,
 )
+
+for command in app.registered_commands:  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
+    command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback))
 
 
 def execute(check: Callable[[], None] = lambda: None) -> int:

@@ -194,10 +194,14 @@ class _Check:
                     where, f"unit = {column.unit!r} is the wrong dimension; {unit} or a multiple of it is needed"
                 )
                 return
+        except ValueError as error:
+            self._fault(where, f"{error}; write for example {unit!r}")
+            return
+        try:
             if column.noise is not None:
                 deviation(column.noise, column.unit)
         except ValueError as error:
-            self._fault(where, f"{error}; write for example {unit!r}")
+            self._fault(where, f"noise: {error}")
 
     def _observed(self, record: RecordTable) -> set[str]:
         return {name for name in self.written.columns_of(record) if not name.startswith("drive.")}

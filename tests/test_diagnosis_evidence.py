@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -240,6 +241,8 @@ def test_unknown_physics_is_mapped_and_described_but_not_named():
     share = {m.of: m.share for m in found.maps["axis"]}
     assert found.quantity == "force" and found.unit == "N"
     assert share["position"] > 3 * max(share["time"], share["velocity"])
+    warm = [replace(a, record=replace(a.record, ambient=np.linspace(0, 1, len(a.record.time)))) for a in left]
+    assert {m.of for m in unknown(fitter, fit, warm).maps["axis"]} - share.keys() == {"temperature"}
     slow = axis_fitter(stop)
     fit, left, _ = mapped(slow)
     term = unknown(slow, fit, left).empirical

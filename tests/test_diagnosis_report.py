@@ -276,13 +276,22 @@ def test_the_page_shows_whatever_evidence_there_is(found):
         True, None,
     )  # fmt: skip
     experiment = {"drive": "multisine", "duration": {"value": 20.0, "unit": "s"}}
+    term = {"axis": "axis", "terms": {"d": 2.0, "d |v|": -0.5}, "unit": "mN", "held_out_gain": 0.43}
+    extra = {"unknown": {"said": ["axis: 80% of the free disturbance goes with position"], "empirical": term}}
     told = replace(
-        found, where=where, next_experiment=experiment, history=({"was": "before"},), extra={}, profiles=(profile,),
+        found, where=where, next_experiment=experiment, history=({"was": "before"},), extra=extra, profiles=(profile,),
         detectable={"drift": {"value": float("nan"), "unit": "nm/s"}},
     )  # fmt: skip
     text = page(told, Provenance({}, 0))
     assert text.count("<figure>") == 7
-    for words in ("more below 1 Hz", "20 s", "before", "drift"):
+    for words in (
+        "more below 1 Hz",
+        "20 s",
+        "before",
+        "drift",
+        "goes with position",
+        "empirical, no cause: 2 d -0.5 d |v| mN takes away 43% of what is left",
+    ):
         assert words in text
 
 

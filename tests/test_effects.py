@@ -458,7 +458,7 @@ def test_has_an_equation_a_source_bounds_and_fits_on_a_screen(effect):
     lines = Path(inspect.getfile(effect)).read_text().splitlines()
     assert len(lines) < 60
     assert effect.__doc__ and "=" in effect.__doc__
-    assert "old" in effect.__doc__ or effect.source == "definition"  # "Holds for ..."
+    assert "old" in effect.__doc__  # "Holds for ..."
     assert effect.source
     assert sum(p.off is not None for p in effect.params) == 1
     where = place_of(effect)[1][0]

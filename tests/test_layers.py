@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import re
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, SCENARIOS
 
 PACKAGE = ROOT / "ctrlgen"
+DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
 LAYERS = [
     "_version errors units",
     "executor", "files", "reference_models reference_models.hinge_fem", "measuring_chain",
@@ -96,18 +98,41 @@ def test_an_effect_needs_the_extension_point_and_nothing_else(path):
     }  # what several laws have in common
 
 
+SHOWN = {  # the papers' figures are drawn from these, and their numbers compared
+    "reproduce.all": {"circle20", "xy_stage_force"},
+    "reproduce.s0_data": {"nist_hexapod"},
+    "commands.app": {"circle20"},  # the example of --help
+}
+WORDS = {"raster", "spiral", "unreachable"}  # names of scenarios that are words: kinds of path, an exception
+
+
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_no_module_knows_a_scenario_by_name(path):
-    literals = {
-        n.value
-        for n in ast.walk(ast.parse(path.read_text()))
-        if isinstance(n, ast.Constant) and isinstance(n.value, str)
+def test_no_module_knows_a_scenario_or_a_recording_by_name(path):
+    tree = ast.parse(path.read_text())
+    told = {
+        ast.get_docstring(n, clean=False) for n in ast.walk(tree) if isinstance(n, DOCUMENTED)
+    }  # examples of a command
+    texts = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)} - told
+    folders = {
+        p.parent.name for kind in ("scenario", "recording", "device", "run_a") for p in SCENARIOS.glob(f"*/{kind}.toml")
     }
-    named = {s.parent.name for s in (ROOT / "scenarios").glob("*/scenario.toml")}
-    known = (
-        {"circle20", "xy_stage_force"} if path.name == "all.py" else set()
-    )  # the figures of S1 are drawn from these two
-    assert not literals & {name for name in named if not name.isalpha()} - known  # 'spiral' is also a kind of path
+    assert {"nist_hexapod", "emps", "rotary_axis", "friction_damper", "circle20"} <= folders
+    known = SHOWN.get(name_of(path), set()) | WORDS
+    words = {word for text in texts for word in re.findall(r"\w+", text)}
+    assert not words & (folders - known)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_no_module_reaches_what_makes_concealed_recordings(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        assert not {name.split(".")[0] for name in names} & {"battery", "plants", "tests"}, path
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "battery").glob("*.py")), ids=lambda p: p.stem)
+def test_what_makes_concealed_recordings_imports_nothing_of_ours(path):
+    assert not our_imports(path)
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)

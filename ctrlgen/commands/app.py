@@ -9,7 +9,8 @@ import typer
 
 app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
-    help="Describe a flexure nanopositioner once; solve its trajectories, generate its C, and prove that the C is right.\n\n"
+    help="Describe a flexure nanopositioner once; solve its trajectories, generate its C and prove that the C is right, and "
+    "say which physics a recording shows that the description leaves out.\n\n"
     "Start with:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
 )  # fmt: skip
 
@@ -27,7 +28,10 @@ OutFolder = Annotated[
 BootstrapCount = Annotated[
     int,
     typer.Option(
-        min=0, metavar="B", help="Replicates for intervals that do not trust the noise's model; 200 is usual."
+        min=0,
+        metavar="B",
+        help="Replicates for intervals that do not trust the noise's model; 200 is usual, which takes as "
+        "long as so many fits.",
     ),
 ]
 SchedulerAddress = Annotated[

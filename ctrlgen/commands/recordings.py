@@ -35,11 +35,22 @@ def diagnose(
     scheduler: SchedulerAddress = None,
     jobs: JobCount = None,
 ) -> None:
-    """Find what a device file leaves out: where, which physics by name, with numbers, proved on held-out records.
+    """Find what a device file leaves out: where, which physics by name, with
+    numbers, proved on held-out records.
 
-    Leaves in --out: report.html (open this first), diagnosis.json, device.next.toml, the device file with what was
-    found, and next_experiment/ where another recording would settle a doubt. The exit status is 0 whatever the
-    verdict, and 2 for input that cannot be used. What is interrupted goes on from its fits when it is asked again.
+    A recording.toml names files (CSV, MATLAB, HDF5, TDMS, MDF4, JSON), their
+    columns, units and roles (fit, hold_out, rest);
+    scenarios/nist_hexapod/recording.toml is one, and ctrlgen check FILE
+    --device DEVICE says what is wrong with yours.
+
+    Leaves in --out: report.html (open this first), diagnosis.json,
+    device.next.toml, the device file with what was found, and next_experiment/
+    where another recording would settle a doubt.
+
+    It answers: consistent, explained, partly (a little remains, or nothing
+    proves it), ambiguous (two causes explain alike), or unexplained. The exit
+    status is 0 whatever it answers, and 2 for input that cannot be used. What
+    is interrupted goes on from its fits when it is asked again.
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
@@ -70,7 +81,7 @@ def diagnose(
 @app.command()
 def batch(
     list_: Annotated[
-        Path, typer.Argument(metavar="JOBS.toml", help="What to diagnose; see ctrlgen/batch.py.", show_default=False)
+        Path, typer.Argument(metavar="JOBS.toml", help="What to diagnose, see above.", show_default=False)
     ],
     out_folder: Annotated[
         Path, typer.Option("--out", help="Gets one result folder a diagnosis, and results.csv.", show_default=False)
@@ -82,10 +93,19 @@ def batch(
     scheduler: SchedulerAddress = None,
     jobs: JobCount = None,
 ) -> None:
-    """Diagnose many recordings, on all cores or on a cluster; results that are there already are kept.
+    """Diagnose many recordings, on all cores or on a cluster; results that are
+    there already are kept.
 
-    Stop it whenever you like: every finished diagnosis stays, and the same command goes on with the rest. The exit
-    status is 1 when a diagnosis failed, and 2 for a list that cannot be used.
+    JOBS.toml, paths as seen from it:
+
+    \b
+      [\\[job]]
+      device = "devices/stage.toml"
+      recordings = ["runs/*", ["a", "b"]]   # a diagnosis each; a and b joined
+
+    Stop it whenever you like: every finished diagnosis stays, and the same
+    command goes on with the rest. The exit status is 1 when a diagnosis failed,
+    and 2 for a list that cannot be used.
 
     Example:  ctrlgen batch jobs.toml --out out/jobs --scheduler tcp://cluster:8786
     """

@@ -61,8 +61,6 @@ def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
     kinds: dict[str, dict[Hypothesis, tuple[float, float, str]]] = {}
     for suspect in screened.suspects:
         h = suspect.hypothesis
-        if h.effect != PARAMETER and h.law.amplitude().expected:
-            continue  # it is so or it is not: it has no size
         sd = louder * screened.amplitude_sd[h.effect, h.location]
         if h.effect == PARAMETER:
             unit, weight = written_unit(nominal[h.path].text), 1 / max(abs(nominal[h.path].si), 1e-300)

@@ -46,11 +46,14 @@ def evidence(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> 
     extra: dict[str, Any] = {"unknown": None, "files": {}}
     if not explained:
         extra["unknown"] = plain(unknown(fitter, chosen, after))
+    left = place(chosen, after)
+    if extra["unknown"]:
+        left["unknown"] = {key: extra["unknown"][key] for key in ("said", "empirical")}
     experiment = next_experiment(fitter, search, explained, seed)
     if experiment is not None:
         extra["files"] = files(fitter, chosen, experiment, NEXT_DEVICE)
     return Evidence(
-        where={"nominal": place(nominal, before), "left": place(chosen, after)},
+        where={"nominal": place(nominal, before), "left": left},
         detectable=plain(detectable(chosen, search.last, chosen.n)),
         next_experiment=_next(experiment),
         history=history(search),

@@ -112,7 +112,9 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
     }
     for source, (degree, parts) in samples.items():
-        parts = [part for part in parts if len(part) >= SHORTEST_REST and np.ptp(part) > 0]  # one number alone tells none
+        parts = [
+            part for part in parts if len(part) >= SHORTEST_REST and np.ptp(part) > 0
+        ]  # one number alone tells none
         parts = _quiet([without_lines(_flat(part, degree)) for part in parts])
         if parts:
             sd, a = _with_rounding(*autoregression(parts), rounding)

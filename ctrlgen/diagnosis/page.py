@@ -13,7 +13,7 @@ from ctrlgen.diagnosis.hypotheses import PARAMETER, numbers, written
 from ctrlgen.diagnosis.pictures import draw_all
 from ctrlgen.diagnosis.record import as_dict
 from ctrlgen.diagnosis.scatter import deviations
-from ctrlgen.diagnosis.words import gathered, hard, interval, next_steps, number, plain_name, sentence
+from ctrlgen.diagnosis.words import gathered, hard, interval, next_steps, number, plain_name, sentence, unknown_lines
 from ctrlgen.report import render
 from ctrlgen.units import show
 
@@ -60,6 +60,7 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         captions=CAPTIONS,
         notes=gathered(diagnosis.notes),
         changed=_changed(diagnosis),
+        unknown=unknown_lines(diagnosis),
         source=diagnosis.device.source,
         sha256=provenance.sha256,
         seed=provenance.seed,

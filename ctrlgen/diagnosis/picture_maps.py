@@ -74,7 +74,7 @@ def excesses(value: Any, prefix: str = "") -> list[tuple[str, float, list[float]
 
 
 def draw_unknown(diagnosis: Diagnosis) -> Figure | None:
-    """The disturbance that would explain the rest against position, speed and time; None where none was sought."""
+    """The disturbance that would explain the rest against position, speed, time and temperature; None where none was sought."""
     found = plain(diagnosis.extra.get("unknown")) or {}
     maps = [(axis, m) for axis, several in (found.get("maps") or {}).items() for m in several]
     maps = sorted((row for row in maps if row[1]["share"] >= SHARE), key=lambda row: -row[1]["share"])[:PANELS]

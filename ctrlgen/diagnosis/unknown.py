@@ -91,6 +91,10 @@ def _maps(found: list[Free], i: int) -> tuple[Map, ...]:
             ("velocity", f"{travel}/s", joined("velocity"), everywhere),
             ("time", "s", np.concatenate([e.along.record.time[: len(e.f)] for e in found]), everywhere),
         ]  # fmt: skip
+    ambient = [e.along.record.ambient for e in found]
+    if all(values is not None for values in ambient):
+        T = np.concatenate([values[: len(e.f)] for values, e in zip(ambient, found, strict=True)])
+        rows += [("temperature", "K", T, everywhere)] if np.ptp(T) > 0 else []
     return tuple(_map(name, u, x[mask], f[mask], sd[mask], unit) for name, u, x, mask in rows if mask.sum() > BINS)
 
 

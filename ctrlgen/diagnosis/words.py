@@ -227,6 +227,22 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     ]
 
 
+def unknown_lines(diagnosis: Diagnosis) -> list[str]:
+    """What the free disturbance goes with, and the empirical term: a description of the rest, never a cause."""
+    found = diagnosis.extra.get("unknown")
+    if not found:
+        return []
+    term = found["empirical"]
+    lines = list(found["said"])
+    if term:
+        formula = " ".join(f"{value:+.3g} {name}" for name, value in term["terms"].items()).removeprefix("+")
+        lines.append(
+            f"{term['axis']}, empirical, no cause: {formula} {term['unit']} takes away {term['held_out_gain']:.0%} of what is "
+            "left of the held-out records (d, v, u: position, speed and drives, each over its largest value)"
+        )
+    return lines
+
+
 def hard(text: str) -> str:
     """`text` with numbers and units that no line break parts."""
     return re.sub(r"(?<=\d) (?=[^\W\d]|%)", HARD_SPACE, text)

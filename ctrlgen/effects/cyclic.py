@@ -8,7 +8,8 @@ from ctrlgen.effect import Effect, Param, Place
 class Cyclic(Effect):
     """Delta y = A sin(2 pi y/Lambda + phi). One harmonic; use several for a distorted one.
 
-    Holds for A below Lambda/2 pi, so that the reading still rises with the position; of positions and angles alone.
+    Holds for A below Lambda/2 pi, so that the reading still rises with the position, and where a period fits into the
+    travel: part of a longer one is an offset, a gain and a bow. Of positions and angles alone.
     """
 
     place = Place.SENSOR
@@ -18,8 +19,8 @@ class Cyclic(Effect):
     params = (
         Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
         Param(
-            "period", "channel", (1e-4, 8.0), "path of one period",
-            grid=(4.0, 2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05), seen="pitches",
+            "period", "channel", (1e-4, 2.0), "path of one period",
+            grid=(2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05), seen="pitches",
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home", grid=(0.0, 90.0)),
     )  # fmt: skip

@@ -4,7 +4,7 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class DriveOffset(Effect):
-    """Delta u = b, constant."""
+    """Delta u = b, constant. Holds while the amplifier is on, at rest too."""
 
     place = Place.DRIVE
     needs = frozenset({"actuator"})

@@ -4,7 +4,7 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class HomeOffset(Effect):
-    """Delta y = b, constant."""
+    """Delta y = b, constant. Holds from the first sample to the last: one that begins later is a step."""
 
     place = Place.SENSOR
     source = "definition"

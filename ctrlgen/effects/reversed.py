@@ -4,7 +4,8 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class Reversed(Effect):
-    """Delta u = -2 g u: the other sign for g = 1. Below 1/2 a weak drive, which `drive_gain` says better."""
+    """Delta u = -2 g u: the other sign for g = 1. Holds as a whole number: below 1/2 it is a weak drive,
+    which `drive_gain` says better."""
 
     place = Place.DRIVE
     rarity = 2.3

@@ -4,7 +4,8 @@ from ctrlgen.effect import Effect, Param, Place
 
 
 class Swapped(Effect):
-    """Delta u_i = g (u_j - u_i) and Delta u_j = g (u_i - u_j): exchanged for g = 1; in between, crosstalk of the leads."""
+    """Delta u_i = g (u_j - u_i) and Delta u_j = g (u_i - u_j), exchanged for g = 1. Holds as a whole number: in between it is
+    crosstalk of the leads."""
 
     place = Place.DRIVE
     rarity = 2.3
