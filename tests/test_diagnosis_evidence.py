@@ -14,13 +14,14 @@ from ctrlgen import build_model, load_device, load_scenario
 from ctrlgen.diagnosis.along import along
 from ctrlgen.diagnosis.detectable import detectable
 from ctrlgen.diagnosis.drives import admissible, shapes
-from ctrlgen.diagnosis.evidence import evidence, plain
+from ctrlgen.diagnosis.evidence import evidence
 from ctrlgen.diagnosis.experiment import separate
 from ctrlgen.diagnosis.fit import Fitter
 from ctrlgen.diagnosis.free import free
 from ctrlgen.diagnosis.hypotheses import Hypothesis, written
 from ctrlgen.diagnosis.lines import lines
 from ctrlgen.diagnosis.noise import Noise, estimate
+from ctrlgen.diagnosis.plain import plain
 from ctrlgen.diagnosis.profile import BOUNDED, profiles
 from ctrlgen.diagnosis.proposal import files
 from ctrlgen.diagnosis.response import Response

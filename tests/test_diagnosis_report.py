@@ -21,8 +21,9 @@ from ctrlgen.diagnosis.hypotheses import Hypothesis
 from ctrlgen.diagnosis.job import diagnose_into, unfinished
 from ctrlgen.diagnosis.page import Provenance, page
 from ctrlgen.diagnosis.pictures import POINTS, _density, thinned
+from ctrlgen.diagnosis.plain import plain
 from ctrlgen.diagnosis.profile import BOUNDED, Profile
-from ctrlgen.diagnosis.record import as_dict, plain
+from ctrlgen.diagnosis.record import as_dict
 from ctrlgen.diagnosis.response import Response
 from ctrlgen.diagnosis.words import gathered, interval, next_steps, sentence
 from ctrlgen.diagnosis.writeback import next_text

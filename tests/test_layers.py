@@ -16,7 +16,7 @@ LAYERS = [
     "physics.screw", "physics.flexure", "physics.circular_hinge", "physics.circular_hinge_table",
     "physics.thermal_actuator", "physics.xy_stage physics.hexapod physics.meso_hexapod",
     "physics.piezo_stack", "physics.rrr_stage",
-    "effect lattice turning", "event frame", "effects",
+    "effect lattice turning play", "event frame", "effects",
     "devices.section", "devices.ports", "devices.sensor", "devices.base", "devices.hinge",
     "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis devices.user", "devices",
     "calibration pose_errors",
@@ -34,7 +34,7 @@ LAYERS = [
     "reproduce.s3_lengths",
     "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s2_figures reproduce.s3 reproduce.s3_hinges",
     "reproduce.all",
-    "diagnosis.mapped diagnosis.equations", "diagnosis.carried",
+    "diagnosis.plain diagnosis.mapped diagnosis.equations", "diagnosis.carried",
     "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise diagnosis.pitches diagnosis.journal diagnosis.descent "
     "diagnosis.quiet diagnosis.spikes",
     "diagnosis.structure", "diagnosis.fit", "diagnosis.learnt",
@@ -93,7 +93,7 @@ def test_the_physics_knows_no_device_file(path):
     "path", [p for p in MODULES if p.parent.name == "effects" and p.stem != "__init__"], ids=lambda p: p.stem
 )
 def test_an_effect_needs_the_extension_point_and_nothing_else(path):
-    assert our_imports(path) - {"event", "frame", "lattice", "turning"} == {
+    assert our_imports(path) - {"event", "frame", "lattice", "play", "turning"} == {
         "effect"
     }  # what several laws have in common
 

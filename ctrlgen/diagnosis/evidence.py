@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from ctrlgen.diagnosis.along import along
 from ctrlgen.diagnosis.detectable import detectable
 from ctrlgen.diagnosis.experiment import Experiment, next_experiment
 from ctrlgen.diagnosis.fit import Fit, Fitter
+from ctrlgen.diagnosis.plain import plain
 from ctrlgen.diagnosis.proposal import files
 from ctrlgen.diagnosis.trial import Round, Search, Trial
 from ctrlgen.diagnosis.unknown import unknown
@@ -45,7 +44,10 @@ def evidence(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> 
     after = before if chosen is nominal else [along(fitter, chosen, record) for record in records]
     extra: dict[str, Any] = {"unknown": None, "files": {}}
     if not explained:
-        extra["unknown"] = plain(unknown(fitter, chosen, after))
+        found = vars(unknown(fitter, chosen, after))
+        extra["unknown"] = plain(
+            {key: value for key, value in found.items() if key != "free"}
+        )  # that is sample by sample
     left = place(chosen, after)
     if extra["unknown"]:
         left["unknown"] = {key: extra["unknown"][key] for key in ("said", "empirical")}
@@ -116,23 +118,3 @@ def _next(found: Experiment | None) -> dict[str, Any] | None:
             "candidates": list(found.candidates),
         }
     )  # fmt: skip
-
-
-def plain(value: Any) -> Any:
-    """Dataclasses, arrays and numpy numbers as dicts, lists and numbers that JSON knows; not finite becomes None.
-
-    Arrays sample by sample are for figures, not for diagnosis.json, and are left out.
-    """
-    if is_dataclass(value):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.name != "free"}
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(item) for item in value]
-    if isinstance(value, (bool, np.bool_)):
-        return bool(value)
-    if isinstance(value, (int, np.integer)):
-        return int(value)
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value

@@ -17,7 +17,8 @@ from ctrlgen.diagnosis.bootstrap import Bootstrap, bootstrap
 from ctrlgen.diagnosis.diagnosis import Diagnosis
 from ctrlgen.diagnosis.journal import Journal
 from ctrlgen.diagnosis.page import Provenance, page
-from ctrlgen.diagnosis.record import as_dict, plain
+from ctrlgen.diagnosis.plain import plain
+from ctrlgen.diagnosis.record import as_dict
 from ctrlgen.diagnosis.writeback import write_next
 from ctrlgen.files import read_toml, whole_folder, write_text
 from ctrlgen.model import build_model

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.diagnosis.diagnosis import Diagnosis
-from ctrlgen.diagnosis.record import plain
+from ctrlgen.diagnosis.plain import plain
 from ctrlgen.diagnosis.words import number
 from ctrlgen.figures import COLOURS
 

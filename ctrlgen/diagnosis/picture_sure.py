@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.diagnosis.diagnosis import CI, Diagnosis
-from ctrlgen.diagnosis.record import plain
+from ctrlgen.diagnosis.plain import plain
 from ctrlgen.diagnosis.search import RIVAL
 from ctrlgen.diagnosis.trial import Round
 from ctrlgen.diagnosis.words import hypothesis_name, number

@@ -1,10 +1,7 @@
 """Hysteresis of a piezo stack: the displacement lags behind the voltage."""
 
-import casadi as ca
-
 from ctrlgen.effect import Effect, Param, Place, State
-
-ELEMENTS = 8
+from ctrlgen.play import followed, lagging, names
 
 
 class DriveHysteresis(Effect):
@@ -24,16 +21,10 @@ class DriveHysteresis(Effect):
         Param("reach", "channel", (1e-3, 2.0), "change of drive that all follow", grid=(0.03, 0.1, 0.3, 1.0)),
         Param("taper", "1", (-1.0, 2.0), "q: how much more of the narrow ones", grid=(0.0,)),
     )
-    states = tuple(State(f"play{j}", "channel", 1.0, stepped=True) for j in range(1, ELEMENTS + 1))
+    states = tuple(State(name, "channel", 1.0, stepped=True) for name in names())
 
     def term(self, s, p):
-        weights = [float(j) ** -p.taper for j in range(1, ELEMENTS + 1)]
-        late = [w * (getattr(s, f"play{j}") - s.value) for j, w in enumerate(weights, start=1)]
-        return p.share * sum(late) / sum(weights)
+        return -p.share * lagging(s, s.value, p.taper)
 
     def update(self, s, p):
-        new = {}
-        for j in range(1, ELEMENTS + 1):
-            name, radius = f"play{j}", p.reach * j / ELEMENTS
-            new[name] = ca.fmax(ca.fmin(getattr(s, name), s.value + radius), s.value - radius)
-        return new
+        return followed(s, [s.value], p.reach)

@@ -1,11 +1,8 @@
 """Hysteresis of many small slipping contacts."""
 
-import casadi as ca
-
 from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.play import followed, lagging, names
 from ctrlgen.turning import turned_at
-
-ELEMENTS = 8
 
 
 class Hysteresis(Effect):
@@ -26,22 +23,14 @@ class Hysteresis(Effect):
         Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones", grid=(0.5,)),
     )
     states = (
-        *(State(f"play{j}", "travel", 1.0, stepped=True) for j in range(1, ELEMENTS + 1)),
+        *(State(name, "travel", 1.0, stepped=True) for name in names()),
         State("d", "travel", 1.0, stepped=True),
         State("v", "travel/s", 100.0, stepped=True),
     )
 
     def term(self, s, p):
-        weights = [float(j) ** -p.taper for j in range(1, ELEMENTS + 1)]
-        stretch = [w * (s.displacement - getattr(s, f"play{j}")) for j, w in enumerate(weights, start=1)]
-        return -p.stiffness * sum(stretch) / sum(weights)
+        return -p.stiffness * lagging(s, s.displacement, p.taper)
 
     def update(self, s, p):
         new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
-        turn = turned_at(s, s.d, s.v)
-        for j in range(1, ELEMENTS + 1):
-            name, radius = f"play{j}", p.reach * j / ELEMENTS
-            new[name] = getattr(s, name)
-            for d in (turn, s.displacement):
-                new[name] = ca.fmax(ca.fmin(new[name], d + radius), d - radius)
-        return new
+        return new | followed(s, [turned_at(s, s.d, s.v), s.displacement], p.reach)
