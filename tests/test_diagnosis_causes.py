@@ -241,6 +241,28 @@ def test_fringes_that_bend_the_path_they_are_read_along_are_found_along_the_one_
     assert near in suggested and both([suggested, suggested]) == suggested
 
 
+def test_the_harmonic_of_a_fringe_that_is_known_is_found_along_what_the_fringe_counts():
+    """The fringe that is known already bends both the path read and the one foreseen with it."""
+    pitch = 4e-7
+    size = (
+        2.405 * pitch / (4 * np.pi)
+    )  # a zero of J_0: of the harmonic nothing is left at its own way along such a path
+
+    def fringed(u):
+        y = move(u)
+        phase = 2 * np.pi * y / pitch
+        return y + size * np.sin(phase) + 0.15 * size * np.sin(2 * phase + 0.6)
+
+    fitter = fitter_of(fringed)
+    fringe = Hypothesis("cyclic", "sensor:axis", "axis")
+    known = Structure(AXIS, (fringe,), ({"amplitude": size, "period": pitch, "phase": 0.0},))
+    fit = fitter.fit(known)
+    read, foreseen = fitter.to_fit[0].observed[:, 0], fitter.predicted(fit, fitter.to_fit[0])[:, 0]
+    near = pytest.approx(pitch / 2, rel=1e-3)
+    assert near not in pitches(foreseen, read - foreseen) and near not in pitches(read, read - foreseen)
+    assert near in Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["pitches"]
+
+
 @pytest.mark.parametrize("place", [-6e-6, 1.5e-6, 1.1e-5])
 def test_a_reading_that_jumps_at_a_place_is_found_there(place):
     """A straight ramp of 60 nm over 0.2 um, in a path of 40 um."""

@@ -128,13 +128,13 @@ class Screen:
         if self.fitter.recording.kind == "poses" or not records:
             return {}
         record = max(records, key=lambda r: r.valid.size)
-        foreseen = self.fitter.predicted(fit, record)
+        foreseen, behind = (self.fitter.predicted(each, record) for each in (fit, _read_truly(fit)))
         left = record.observed - foreseen
         names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         return {
             (Place.SENSOR, names.index(name)): {
-                "pitches": both(pitches(y[good, i], left[good, i]) for y in (record.observed, foreseen)),
+                "pitches": both(pitches(y[good, i], left[good, i]) for y in (record.observed, foreseen, behind)),
                 "places": jumps(record.observed[good, i], left[good, i]),
             }
             for i, name in read
@@ -192,6 +192,16 @@ class Screen:
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = np.random.default_rng(self.seed).standard_normal((NULLS, len(cosine)))
         return float(np.quantile(np.abs(draws @ root.T).max(axis=1), 0.99))
+
+
+def _read_truly(fit: Fit) -> Fit:
+    """The fit with every cause at a sensor off: fringes count what is there, not what they have made of it."""
+    theta = fit.theta.copy()
+    for k, u in enumerate(fit.structure.unknowns):
+        cause = None if u.cause is None else fit.structure.causes[u.cause]
+        if u.amplitude and cause.effect != PARAMETER and cause.law.place is Place.SENSOR:
+            theta[k] = u.nominal
+    return replace(fit, theta=theta)
 
 
 def _directions(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
