@@ -26,6 +26,7 @@ from ctrlgen.diagnosis.profile import profiles
 from ctrlgen.diagnosis.read_off import read_off
 from ctrlgen.diagnosis.screen import Screen
 from ctrlgen.diagnosis.search import Searcher
+from ctrlgen.diagnosis.spikes import marked
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.errors import Fault, InputError
 from ctrlgen.model import build_model, movable
@@ -70,7 +71,8 @@ def _diagnose(
     for _ in range(GUESSES if noise.guessed.any() else 0):
         fitter.noise = learn_guessed(fitter, fitter.fit(Structure(device)))
     noise = fitter.noise
-    spikes = fitter.mark_spikes(fitter.described(device))
+    described = fitter.described(device)
+    fitter.recording, spikes = marked(recording, lambda record: fitter.predicted(described, record))
     acting = set(movable(device))
     sample_times = {r.sample_time for r in recording.records}
     links = nominal_links(device)

@@ -119,8 +119,8 @@ def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False)
     """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
 
     Partly: causes are found, but they leave a little more than noise, or no held-out record shows one of them, or nothing
-    tells the noise, so that nobody can say whether all is explained. Unexplained, too, where it takes numbers that the
-    device file excludes: a wrong unit, sign or gain of a column looks like that.
+    tells the noise, so that nobody can say whether all is explained, or the numbers are too loose. Unexplained, too, where
+    it takes numbers that the device file excludes: a wrong unit, sign or gain of a column looks like that.
     """
     found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
     if excluded(search.chosen.fit):
@@ -131,7 +131,8 @@ def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False)
         return CONSISTENT
     if any(search.rivals):
         return AMBIGUOUS
-    return EXPLAINED if known and after.passed and not unconfirmed(search) else PARTLY
+    sure = known and after.passed and not unconfirmed(search) and not loose(fitter, search)
+    return EXPLAINED if sure else PARTLY
 
 
 def excluded(fit: Fit) -> dict[str, float]:
@@ -157,6 +158,12 @@ def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
         if bare.held - chosen.held < CONFIRMED
         and bare.fit.penalty - chosen.fit.penalty < 0.5 * (bare.fit.objective - chosen.fit.objective)
     )
+
+
+def loose(fitter: Fitter, search: Search) -> bool:
+    """Whether the held-out records are foreseen no better than before, though the causes may be right: by the numbers as
+    fitted, not as far as those are known."""
+    return fitter.held_squares(search.chosen.fit) > fitter.held_squares(search.nominal.fit)
 
 
 def tolerated(search: Search) -> float:

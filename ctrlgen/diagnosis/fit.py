@@ -18,7 +18,6 @@ from ctrlgen.diagnosis.hypotheses import PARAMETER
 from ctrlgen.diagnosis.journal import Journal, key_of
 from ctrlgen.diagnosis.noise import Noise
 from ctrlgen.diagnosis.response import Response
-from ctrlgen.diagnosis.spikes import alone
 from ctrlgen.diagnosis.structure import Structure
 from ctrlgen.recording import Record, Recording
 
@@ -106,8 +105,16 @@ class Fitter:
     def __init__(self, recording: Recording, noise: Noise, journal: Journal | None = None) -> None:
         self.recording, self.noise, self.journal = recording, noise, journal
         self.cache: dict = {}
-        self.to_fit = [r for r in recording.records if r.role == "fit"]
-        self.held = [r for r in recording.records if r.role == "hold_out"]
+
+    @property
+    def to_fit(self) -> list[Record]:
+        """The records to fit."""
+        return [r for r in self.recording.records if r.role == "fit"]
+
+    @property
+    def held(self) -> list[Record]:
+        """The records held out."""
+        return [r for r in self.recording.records if r.role == "hold_out"]
 
     def fit(
         self, structure: Structure, theta: np.ndarray | None = None, steps: int = STEPS, nested: Fit | None = None
@@ -163,27 +170,6 @@ class Fitter:
             self.journal.keep(key, optimum)
         return problem.result(optimum)
 
-    def mark_spikes(self, fit: Fit) -> str:
-        """Marks as not valid what stands out alone, for one or two samples, from what `fit` leaves over; says how many.
-
-        A mechanism cannot jump there and back within two samples, so this takes no physics away.
-        """
-        if self.recording.kind == "poses":
-            return ""
-        records, count = [], 0
-        for record in self.recording.records:
-            if record.role == "rest":
-                records.append(record)
-                continue
-            left = np.where(record.valid, record.observed - self.predicted(fit, record), 0.0)
-            spikes = record.valid & alone(np.nan_to_num(left))
-            count += int(spikes.sum())
-            records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
-        self.recording = replace(self.recording, records=tuple(records))
-        self.to_fit = [r for r in records if r.role == "fit"]
-        self.held = [r for r in records if r.role == "hold_out"]
-        return f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
-
     def predicted(self, fit: Fit, record: Record) -> np.ndarray:
         """Readings (n, n_y) of a fitted structure on any record, started as the record itself says best."""
         response = fit.structure.responses(self.recording, self.cache)[record.sample_time, record.linear]
@@ -223,7 +209,7 @@ class Fitter:
         explain the records to fit.
         """
         moved, price, spread = self.as_known(fit, HELD_STEPS if fit.objective < NEARLY_NOISE * fit.n else 1)
-        return self._held_squares(moved) + price + spread
+        return self.held_squares(moved) + price + spread
 
     def as_known(self, fit: Fit, steps: int = 1) -> tuple[Fit, float, float]:
         """The fit with its numbers p moved to where the held-out records are most likely, as p is known from the records to
@@ -238,7 +224,7 @@ class Fitter:
         C = fit.covariance / np.outer(unit, unit) * np.outer(sd > 0, sd > 0)
         R, best = fit.root * sd, (fit, 0.0, 0.0)
         low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
-        least = self._held_squares(fit)
+        least = self.held_squares(fit)
         for k in range(steps):
             b, H = self._held_slopes(best[0], sd)
             spread = np.eye(len(sd)) + C @ H
@@ -252,7 +238,7 @@ class Fitter:
             for halved in range(HALVINGS if steps > 1 else 1):
                 moved = replace(fit, theta=np.clip(begin + step / 2**halved, low, high))
                 price = float(np.sum((R @ ((moved.theta - fit.theta) / unit)) ** 2))
-                total = self._held_squares(moved) + price
+                total = self.held_squares(moved) + price
                 if total < least:
                     best, least = (moved, price, best[2]), total
                     break
@@ -270,7 +256,8 @@ class Fitter:
             b, H = b + J.T @ self.whitened(fit, record).ravel(), H + J.T @ J
         return b, H
 
-    def _held_squares(self, fit: Fit) -> float:
+    def held_squares(self, fit: Fit) -> float:
+        """What a fit leaves of the held-out records, whitened."""
         return sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)
 
 

@@ -2,13 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 from scipy.ndimage import median_filter
+
+from ctrlgen.recording import Record, Recording
 
 SPIKE = 7.0
 MOST_SPIKES = 0.01
 WIDEST_SPIKE = 2  # samples
 BESIDE = 0.3  # of a spike: what its neighbours have at most
+
+
+def marked(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> tuple[Recording, str]:
+    """A series with what stands alone, for one or two samples, in what `predicted` leaves over as not valid; how many.
+
+    A mechanism cannot jump there and back within two samples, so this takes no physics away.
+    """
+    if recording.kind == "poses":
+        return recording, ""
+    records, count = [], 0
+    for record in recording.records:
+        if record.role == "rest":
+            records.append(record)
+            continue
+        left = np.where(record.valid, record.observed - predicted(record), 0.0)
+        spikes = record.valid & alone(np.nan_to_num(left))
+        count += int(spikes.sum())
+        records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
+    said = f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
+    return replace(recording, records=tuple(records)), said
 
 
 def alone(left: np.ndarray) -> np.ndarray:

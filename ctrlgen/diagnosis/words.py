@@ -18,6 +18,7 @@ from ctrlgen.diagnosis.diagnosis import (
     Estimate,
     Finding,
     excluded,
+    loose,
     tolerated,
 )
 from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis
@@ -217,6 +218,11 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
         if known:
             most = number(100 * tolerated(diagnosis.search))
             left = f"A little remains above the noise, less than {most} % of what was wrong: see where below."
+        if loose(diagnosis.fitter, diagnosis.search):
+            return [
+                "The cause is there, but its numbers are known too loosely to foresee the held-out records: fit those too, or "
+                "record more of where it acts. Until then device.next.toml foresees no better than the device file.",
+            ]
         if diagnosis.unconfirmed:
             names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
             left = f"No held-out record shows {names}: hold out one that goes where the record to fit went."
