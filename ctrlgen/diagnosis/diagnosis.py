@@ -161,9 +161,10 @@ def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
 
 
 def loose(fitter: Fitter, search: Search) -> bool:
-    """Whether the held-out records are foreseen no better than before, though the causes may be right: by the numbers as
-    fitted, not as far as those are known."""
-    return fitter.held_squares(search.chosen.fit) > fitter.held_squares(search.nominal.fit)
+    """Whether the held-out records are foreseen worse than before, beyond chance, though the causes may be right: by the
+    numbers as fitted, not as far as those are known."""
+    worse = fitter.held_squares(search.chosen.fit) - fitter.held_squares(search.nominal.fit)
+    return worse > CHANCE * np.sqrt(2 * _n_held(fitter))
 
 
 def tolerated(search: Search) -> float:
@@ -175,7 +176,7 @@ def tolerated(search: Search) -> float:
 def remaining(fitter: Fitter, search: Search) -> float:
     """What the chosen causes leave beyond the noise, as a share of what the device as described leaves, both root mean
     square; the larger one of the records to fit and of those held out. By as much as `CHANCE` the noise itself may differ."""
-    n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+    n_held = _n_held(fitter)
     after, before = search.chosen, search.nominal
     shares = [0.0]
     for left, all_, n in (
@@ -185,6 +186,11 @@ def remaining(fitter: Fitter, search: Search) -> float:
         if left - n > CHANCE * np.sqrt(2 * n):
             shares.append(float(np.sqrt((left - n) / max(all_ - n, left - n))))
     return max(shares)
+
+
+def _n_held(fitter: Fitter) -> int:
+    """Usable samples of the held-out records."""
+    return sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
 
 
 def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:

@@ -221,7 +221,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
         if loose(diagnosis.fitter, diagnosis.search):
             return [
                 "The cause is there, but its numbers are known too loosely to foresee the held-out records: fit those too, or "
-                "record more of where it acts. Until then device.next.toml foresees no better than the device file.",
+                "record more of where it acts. Until then device.next.toml foresees worse than the device file.",
             ]
         if diagnosis.unconfirmed:
             names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
