@@ -1,7 +1,7 @@
 """Step 0 of the diagnosis: what a recording is worth. Faults refuse it; the rest is marked in `valid` and said in a note.
 
 Refused: time that does not rise or is sampled unevenly, drives that are missing or beyond the device's limits, channels
-without a number, records in which nothing happens, held-out data that were fitted, too little to hold anything out.
+of few numbers, records in which nothing happens, held-out data that were fitted, too little to hold anything out.
 Marked or noted: gaps, missing samples, spikes, stuck and clipped stretches, dead channels, jitter below 1 %.
 Nothing is filled in: where the drive is not known a record ends and another begins.
 """
@@ -336,7 +336,13 @@ def hold_out(records: Sequence[Record], kind: str) -> Judged:
     note = (
         f"No record is held out: {how} are held out of {longest.name}; a second run of another kind would prove more."
     )
-    return Judged(tuple(p for r in records for p in (parts if r is longest else (r,))), (note,))
+    still = kind == "series" and (parts[1].drive == parts[1].drive[0]).all()
+    rests = (
+        ("In what is held out no drive moves, so it proves little: name a record that moves hold_out.",)
+        if still
+        else ()
+    )
+    return Judged(tuple(p for r in records for p in (parts if r is longest else (r,))), (note, *rests))
 
 
 def _only(record: Record, rows: np.ndarray) -> Record:

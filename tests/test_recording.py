@@ -287,6 +287,15 @@ def test_the_end_of_a_series_is_held_out_where_nothing_else_is(tmp_path, model):
     assert fit.valid.all() and held.valid.all() and "its last 120 of 400 samples" in recording.notes[-1]
 
 
+def test_a_held_out_end_without_motion_is_noted(tmp_path, model):
+    columns = samples()
+    for axis in AXES:
+        columns[f"u{axis}"][250:] = 0.2
+    (tmp_path / "fit.csv").write_text(csv_text(columns))
+    recording = load_recordings([described(tmp_path, {"file": "fit.csv", "role": "fit"})], model)
+    assert any("no drive moves, so it proves little" in note for note in recording.notes)
+
+
 def test_what_is_too_short_to_divide_is_refused(tmp_path, model):
     (tmp_path / "a.csv").write_text(csv_text(samples(199)))
     described(tmp_path, {"file": "a.csv", "role": "fit"})
