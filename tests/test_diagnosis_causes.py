@@ -303,6 +303,18 @@ def test_what_moves_at_rest_is_no_noise():
         assert found.restless == restless and found.passed == (not restless)
 
 
+@pytest.mark.parametrize("poles, said", [((0.5,), False), ((0.9, 0.9), True)])
+def test_noise_so_slow_that_the_stage_may_move_is_said(poles, said):
+    """One pole is a sensor's filter; what a mass does with a random force has two."""
+    rng = np.random.default_rng(11)
+
+    def wandering(y):
+        return y + 3 * NOISE * lfilter([1.0], np.poly(poles), rng.standard_normal(len(y)))
+
+    (sentence,) = fitter_of(after=wandering).noise.said
+    assert ("may be the device" in sentence) == said
+
+
 def test_play_is_seen_by_what_it_does_at_finite_gaps():
     """The slope at no gap says little of a stage that creeps and swings about its goal."""
     fitter = fitter_of(played)

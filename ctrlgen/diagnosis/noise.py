@@ -27,6 +27,7 @@ NEAR_BINS = 15  # of the spectrum, over which noise is level
 OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
 LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
 LAGS = 20  # samples over which noise that was whitened is looked at for a memory
+SLOW = 3.0  # times its innovations: noise so slow moves
 SAME = 1e-9  # of its range: drives so near are one pose
 LEAST = 6  # repeated poses that tell a deviation, to 30 %
 ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
@@ -118,8 +119,11 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         parts = _quiet([without_lines(_flat(part, degree)) for part in parts])
         if parts:
             sd, a = _with_rounding(*autoregression(parts), rounding)
-            n = sum(map(len, parts))
-            return sd, a, True, f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}", float(n), False
+            n, times = sum(map(len, parts)), coloured(sd, a) / sd
+            said = f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}"
+            if times > SLOW:
+                said += f"; it is {times:.0f} times what one sample adds: what moves so slowly may be the device, not its sensor"
+            return sd, a, True, said, float(n), False
     if stated:
         sd, _ = _with_rounding(stated, none, rounding)
         return sd, none, True, f"{name}: as stated, taken as white", STATED, False
