@@ -48,6 +48,8 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise
+        if not error.format_message():  # no command at all: typer has shown the help
+            return 2
         context = getattr(error, "ctx", None)
         err.print(f"error: {error.format_message()}", markup=False, soft_wrap=True)
         err.print(f"try: {context.command_path if context else 'ctrlgen'} --help", markup=False)

@@ -27,6 +27,7 @@ COMMANDS = (
     "workspace",
     "reproduce",
     "diagnose",
+    "batch",
 )
 
 
@@ -34,6 +35,11 @@ COMMANDS = (
 def test_every_command_has_a_help_with_an_example(command):
     done = ctrlgen(command, "--help")
     assert done.returncode == 0 and f"ctrlgen {command} " in done.stdout and "Example" in done.stdout
+
+
+def test_no_command_at_all_shows_the_help():
+    done = ctrlgen()
+    assert "Start with" in done.stdout and "error" not in done.stdout + done.stderr
 
 
 def test_help_names_every_command_and_a_first_step():
