@@ -31,6 +31,8 @@ def main() -> None:
     interruption = Interruption()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, interruption)
+    # where a callback swallows the interruption, as one of the import system does, Python prints a traceback of it
+    sys.unraisablehook = lambda ignored: None if interruption.seen else sys.__unraisablehook__(ignored)
     try:
         from ctrlgen.cli import execute
 

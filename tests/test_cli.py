@@ -139,6 +139,31 @@ def test_unreachable_says_which_actuator_by_how_much_and_what_is_nearest(tmp_pat
     assert not (tmp_path / "out").exists()
 
 
+SWALLOWED = """
+import os, signal, sys
+import ctrlgen.cli
+from ctrlgen.__main__ import main
+
+class Dying:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        sum(range(100))
+
+def execute(check):
+    Dying()
+    check()
+
+ctrlgen.cli.execute = execute
+main()
+"""
+
+
+def test_an_interruption_that_a_callback_swallows_ends_the_work_too():
+    """Python ignores what is raised there, and prints it."""
+    done = subprocess.run([sys.executable, "-c", SWALLOWED], capture_output=True, text=True)
+    assert done.returncode == 130 and "Traceback" not in done.stderr and "interrupted" in done.stderr
+
+
 @pytest.mark.parametrize("after", [0.05, 0.6, 1.4, 2.2, 3.0])
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_at_any_moment_leaves_nothing_behind(tmp_path, stop, after):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -130,6 +131,5 @@ def test_groups_carry_only_what_enters_them():
 
 def test_a_device_without_free_numbers_is_screened(hexapod):
     fit = hexapod.fit(Structure(HEXAPOD))
-    bare = SimpleNamespace(**{k: getattr(fit, k) for k in ("structure", "theta", "starts", "residual", "objective")})
-    bare.J = np.zeros((len(fit.residual), 0))
+    bare = replace(fit, J=np.zeros((len(fit.residual), 0)))
     assert len(Screen(hexapod, LAWS[:2]).run(bare).suspects) == 2
