@@ -57,6 +57,7 @@ def test_a_column_of_another_unit_is_no_agreement(clean, unit, named):
     assert "units" in " ".join(next_steps(found))
 
 
+@pytest.mark.long
 def test_a_reading_that_counts_backwards_is_a_sign_and_no_lag(clean):
     """The device's own numbers bend to the edge of what they may be first, and hide the sign there."""
     for role in ("fit", "hold_out"):
