@@ -81,8 +81,8 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("worth", [equations.WORTH, -1], ids=["parameters", "constants"])
-@pytest.mark.parametrize("linear", [False, True], ids=["held", "linear"])
-@pytest.mark.parametrize("steps", [1, 3])
+@pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.long)], ids=["held", "linear"])
+@pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.long), 3])
 @pytest.mark.parametrize("text, size", [(AXIS, 1.0), (AXIS + LOOP, 4e-5)], ids=["open", "loop"])
 @pytest.mark.parametrize("effects", [("creep", "bouc_wen", "resonance", "coulomb"), ("creep", "bouc_wen", "resonance")])
 def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, effects, text, size, steps, linear, worth):

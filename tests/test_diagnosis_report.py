@@ -399,7 +399,9 @@ def test_a_foreign_folder_is_refused(creeping, tmp_path, capsys):
     assert "did not make" in capsys.readouterr().err and [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-@pytest.mark.parametrize("at", ["noise", "screening", "report"])
+@pytest.mark.parametrize(
+    "at", [pytest.param("noise", marks=pytest.mark.long), pytest.param("screening", marks=pytest.mark.long), "report"]
+)
 def test_an_interruption_keeps_the_earlier_result(creeping, tmp_path, at):
     def stop(step: str) -> None:
         if step.startswith(at):

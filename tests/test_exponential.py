@@ -63,7 +63,9 @@ def stepped(law, drive: np.ndarray, fine: int) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("reach, share", [(3e-6, 0.005), (0.3e-6, 0.01), (0.1e-6, 0.02)])
+@pytest.mark.parametrize(
+    "reach, share", [(3e-6, 0.005), pytest.param(0.3e-6, 0.01, marks=pytest.mark.long), (0.1e-6, 0.02)]
+)
 @pytest.mark.parametrize("drive", DRIVES.values(), ids=DRIVES)
 def test_dry_friction_is_right_to_hundredths_of_itself_sliding_and_sticking(tmp_path, drive, reach, share):
     """Contacts that yield by 0.1 um are crossed in 5 us of a sample of 1 ms, and hold 25 times as stiffly as the flexures."""

@@ -27,6 +27,7 @@ def test_the_finite_element_hinge_imports_nothing_of_ours():
     assert not any(module.startswith("ctrlgen") for module in modules)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("reading", fem.Reading, ids=lambda r: r.name)
 @pytest.mark.parametrize("ratio", [0.05, 0.374, 0.8])
 def test_the_finite_element_hinge_has_converged(ratio, reading):

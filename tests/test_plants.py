@@ -240,6 +240,7 @@ def test_heat_is_first_order_and_force_is_equation_4():
     assert temperature_for(bar_force(np.array(300.0), a), a) == pytest.approx(300)
 
 
+@pytest.mark.long
 def test_recording_repeats_and_its_noise_is_the_given_one(whole):
     powers = 0.2 + 0.05 * np.sin(np.arange(60)[:, None] / 10 + np.arange(6))
     noise = (1e-7, 1e-3)  # rad, um

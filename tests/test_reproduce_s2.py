@@ -13,6 +13,7 @@ from ctrlgen.reproduce.row import Row, Status
 from ctrlgen.reproduce.s3_hinges import PRINTED_ERRORS
 
 
+@pytest.mark.long
 def test_the_page_of_s2_shows_its_measuring_chain_and_the_hinge_errors(tmp_path, found):
     """The hinge errors are S3's figures; its Table 3 is among the rows of S2."""
     page = tmp_path / "page.html"

@@ -143,6 +143,7 @@ def test_states_of_its_own_may_depend_on_everything():
     assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max()
 
 
+@pytest.mark.long
 def test_friction_of_a_pendulum_is_found(tmp_path, small_library):
     def force(u, q, v):
         return MOTOR * u - WEIGHT * np.sin(q) - DAMPING * v - 2e-3 * np.tanh(v / 0.3)

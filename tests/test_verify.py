@@ -100,6 +100,7 @@ def test_the_page_holds_every_check_target_and_comparison(verified):
     assert not re.search(r'(src|href)="(?!#)', page)  # self-contained
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_numbers_on_a_page_twice(example, tmp_path):
     for name in ("a", "b"):
         write_build(tmp_path / name, example)
@@ -186,6 +187,7 @@ def stubbed(monkeypatch, compiler):
     return monkeypatch
 
 
+@pytest.mark.long
 def test_a_failing_check_gives_status_1_and_the_page_is_written(stubbed, tmp_path):
     finding = Finding("a.c", 3, "misra-c2012-15.1", "advisory", "MISRA C:2012 rule 15.1")
     failing = Check("cppcheck --addon=misra", "2.10", (), "failed", (finding,))
