@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from battery.laws_drive import ARRIVING, BREAKING
+
 # Truth -> names that are right. Two names stand together where the physics is one law under two names, or where moving a
 # linear law along the chain changes nothing that a recording could show (a lag in the actuator, a relaxation in the flexure).
 FORCE_CONSTANT = "parameter@force_constant"
@@ -43,6 +45,13 @@ ALSO_AT = {
     "parameter": ("mechanism", "actuator", "stage", "hexapod"),
 }
 Value = Callable[[dict[str, Any]], float]
+
+
+def _middle(truth: dict[str, Any], takes: float) -> float:
+    """The moment [s] of an event that begins at its planted one: the middle, all that records tell of one within a sample."""
+    return truth["shape"]["moment"] + takes / 2
+
+
 # Parameters whose law has the same form in the plant and in any library: aliases of the name, and the value in SI.
 TRUTHS: dict[str, dict[tuple[str, ...], Value]] = {
     "drive_gain": {("gain",): lambda t: t["amplitude"]},
@@ -53,8 +62,8 @@ TRUTHS: dict[str, dict[tuple[str, ...], Value]] = {
     "temperature_sensitivity": {("sensitivity", "gain", "slope"): lambda t: t["amplitude"]},
     "quadratic_damping": {("c2", "coefficient", "drag", "damping"): lambda t: t["amplitude"]},
     "vibration": {("frequency",): lambda t: t["shape"]["frequency"]},
-    "step": {("amplitude", "size", "height", "force"): lambda t: t["amplitude"], ("moment", "time"): lambda t: t["shape"]["moment"]},
-    "lost_beams": {("share", "fraction", "lost"): lambda t: t["amplitude"], ("moment", "time"): lambda t: t["shape"]["moment"]},
+    "step": {("amplitude", "size", "height", "force"): lambda t: t["amplitude"], ("moment", "time"): lambda t: _middle(t, ARRIVING)},
+    "lost_beams": {("share", "fraction", "lost"): lambda t: t["amplitude"], ("moment", "time"): lambda t: _middle(t, BREAKING)},
     "resonance": {("frequency",): lambda t: t["shape"]["frequency"]},
     "heat_crosstalk": {("share",): lambda t: t["amplitude"]},
     "frame_turn": {("angle",): lambda t: t["amplitude"]},

@@ -11,6 +11,8 @@ import numpy as np
 
 from battery.plant_axis import Hooks, Scene
 
+BREAKING, ARRIVING = 3e-3, 2e-3  # s, how long an event takes from its begin on
+
 
 def make_drive_gain(scene: Scene, a: float) -> Hooks:
     """u -> (1 + a) u."""
@@ -37,10 +39,10 @@ def make_dead_zone(scene: Scene, a: float) -> Hooks:
 
 
 def make_lost_beams(scene: Scene, a: float, moment: float) -> Hooks:
-    """k_f falls by the share a within 3 ms at `moment` [s]."""
+    """k_f falls by the share a within 3 ms from `moment` [s] on."""
 
     def drive(t: float, u: float) -> float:
-        return u * (1 - a * min(max((t - moment) / 3e-3, 0.0), 1.0))
+        return u * (1 - a * min(max((t - moment) / BREAKING, 0.0), 1.0))
 
     return Hooks(drive=drive)
 
@@ -82,7 +84,7 @@ def make_vibration(scene: Scene, a: float, frequency: float, phase: float) -> Ho
 
 def make_step(scene: Scene, a: float, moment: float) -> Hooks:
     """A force a [N] that is there from `moment` [s] on, arriving within 2 ms."""
-    return Hooks(force=lambda t, q, v: a * min(max((t - moment) / 2e-3, 0.0), 1.0))
+    return Hooks(force=lambda t, q, v: a * min(max((t - moment) / ARRIVING, 0.0), 1.0))
 
 
 def _moment(rng: np.random.Generator, scene: Scene) -> dict[str, float]:

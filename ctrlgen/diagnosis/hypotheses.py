@@ -98,7 +98,13 @@ class Hypothesis:
     def bounds(self, p: Param, where: Where) -> tuple[float, float]:
         """Of a parameter [SI], here and with these samples."""
         low, high = (where.si(b, p) for b in p.bounds)
-        return low, max(low, min(high, self.highest)) if p.unit == "Hz" else high
+        if p.unit == "Hz":
+            return low, max(low, min(high, self.highest))
+        if p.unit == "s" and p.level and self.law.place is not Place.SENSOR:
+            low = min(
+                high, max(low, HALF / self.highest)
+            )  # within a sample a motion shows the middle of a change, not its length
+        return low, high
 
 
 def hypotheses(

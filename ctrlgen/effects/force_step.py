@@ -5,7 +5,7 @@ from ctrlgen.event import CLOCK, WHEN, happened
 
 
 class ForceStep(Effect):
-    """Delta F = f e(t), e from 0 to 1 within the time T from the moment t_0 on. Holds for one event."""
+    """Delta F = f e(t), e from 0 to 1 within the time T about the moment t_0. Holds for one event."""
 
     place = Place.FORCE
     needs = frozenset({"force"})

@@ -5,7 +5,7 @@ from ctrlgen.event import CLOCK, WHEN, happened
 
 
 class SensorStep(Effect):
-    """Delta y = b e(t), e from 0 to 1 within the time T from the moment t_0 on. Holds for one event."""
+    """Delta y = b e(t), e from 0 to 1 within the time T about the moment t_0. Holds for one event."""
 
     place = Place.SENSOR
     domain = "disturbance"
