@@ -50,7 +50,9 @@ def next_sample(model: Model, sample_time: float, linear: bool = False, newton_s
 def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = 4) -> ca.SX:
     """The displacement that balances the forces at `x`, a function of z or not, and `u`, by Newton's method from model.z; one
     step if linear."""
-    g = ca.substitute(ca.substitute(model.balance, model.x, x), model.u, u)
+    g = ca.substitute(
+        model.balance, ca.vertcat(model.x, model.u), ca.vertcat(x, u)
+    )  # at once: x depends on the drive before
     slope = ca.jacobian(g, model.z)
     diagonal = slope.sparsity().is_diag()
     z = model.z

@@ -53,6 +53,18 @@ def test_a_settled_pose_is_where_a_long_simulation_ends():
     assert np.abs(read(x, z, P, model.p_nominal).full().ravel() - long.signals["reading"][-1])[3:].max() < 1e-3 * NM
 
 
+def test_the_map_of_a_sample_goes_where_a_simulation_goes(model):
+    """Powers that jump move nothing at once: the temperature is still what the power before has made it."""
+    h, u = 1e-3, np.repeat([[0.1] * 6, [0.4, 0.1, 0.3, 0.2, 0.1, 0.5], [0.05] * 6], 7, axis=0)
+    after = next_sample(model, h, newton_steps=8)
+    one = ca.Function("one", [model.x, model.z, model.u, after.u_next, model.p], [after.x, after.z])
+    wanted = simulate(model, u, h)
+    x, z = model.rest, wanted.signals["displacement"][0]
+    for k in range(len(u) - 1):
+        x, z = one(x, z, u[k], u[k + 1], model.p_nominal)
+        assert np.allclose(z.full().ravel(), wanted.signals["displacement"][k + 1], rtol=1e-9, atol=0)
+
+
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 2e-2])
 def test_a_step_is_exact_for_the_first_order_lag(model, h):
     step = ca.Function("step", [model.x, model.z, model.u], [model.step(h)])

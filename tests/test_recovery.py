@@ -1,0 +1,319 @@
+"""Every law is recovered from a record that another simulator made: here those that the battery does not plant.
+
+The simulators know the law by its definition, not by its expression: exact rotations, ramps, plays by the hundred, forces
+in steps of a tenth of a sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+import pytest
+from conftest import DEVICE, SCENARIOS
+from scipy.linalg import expm
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+from scipy.stats import norm
+from test_diagnosis_evidence import AXIS, NOISE, SETTLING, H, move, record
+
+import ctrlgen.effects  # noqa: F401
+from battery import laws
+from battery.hexapod_cases import FAULTS
+from battery.plant_hexapod import Faults, Hexapod
+from ctrlgen import load_device
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.fit import Fitter
+from ctrlgen.diagnosis.hypotheses import HALF, Hypothesis
+from ctrlgen.diagnosis.noise import estimate
+from ctrlgen.diagnosis.screen import Screen
+from ctrlgen.diagnosis.structure import Structure
+from ctrlgen.effect import Effect
+from ctrlgen.recording import Recording
+
+N = 2500
+COMPONENTS = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
+TURNED, SHIFTED = 1e-6, 5e-9  # noise of a pose [rad, m]
+ALSO = {
+    "softening": "stiffening",
+    "step": "force_step",
+    "viscous": "asymmetric_viscous",
+}  # the battery's names for them
+IN_THE_LOOP = {"link_load"}  # found on the finite-rotation plant of tests/test_loop.py
+
+
+@dataclass(frozen=True)
+class Planted:
+    """`truth` by parameter [SI]; `within` of itself, where the simulator's form is another than the law's, beside the noise."""
+
+    at: str
+    truth: dict[str, float]
+    of: str | None = None
+    within: dict[str, float] = field(default_factory=dict)
+
+
+def given(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A drive to fit and one to hold out [V]."""
+    t = H * np.arange(n)
+    fit = 1.5 * np.sin(2 * np.pi * 2.3 * t) + 0.3 * np.sin(2 * np.pi * 13.1 * t + 1) + 0.2 * np.sin(2 * np.pi * 41 * t)
+    return fit, 1.3 * np.sin(2 * np.pi * 1.7 * t)
+
+
+# Of one axis: drive [V] and time [s] -> position [m]
+
+
+def asymmetric_gain(u, t):
+    return move(np.where(u > 0, 1.03 * u, 0.97 * u))
+
+
+def reversed(u, t):
+    return move(-u)
+
+
+def drive_offset(u, t):
+    return move(u + 0.05)
+
+
+def cubic_sensor(u, t):
+    y = move(u)
+    return y + 2e6 * y**3
+
+
+def stitching_error(u, t):
+    """With the slope of 0.4 um on 2 um in its middle."""
+    y = move(u)
+    return y + 4e-7 * norm.cdf(np.sqrt(2 * np.pi) * (y - 2e-5) / 2e-6)
+
+
+def sensor_step(u, t):
+    return move(u) + 2e-7 * np.clip((t - 1.1) / 0.02 + 0.5, 0, 1)
+
+
+def drive_hysteresis(u, t):
+    """Two hundred plays, all alike in weight, where the law has eight: its numbers count in eighths."""
+    radii = 0.4 * (np.arange(200) + 0.5) / 200
+    play, out = np.zeros(200), []
+    for volts in u:
+        play = np.clip(play, volts - radii, volts + radii)
+        out.append(volts + 0.1 * (play.mean() - volts))
+    return move(np.array(out))
+
+
+def asymmetric_hysteresis(u, t):
+    """Dahl's friction of 2e4 N/m and 10 um, in the displacement warped by 0.5, in steps of a tenth of a sample."""
+    L, r, a, k = AXIS.mechanics.stroke.si, 1e-5, 0.5, 2e4
+
+    def force(time, q, v, memory):
+        z, before = memory or (0.0, 0.0)
+        slope = 1 + a * q / np.hypot(q, L)
+        dw = slope * (q - before)
+        z += dw * (1 - np.sign(dw) * z / r)
+        return -k * z * slope, (z, q)
+
+    return move(u, force)
+
+
+def bouc_wen(u, t):
+    """F = -k z, dz = dd (1 - (beta sgn(dd z) + gamma)|z|), beta = 8e4/m, gamma = 2e4/m, in steps of a tenth of a sample."""
+
+    def force(time, q, v, memory):
+        z, before = memory or (0.0, 0.0)
+        step = q - before
+        z += step * (1 - (8e4 * np.sign(step * z) + 2e4) * abs(z))
+        return -2e4 * z, (z, q)
+
+    return move(u, force)
+
+
+ON_AXIS = {
+    asymmetric_gain: Planted("actuator:axis", {"gain": 0.03}),
+    reversed: Planted("actuator:axis", {}),
+    drive_offset: Planted("actuator:axis", {"offset": 0.05}),
+    cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
+    stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
+    sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
+    drive_hysteresis: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
+    bouc_wen: Planted(
+        "stage:axis", {"stiffness": 2e4, "reach": 1e-5, "loop": 0.8}, within={"stiffness": 0.03, "reach": 0.03, "loop": 0.05}
+    ),
+    asymmetric_hysteresis: Planted(
+        "stage:axis", {"stiffness": 2e4, "reach": 1e-5, "skew": 0.5}, within={"stiffness": 0.03, "reach": 0.03, "skew": 0.1}
+    ),
+}  # fmt: skip
+
+
+# Of settled poses: heater powers [W] -> poses (theta; delta) [rad, um] of S1's hexapod, assembled as one structure
+
+
+def posed(change):
+    """A law of the pose alone."""
+    return lambda u: change(Hexapod().settled(u))
+
+
+def at(k, value):
+    out = np.zeros(6)
+    out[k] = value
+    return out
+
+
+def rotated(axis, angle):
+    """Components in a frame turned about an axis."""
+    R = Rotation.from_rotvec(angle * np.eye(3)["xyz".index(axis)]).as_matrix()
+    return posed(lambda p: np.hstack([p[:, :3] @ R.T, p[:, 3:] @ R.T]))
+
+
+def along_a_screw(p):
+    """The translation of exp(twist)."""
+    out = p.copy()
+    for row, (theta, delta) in enumerate(zip(p[:, :3], p[:, 3:], strict=True)):
+        w = np.array([[0, -theta[2], theta[1]], [theta[2], 0, -theta[0]], [-theta[1], theta[0], 0]])
+        twist = np.zeros((4, 4))
+        twist[:3, :3], twist[:3, 3] = w, delta
+        out[row, 3:] = expm(twist)[:3, 3]
+    return out
+
+
+def raised(p, height=20e3):
+    """The second order of where a point 20 mm above goes: beyond theta x h."""
+    h = np.array([0, 0, height])
+    go = Rotation.from_rotvec(p[:, :3]).apply(h) - h - np.cross(p[:, :3], h)
+    return np.hstack([p[:, :3], p[:, 3:] + go])
+
+
+def carried(u):
+    """The third stage carries the platform 2 % further than it goes."""
+    plant = Hexapod()
+    return plant.pose(plant.displacement(plant.temperature(u)) * (1 + at(2, 0.02)))
+
+
+def losing(u):
+    """Every lever bends by 5 um/N times the bar's force, S1 eq. (4)."""
+    plant = Hexapod()
+    a, T = plant.n.actuator, plant.temperature(u)
+    F = 2 * a.beams * (a.expansion + a.expansion_slope * T) * (T - a.ambient)
+    F = F * a.young * a.beam_width * a.thickness * np.sin(a.beam_angle)
+    return plant.pose(plant.displacement(T) - 5.0 * F)
+
+
+ON_HEXAPOD = {
+    "abbe_arm": (posed(lambda p: p + np.outer(p[:, 1] * 2e3, at(3, 1))), Planted("sensor:delta_x", {"arm": 2e-3}, "theta_y")),
+    "link_compliance": (posed(lambda p: p + np.outer(p[:, 4] * 2e-5, at(0, 1))), Planted("mechanism:theta_x", {"tilt": 20.0}, "delta_y")),
+    "frame_tilt_x": (rotated("x", 0.01), Planted("mechanism:all", {"angle": 0.01})),
+    "frame_tilt_y": (rotated("y", -0.01), Planted("mechanism:all", {"angle": -0.01})),
+    "screw_motion": (posed(along_a_screw), Planted("mechanism:all", {"share": 1.0})),
+    "raised_point": (posed(raised), Planted("mechanism:all", {"height": 0.02})),
+    "coupling": (lambda u: Hexapod(faults=Faults(coupling=at(2, 0.01))).settled(u), Planted("stage:2X", {"gain": 0.01}, "2Y")),
+    "lever_ratio": (carried, Planted("stage:2X", {"gain": 0.02})),
+    "lost_motion": (losing, Planted("stage:all", {"compliance": 5e-6})),
+    "heater_resistance": (
+        lambda u: Hexapod(faults=Faults(resistance=5e-5), voltage=True).settled(np.sqrt(u * Hexapod().n.actuator.heater_resistance)),
+        Planted("actuator:all", {"slope": 5e-5}),
+    ),
+}  # fmt: skip
+
+
+def warmed(u, late=0.1, tau=0.05, dt=H / 10):
+    """A tenth of every heater's power comes with another 50 ms of delay: readings a sample apart, ten steps between them."""
+    fine = np.repeat(u, 10, axis=0)
+    keep = np.exp(-dt / tau)
+    lagged = lfilter([0, 1 - keep], [1, -keep], fine, axis=0)
+    lagged += (
+        (fine - lagged) * (1 - keep) / 2
+    )  # held through a step, of which the delayed heat has come half of the way
+    return Hexapod().series((1 - late) * fine + late * lagged, dt)[::10]
+
+
+def payload(r):
+    """A table that gives way by 0.002 (sin(y + 40 deg) - sin(40 deg)) where it stands then [rad]."""
+    y = r.copy()
+    for _ in range(50):
+        y = r + 0.002 * (np.sin(y + np.radians(40)) - np.sin(np.radians(40)))
+    return y
+
+
+def noisy(n: int) -> float:
+    """The squares of n deviations of noise, four of their own deviations above the mean."""
+    return n + 4 * np.sqrt(2 * n)
+
+
+def recover(fitter: Fitter, device: Device, effect: str, planted: Planted) -> None:
+    """Screened where it acts and fitted from there: the numbers planted, and what is left is noise, fitted and held out, but
+    for the form of the law, of which its effect says how far nature's may be."""
+    highest = HALF / H if fitter.recording.kind == "series" else np.inf
+    cause = Hypothesis(effect, planted.at, planted.at.partition(":")[2], planted.of, highest=highest)
+    nominal = fitter.fit(Structure(device))
+    best, *_ = Screen(fitter, [cause]).run(nominal).suspects
+    fit = fitter.fit(Structure(device).with_cause(cause, best.start))
+    rough, held = cause.law.rough**2, sum(int(r.valid.sum()) for r in fitter.held)
+    assert fit.chi2 < noisy(fit.n) + rough * nominal.chi2 and fit.chi2 < 0.3 * nominal.chi2
+    assert fitter.held_out(fit) < noisy(held) + rough * fitter.held_out(nominal)
+    sd = np.sqrt(np.diag(fit.covariance))
+    found = {u.name: (fit.theta[k], sd[k]) for k, u in enumerate(fit.structure.unknowns) if u.cause == 0}
+    for parameter, truth in planted.truth.items():
+        value, deviation = found[parameter]
+        assert abs(value - truth) < 4 * deviation + planted.within.get(parameter, 0.005) * abs(truth), parameter
+
+
+def fitter_of(device, channels, units, sds, kind, parts) -> Fitter:
+    recording = Recording("t", device.name, kind, channels, units, tuple(sds), tuple(parts), ())
+    return Fitter(recording, estimate(recording, SETTLING))
+
+
+def poses_of(parts, kind) -> Fitter:
+    channels = tuple(f"reading.{c}" for c in COMPONENTS)
+    units, sds = ("urad",) * 3 + ("um",) * 3, np.repeat([TURNED, SHIFTED], 3)
+    return fitter_of(hexapod(), channels, units, sds, kind, parts)
+
+
+@pytest.mark.parametrize("law", ON_AXIS, ids=lambda law: law.__name__)
+def test_of_an_axis(law):
+    rng, t = np.random.default_rng(3), H * np.arange(N)
+    parts = [
+        record(u, law(u, t) + NOISE * rng.standard_normal(N), role)
+        for u, role in zip(given(N), ("fit", "hold_out"), strict=True)
+    ]
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", parts)
+    recover(fitter, AXIS, law.__name__, ON_AXIS[law])
+
+
+@cache
+def hexapod() -> Device:
+    return load_device(DEVICE)
+
+
+@pytest.mark.parametrize("effect", ON_HEXAPOD)
+def test_of_settled_poses(effect):
+    rng = np.random.default_rng(5)
+    plant, planted = ON_HEXAPOD[effect]
+    parts = []
+    for n, role in ((60, "fit"), (30, "hold_out")):
+        u = rng.uniform(0.05, 0.5, (n, 6))
+        y = plant(u) * np.repeat([1, 1e-6], 3) + np.repeat([TURNED, SHIFTED], 3) * rng.standard_normal((n, 6))
+        parts.append(record(u, y, role, h=np.inf))
+    recover(poses_of(parts, "poses"), hexapod(), effect, planted)
+
+
+def test_of_heaters_with_a_second_lag():
+    rng, parts = np.random.default_rng(7), []
+    for n, role in ((400, "fit"), (300, "hold_out")):
+        u = np.repeat(rng.uniform(0.05, 0.5, (n // 50, 6)), 50, axis=0)
+        y = warmed(u) * np.repeat([1, 1e-6], 3) + np.repeat([TURNED, SHIFTED], 3) * rng.standard_normal((n, 6))
+        parts.append(record(u, y, role))
+    recover(poses_of(parts, "series"), hexapod(), "second_pole", Planted("actuator:all", {"share": 0.1, "tau": 0.05}))
+
+
+def test_of_a_table_out_of_balance():
+    rng, device = np.random.default_rng(6), load_device(SCENARIOS / "rotary_axis" / "device.toml")
+    parts = []
+    for n, role in ((60, "fit"), (30, "hold_out")):
+        r = rng.uniform(-2, 2, n)
+        parts.append(record(r, payload(r) + 2e-5 * rng.standard_normal(n), role, h=np.inf))
+    fitter = fitter_of(device, ("reading.axis",), ("deg",), (2e-5,), "poses", parts)
+    recover(fitter, device, "payload", Planted("mechanism:axis", {"share": 0.002, "lean": np.radians(40)}))
+
+
+def test_no_law_is_left_out():
+    battery = {ALSO.get(name, name) for name in (*laws.DRAW, *FAULTS)}
+    here = {*(law.__name__ for law in ON_AXIS), *ON_HEXAPOD, "payload", "second_pole"}
+    assert not set(Effect.library) - battery - here - IN_THE_LOOP
