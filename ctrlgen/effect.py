@@ -194,6 +194,11 @@ class Effect:
         return None
 
     @classmethod
+    def holds(cls, p: dict[str, float]) -> bool:
+        """Whether the law means what it says with these parameters [SI]."""
+        return True
+
+    @classmethod
     def fits(cls, where: Where) -> bool:
         """Whether the law makes sense at this channel (for an effect of pairs: `beside` the other one)."""
         units = (cls.channel_unit,) if isinstance(cls.channel_unit, str) else cls.channel_unit

@@ -52,12 +52,19 @@ def _off_chord(y: np.ndarray, width: int) -> np.ndarray:
 
 
 def _isolated(y: np.ndarray, start: int, width: int, size: float) -> bool:
-    """Whether the signal goes on after the stretch as it came: a step does not, nor does ringing."""
+    """Whether the signal goes on after the stretch as it came: a step does not, nor does ringing. One sample around, not
+    beside it, may be another spike."""
     around = np.r_[max(start - 4, 0) : start, start + width : min(start + width + 4, len(y))]
-    if len(around) < LEAST_AROUND:
+    apart = around[(around < start - 1) | (around > start + width)]
+    return any(_straight(y, around[around != other], start, 0.3 * size) for other in (-1, *apart))
+
+
+def _straight(y: np.ndarray, at: np.ndarray, start: int, within: float) -> bool:
+    """Whether the samples `at` lie on one line."""
+    if len(at) < LEAST_AROUND:
         return False
-    line = np.polyfit(around - start, y[around], 1)
-    return bool(np.abs(y[around] - np.polyval(line, around - start)).max() < 0.3 * size)
+    line = np.polyfit(at - start, y[at], 1)
+    return bool(np.abs(y[at] - np.polyval(line, at - start)).max() < within)
 
 
 def _near_jump(drive: np.ndarray) -> np.ndarray:

@@ -460,3 +460,16 @@ def test_fringes_that_the_records_cannot_part_are_one():
         fit = fitter.fit(Structure(AXIS, (fringe, once_more), starts), steps=0)
         assert resolved(fitter.recording, fit) == part
         assert resolved(fitter.recording, fit, (fringe, once_more))
+
+
+@pytest.mark.parametrize("share, meant", [(0.9, True), (1.1, False)])
+def test_a_fringe_that_turns_the_reading_back_is_none(share, meant):
+    """Beyond A = Lambda/2 pi what repeats is no error of a reading: the aliases of a line in time look so."""
+    fringe = Hypothesis("cyclic", "sensor:axis", "axis", highest=HALF / H)
+    period = 2e-6
+    fitter = fitter_of(after=lambda y: y + share * period / (2 * np.pi) * np.sin(2 * np.pi * y / period + 0.5))
+    start = {"amplitude": 0.9 * share * period / (2 * np.pi), "period": period, "phase": 0.5}
+    searcher = Searcher(fitter, Screen(fitter, [fringe]), lambda _: None)
+    trial = searcher.trial(Structure(AXIS).with_cause(fringe, start), steps=40)
+    assert trial.fit.values(0)["amplitude"] == pytest.approx(share * period / (2 * np.pi), rel=0.02)
+    assert searcher.weigh.meant(trial) == meant

@@ -17,6 +17,15 @@ def test_a_spike_beside_the_end_of_a_record_is_one_too(at, rng):
     assert np.array_equal(np.flatnonzero(spikes(y, np.cos(0.02 * t)[:, None])), [at % n])
 
 
+@pytest.mark.parametrize("apart", [2, 3, 4, 5])
+@pytest.mark.parametrize("sizes", [(0.1, 0.1), (0.1, -0.1), (0.1, 0.03)])
+def test_two_spikes_close_together_are_two(apart, sizes, rng):
+    t = np.arange(1000)
+    y = np.sin(0.02 * t) + 1e-3 * rng.standard_normal(1000)
+    y[[600, 600 + apart]] += sizes
+    assert np.array_equal(np.flatnonzero(spikes(y, np.cos(0.02 * t)[:, None])), [600, 600 + apart])
+
+
 @pytest.mark.parametrize("pole", [0.3, 0.9, 0.97 * np.exp(0.9j), 0.97 * np.exp(2.2j)])
 def test_a_record_may_begin_in_motion(pole, rng):
     n = 400

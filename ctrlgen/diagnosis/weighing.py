@@ -77,10 +77,13 @@ class Weighing:
         )
 
     def meant(self, trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
-        """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one, and is no double."""
+        """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one, holds, and is no double."""
         structure = trial.fit.structure
         if not resolved(self.fitter.recording, trial.fit, accepted):
             return False
+        for k, cause in enumerate(structure.causes):
+            if cause.effect != PARAMETER and cause not in accepted and not cause.law.holds(trial.fit.values(k)):
+                return False
         for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
             if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
                 continue

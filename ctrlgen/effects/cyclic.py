@@ -1,5 +1,7 @@
 """An error that repeats along the path: interferometer fringe, resolver or encoder pitch, screw pitch."""
 
+import math
+
 import casadi as ca
 
 from ctrlgen.effect import Effect, Param, Place
@@ -24,6 +26,10 @@ class Cyclic(Effect):
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home", grid=(0.0, 90.0)),
     )  # fmt: skip
+
+    @classmethod
+    def holds(cls, p):
+        return 2 * math.pi * abs(p["amplitude"]) < p["period"]
 
     def term(self, s, p):
         return p.amplitude * ca.sin(2 * ca.pi * s.value / p.period + p.phase)

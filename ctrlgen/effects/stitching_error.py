@@ -23,5 +23,9 @@ class StitchingError(Effect):
         Param("width", "channel", (1e-4, 0.05), "path over which it does", grid=(0.005, 0.03)),
     )
 
+    @classmethod
+    def holds(cls, p):
+        return p["offset"] > -p["width"]
+
     def term(self, s, p):
         return p.offset * (1 + ca.tanh(2 * (s.value - p.position) / p.width)) / 2
