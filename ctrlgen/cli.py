@@ -43,7 +43,10 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     except typer.Abort:
         return 130
     except OSError as error:
-        err.print(f"error: {error.strerror}: {error.filename}", markup=False, soft_wrap=True)
+        said = (
+            f"{error.strerror}: {error.filename}" if error.strerror else str(error)
+        )  # a library's own may have no number
+        err.print(f"error: {said}", markup=False, soft_wrap=True)
         return 1
     except Exception as error:
         if not hasattr(error, "format_message"):
