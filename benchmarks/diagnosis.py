@@ -14,14 +14,14 @@ from battery.plant_axis import Axis, Planted
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import SCENARIO, Disagreement
 from ctrlgen import build_model, diagnose, load_device
-from ctrlgen.diagnosis.fit import Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, hypotheses, nominal_links
-from ctrlgen.diagnosis.noise import Noise
-from ctrlgen.diagnosis.response import Response
-from ctrlgen.diagnosis.screen import Screen
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.model import movable
-from ctrlgen.recording import Record, Recording
+from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.estimation.noise import Noise
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_links
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.model.model import movable
+from ctrlgen.recordings.recording import Record, Recording
 
 DEVICES = SCENARIO.parent / "devices"
 H, LONG, AXIS_SAMPLES = 1e-3, 60_000, 20_000

@@ -2,7 +2,7 @@
 
 One sample: given the wanted pose, the stage displacements z and temperatures T with pose(z) = target and
 balance(z, T) = 0; the drives u that lead from the temperatures before to T follow in closed form, because the
-step is linear in u. Unknowns y = (z, T) and equations are divided by their typical sizes, as in `ctrlgen.solution`.
+step is linear in u. Unknowns y = (z, T) and equations are divided by their typical sizes, as in `ctrlgen.trajectory.solution`.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller import Controller
 from ctrlgen.firmware.cprint import Real
-from ctrlgen.model import Model, build_model
-from ctrlgen.scenario import Scenario, load_scenario
-from ctrlgen.simulation import simulate
-from ctrlgen.solution import Solution, solve
+from ctrlgen.model.feedforward import Controller
+from ctrlgen.model.model import Model, build_model
+from ctrlgen.model.simulation import simulate
+from ctrlgen.trajectory.scenario import Scenario, load_scenario
+from ctrlgen.trajectory.solution import Solution, solve
 from ctrlgen.verification.comparison import EXCESS
 
 SCENARIO = Path(__file__).resolve().parent.parent / "scenarios" / "circle20"
@@ -182,7 +182,7 @@ class Samples:
         _require(name, "its drives lead the model off the circle by", error.max(), near)
 
     def reference(self, targets: np.ndarray) -> Answers:
-        """The controller of `ctrlgen.controller` over `targets`, starting settled at the last one."""
+        """The controller of `ctrlgen.model.feedforward` over `targets`, starting settled at the last one."""
         step = self.controller.step(self.controller.rest(), targets[-1], settle=True)
         steps = []
         for target in targets:

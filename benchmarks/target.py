@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks import casadi_c
 from benchmarks.measure import Count, Note
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
-from ctrlgen.errors import ToolError
+from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder, generate
 from ctrlgen.verification.cores import BASE, CORES, INSTALL, Core, cross_compile, cross_compilers

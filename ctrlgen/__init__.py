@@ -10,31 +10,40 @@ from typing import TYPE_CHECKING, Any
 from ctrlgen._version import __version__
 
 if TYPE_CHECKING:
-    from ctrlgen.controller import Controller, Status
+    from ctrlgen.app.pipeline import Outcome, run
+    from ctrlgen.core.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import load_device
     from ctrlgen.devices.user import user_device
-    from ctrlgen.diagnosis.diagnosis import Diagnosis
-    from ctrlgen.diagnosis.job import diagnose
-    from ctrlgen.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
+    from ctrlgen.diagnosis.pipeline import diagnose
+    from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
     from ctrlgen.firmware.folder import generate
-    from ctrlgen.job import Outcome, run
-    from ctrlgen.model import Model, build_model
-    from ctrlgen.readings import Record, record_readings
-    from ctrlgen.recording import load_recordings
-    from ctrlgen.scenario import load_scenario
-    from ctrlgen.simulation import Trace, simulate
-    from ctrlgen.solution import Solution, solve
+    from ctrlgen.model.feedforward import Controller, Status
+    from ctrlgen.model.model import Model, build_model
+    from ctrlgen.model.simulation import Trace, simulate
+    from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
+    from ctrlgen.recordings.reader import load_recordings
+    from ctrlgen.trajectory.scenario import load_scenario
+    from ctrlgen.trajectory.solution import Solution, solve
     from ctrlgen.verification.comparison import Comparison, compare
 
-_HOME = {
-    "verification.comparison": ("Comparison", "compare"), "controller": ("Controller", "Status"), "devices": ("load_device",),
+_EXPORTS = {
+    "app.pipeline": ("Outcome", "run"),
+    "core.errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"),
+    "devices": ("load_device",),
     "devices.user": ("user_device",),
-    "diagnosis.diagnosis": ("Diagnosis",), "diagnosis.job": ("diagnose",), "recording": ("load_recordings",),
-    "errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"), "firmware.folder": ("generate",),
-    "job": ("Outcome", "run"), "model": ("Model", "build_model"), "readings": ("Record", "record_readings"), "scenario": ("load_scenario",),
-    "simulation": ("Trace", "simulate"), "solution": ("Solution", "solve"),
-}  # fmt: skip
-_MODULE = {name: module for module, names in _HOME.items() for name in names}
+    "diagnosis.pipeline": ("diagnose",),
+    "diagnosis.selection.diagnosis": ("Diagnosis",),
+    "firmware.folder": ("generate",),
+    "model.feedforward": ("Controller", "Status"),
+    "model.model": ("Model", "build_model"),
+    "model.simulation": ("Trace", "simulate"),
+    "model.virtual_sensors": ("SensorReadings", "simulate_sensors"),
+    "recordings.reader": ("load_recordings",),
+    "trajectory.scenario": ("load_scenario",),
+    "trajectory.solution": ("Solution", "solve"),
+    "verification.comparison": ("Comparison", "compare"),
+}
+_MODULE = {name: module for module, names in _EXPORTS.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
@@ -52,7 +61,7 @@ __all__ = [
     "InputError",
     "Model",
     "Outcome",
-    "Record",
+    "SensorReadings",
     "Solution",
     "SolverError",
     "Status",
@@ -67,9 +76,9 @@ __all__ = [
     "load_device",
     "load_recordings",
     "load_scenario",
-    "record_readings",
     "run",
     "simulate",
+    "simulate_sensors",
     "solve",
     "user_device",
 ]

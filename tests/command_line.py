@@ -26,7 +26,7 @@ def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[s
 def _server() -> multiprocessing.context.ForkServerContext:
     os.environ["COLUMNS"] = "200"  # read where the consoles are made, at import
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["ctrlgen.cli"])
+    context.set_forkserver_preload(["ctrlgen.app.cli"])
     return context
 
 

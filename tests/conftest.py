@@ -8,8 +8,8 @@ import pytest
 from package_programs import STRICT, run
 
 from ctrlgen import build_model, generate, load_device, load_scenario, solve
-from ctrlgen.figures import draw_all
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.reporting.plots import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
@@ -55,8 +55,8 @@ def effect_device(*effects: dict):
     """The MEMS hexapod with effects, as a device file with [[effect]] tables would give."""
     import tomllib
 
+    from ctrlgen.core.files import validate
     from ctrlgen.devices import Device
-    from ctrlgen.files import validate
 
     table = tomllib.loads(DEVICE.read_text())
     table["effect"] = list(effects)

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from ctrlgen.errors import InputError
-from ctrlgen.recording import load_recordings
+from ctrlgen.core.errors import InputError
+from ctrlgen.recordings.reader import load_recordings
 
 AXES = ("1X", "1Y", "2X", "2Y", "3X", "3Y")
 N = 400

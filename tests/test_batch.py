@@ -19,12 +19,12 @@ from conftest import SCENARIOS
 from test_diagnosis_report import axis_recording
 
 import ctrlgen
-from ctrlgen.batch import load_batch, run_batch
-from ctrlgen.cli import execute
-from ctrlgen.diagnosis.bootstrap import block_length, bootstrap, redrawn
-from ctrlgen.effect import Effect
-from ctrlgen.errors import InputError
-from ctrlgen.recording import Record
+from ctrlgen.app.batch import load_batch, run_batch
+from ctrlgen.app.cli import execute
+from ctrlgen.core.errors import InputError
+from ctrlgen.diagnosis.evidence.bootstrap import block_length, bootstrap, redrawn
+from ctrlgen.effects import Effect
+from ctrlgen.recordings.recording import Record
 
 SERVO = 'kind = "servo"\nname = "table"\ntitle = "a table"\nsource = "an example"\ntravel = "90 deg"\n'
 RECORD = '[[record]]\nfile = "poses.csv"\nrole = "{}"\nrows = [{}, {}]\n'

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from ctrlgen.core.errors import InputError
+from ctrlgen.core.files import validate
 from ctrlgen.devices.base import Section, _namespace
 from ctrlgen.devices.hinge import Hinge
-from ctrlgen.errors import InputError
-from ctrlgen.files import validate
 from ctrlgen.physics import circular_hinge as c
 from ctrlgen.physics import circular_hinge_table as table
 from ctrlgen.physics.circular_hinge_table import ALPHA, DELTA_X, DELTA_Y, LOCKED, Geometry

@@ -17,7 +17,7 @@ from ctrlgen import Controller, CtrlgenError, build_model, load_scenario
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.folder import generate
-from ctrlgen.verification.toolchains import FLAGS
+from ctrlgen.firmware.toolchains import FLAGS
 
 GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"
 NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")

@@ -7,9 +7,9 @@ import re
 import pytest
 
 from ctrlgen import ToolError
+from ctrlgen.firmware import toolchains
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import generate
-from ctrlgen.verification import toolchains
 from ctrlgen.verification.comparison import compare
 
 

@@ -7,10 +7,10 @@ import pytest
 from conftest import ROOT
 
 import ctrlgen
-from ctrlgen import conditioning
-from ctrlgen.errors import InputError
-from ctrlgen.model import build_model
-from ctrlgen.recording import load_recordings
+from ctrlgen.core.errors import InputError
+from ctrlgen.model.model import build_model
+from ctrlgen.recordings import preprocessing
+from ctrlgen.recordings.reader import load_recordings
 
 H, N = 1e-3, 4000
 T = H * np.arange(N)
@@ -72,5 +72,5 @@ def test_a_cut_off_that_the_kept_rows_cannot_hold_is_refused(loaded):
 
 
 def test_a_low_pass_has_no_phase():
-    y = conditioning.low_passed(np.sin(2 * np.pi * 20 * T), H, 100.0)
+    y = preprocessing.low_passed(np.sin(2 * np.pi * 20 * T), H, 100.0)
     assert y[200:-200] == pytest.approx(np.sin(2 * np.pi * 20 * T)[200:-200], abs=1e-3)

@@ -10,9 +10,9 @@ from conftest import DEVICE
 from scipy.optimize import lsq_linear
 
 from ctrlgen import Controller, Status, build_model, simulate
+from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.files import validate
-from ctrlgen.inverse import _solve, _Values
+from ctrlgen.model.inverse import _solve, _Values
 
 NM, H = 1e-9, 1e-3
 

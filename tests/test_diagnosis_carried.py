@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from conftest import SCENARIOS
 
-from ctrlgen import exponential, load_device
-from ctrlgen.diagnosis import equations
-from ctrlgen.diagnosis.descent import levenberg_marquardt
-from ctrlgen.diagnosis.hypotheses import hypotheses, nominal_links
-from ctrlgen.diagnosis.response import Response
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.recording import Record
+from ctrlgen import load_device
+from ctrlgen.diagnosis.estimation import sample_equations
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import hypotheses, nominal_links
+from ctrlgen.model import integrators
+from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
+from ctrlgen.recordings.recording import Record
 
 H, N = 1e-3, 300
 AXIS = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
@@ -80,19 +81,19 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
     assert np.all(np.abs(found - wanted).max(axis=(0, 1)) < 1e-10 * size)
 
 
-@pytest.mark.parametrize("worth", [equations.WORTH, -1], ids=["parameters", "constants"])
+@pytest.mark.parametrize("worth", [sample_equations.WORTH, -1], ids=["parameters", "constants"])
 @pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.long)], ids=["held", "linear"])
 @pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.long), 3])
 @pytest.mark.parametrize("text, size", [(AXIS, 1.0), (AXIS + LOOP, 4e-5)], ids=["open", "loop"])
 @pytest.mark.parametrize("effects", [("creep", "bouc_wen", "resonance", "coulomb"), ("creep", "bouc_wen", "resonance")])
 def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, effects, text, size, steps, linear, worth):
-    monkeypatch.setattr(exponential, "substeps", lambda *_: steps)
+    monkeypatch.setattr(integrators, "substeps", lambda *_: steps)
     monkeypatch.setattr(
-        exponential, "SOLVING", 14
+        integrators, "SOLVING", 14
     )  # to the end: where N is solved for, slopes of steps on the way are others
-    monkeypatch.setattr(equations, "WORTH", worth)
+    monkeypatch.setattr(sample_equations, "WORTH", worth)
     r, p = response(text, effects, linear, tmp_path)
-    assert isinstance(r._equations.steps, exponential.Sticking) == ("coulomb" in effects)
+    assert isinstance(r._equations.steps, integrators.Sticking) == ("coulomb" in effects)
     assert r._equations.model.held.numel() == ("loop" in text)
     moved = record(size)
     y, Y = r.sensitivities(moved, p)

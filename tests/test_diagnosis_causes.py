@@ -9,26 +9,26 @@ import pytest
 from scipy.signal import lfilter
 from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, record
 
-from ctrlgen.diagnosis.adequacy import judge
-from ctrlgen.diagnosis.fit import Fit, Fitter
-from ctrlgen.diagnosis.forecast import uncertainty
-from ctrlgen.diagnosis.hypotheses import HALF, Hypothesis
-from ctrlgen.diagnosis.learnt import learn_guessed
-from ctrlgen.diagnosis.noise import coloured, estimate
-from ctrlgen.diagnosis.pitches import both, jumps, pitches
-from ctrlgen.diagnosis.quiet import quiet_noise
-from ctrlgen.diagnosis.read_off import read_off
-from ctrlgen.diagnosis.resolved import resolved
-from ctrlgen.diagnosis.response import Response
-from ctrlgen.diagnosis.screen import Screen
-from ctrlgen.diagnosis.search import Searcher
-from ctrlgen.diagnosis.spikes import alone
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.diagnosis.trial import Trial
-from ctrlgen.diagnosis.weighing import Weighing
-from ctrlgen.effect import Place
-from ctrlgen.lattice import lattice
-from ctrlgen.recording import Recording
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.isolated_outliers import alone
+from ctrlgen.diagnosis.estimation.noise import coloured, estimate
+from ctrlgen.diagnosis.estimation.noise_update import learn_guessed
+from ctrlgen.diagnosis.estimation.prediction_uncertainty import uncertainty
+from ctrlgen.diagnosis.estimation.residual_noise import quiet_noise
+from ctrlgen.diagnosis.estimation.residual_tests import judge
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import HALF, Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import Trial
+from ctrlgen.diagnosis.selection.direct_detection import read_off
+from ctrlgen.diagnosis.selection.line_resolvability import resolved
+from ctrlgen.diagnosis.selection.model_selection import Weighing
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
+from ctrlgen.effects import Place
+from ctrlgen.numerics.quantisation_step import lattice
+from ctrlgen.recordings.recording import Recording
 
 FINE = 10
 BACKLASH = Hypothesis("backlash", "stage:axis", "axis")

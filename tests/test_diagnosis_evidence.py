@@ -11,27 +11,28 @@ from conftest import SCENARIOS
 from scipy.signal import cont2discrete, lfilter
 
 from ctrlgen import build_model, load_device, load_scenario
-from ctrlgen.diagnosis.along import along
-from ctrlgen.diagnosis.detectable import detectable
-from ctrlgen.diagnosis.drives import admissible, shapes
-from ctrlgen.diagnosis.evidence import evidence
-from ctrlgen.diagnosis.experiment import separate
-from ctrlgen.diagnosis.fit import Fitter
-from ctrlgen.diagnosis.free import free
-from ctrlgen.diagnosis.hypotheses import Hypothesis, written
-from ctrlgen.diagnosis.lines import lines
-from ctrlgen.diagnosis.noise import Noise, estimate
-from ctrlgen.diagnosis.plain import plain
-from ctrlgen.diagnosis.profile import BOUNDED, profiles
-from ctrlgen.diagnosis.proposal import files
-from ctrlgen.diagnosis.response import Response
-from ctrlgen.diagnosis.scatter import deviations, sandwich_over_model
-from ctrlgen.diagnosis.screen import Screen
-from ctrlgen.diagnosis.search import Searcher
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.diagnosis.unknown import unknown
-from ctrlgen.diagnosis.where import where
-from ctrlgen.recording import Record, Recording, load_recordings
+from ctrlgen.core.to_json import plain
+from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.estimation.noise import Noise, estimate
+from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, profiles
+from ctrlgen.diagnosis.estimation.robust_covariance import deviations, sandwich_over_model
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.evidence.detectability import detectable
+from ctrlgen.diagnosis.evidence.excitation_signals import admissible, shapes
+from ctrlgen.diagnosis.evidence.experiment_design import separate
+from ctrlgen.diagnosis.evidence.experiment_files import files
+from ctrlgen.diagnosis.evidence.ltv_linearisation import along
+from ctrlgen.diagnosis.evidence.residual_localisation import where
+from ctrlgen.diagnosis.evidence.spectral_lines import lines
+from ctrlgen.diagnosis.evidence.supporting_analyses import evidence
+from ctrlgen.diagnosis.evidence.unknown_input import free
+from ctrlgen.diagnosis.evidence.unmodelled_dynamics import unknown
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, written
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.recordings.reader import load_recordings
+from ctrlgen.recordings.recording import Record, Recording
 
 H, N, NOISE = 1e-3, 2500, 5e-9
 SETTLING = 0.5  # s, some dozen time constants of the stage

@@ -10,11 +10,11 @@ from test_batch import SERVO, servo_poses
 from test_diagnosis_report import AXIS, MESO, axis_recording, poses_recording
 
 import ctrlgen
-from ctrlgen.diagnosis.diagnosis import CONSISTENT, EXPLAINED, UNEXPLAINED
-from ctrlgen.diagnosis.job import diagnose_into
-from ctrlgen.diagnosis.words import next_steps, sentence
-from ctrlgen.effect import Effect
-from ctrlgen.errors import InputError
+from ctrlgen.core.errors import InputError
+from ctrlgen.diagnosis.pipeline import diagnose_into
+from ctrlgen.diagnosis.report.narrative import next_steps, sentence
+from ctrlgen.diagnosis.selection.diagnosis import CONSISTENT, EXPLAINED, UNEXPLAINED
+from ctrlgen.effects import Effect
 
 
 @pytest.fixture(scope="module", autouse=True)

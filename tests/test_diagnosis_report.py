@@ -15,22 +15,30 @@ import pytest
 from conftest import SCENARIOS
 
 import ctrlgen
-from ctrlgen.cli import execute
-from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, Estimate, Finding
-from ctrlgen.diagnosis.hypotheses import Hypothesis
-from ctrlgen.diagnosis.job import diagnose_into, unfinished
-from ctrlgen.diagnosis.page import Provenance, page
-from ctrlgen.diagnosis.pictures import POINTS, _density, thinned
-from ctrlgen.diagnosis.plain import plain
-from ctrlgen.diagnosis.profile import BOUNDED, Profile
-from ctrlgen.diagnosis.record import as_dict
-from ctrlgen.diagnosis.response import Response
-from ctrlgen.diagnosis.words import gathered, interval, next_steps, sentence
-from ctrlgen.diagnosis.writeback import next_text
-from ctrlgen.effect import Effect
+from ctrlgen.app.cli import execute
+from ctrlgen.core.to_json import plain
+from ctrlgen.core.units import from_si
+from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, Profile
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.pipeline import diagnose_into, unfinished
+from ctrlgen.diagnosis.report.diagnosis_json import as_dict
+from ctrlgen.diagnosis.report.html_report import Provenance, page
+from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
+from ctrlgen.diagnosis.report.plots import POINTS, _density, thinned
+from ctrlgen.diagnosis.report.writeback import next_text
+from ctrlgen.diagnosis.selection.diagnosis import (
+    AMBIGUOUS,
+    CONSISTENT,
+    EXPLAINED,
+    PARTLY,
+    UNEXPLAINED,
+    Estimate,
+    Finding,
+)
+from ctrlgen.effects import Effect
 from ctrlgen.effects.quantisation import Quantisation
 from ctrlgen.effects.saturation import Saturation
-from ctrlgen.units import from_si
 
 AXIS, MESO = SCENARIOS / "devices" / "flexure_axis.toml", SCENARIOS / "devices" / "meso_hexapod.toml"
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
@@ -77,7 +85,7 @@ def poses_recording(folder: Path, device) -> Path:
     channels = tuple(f"reading.{c}" for c in model.signals["pose"].channels)
     units = model.signals["pose"].units
     drives = rng.uniform(-400e-6, 400e-6, (n, 6))
-    from ctrlgen.recording import Record
+    from ctrlgen.recordings.recording import Record
 
     none = np.zeros((n, 6))
     record = Record("", "fit", np.arange(n), np.inf, drives, none, False, None, none == 0)

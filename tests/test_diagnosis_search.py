@@ -10,18 +10,26 @@ from scipy.signal import lfilter
 from test_diagnosis_causes import BACKLASH, LATE, LIMIT, fitter_of, played
 from test_diagnosis_evidence import AXIS, NOISE, H, move
 
-from ctrlgen.diagnosis.adequacy import Adequacy
-from ctrlgen.diagnosis.descent import levenberg_marquardt
-from ctrlgen.diagnosis.diagnosis import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED, unconfirmed, verdict
-from ctrlgen.diagnosis.fit import Fit
-from ctrlgen.diagnosis.hypotheses import Hypothesis
-from ctrlgen.diagnosis.learnt import learn_colour, learn_more
-from ctrlgen.diagnosis.resolved import resolved
-from ctrlgen.diagnosis.screen import Screen, Screened, Suspect
-from ctrlgen.diagnosis.search import Searcher
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.diagnosis.trial import Search, Trial, freed
-from ctrlgen.diagnosis.weighing import Weighing
+from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.noise_update import learn_colour, learn_more
+from ctrlgen.diagnosis.estimation.residual_tests import Adequacy
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import Search, Trial, freed
+from ctrlgen.diagnosis.selection.diagnosis import (
+    AMBIGUOUS,
+    CONSISTENT,
+    EXPLAINED,
+    PARTLY,
+    UNEXPLAINED,
+    unconfirmed,
+    verdict,
+)
+from ctrlgen.diagnosis.selection.line_resolvability import resolved
+from ctrlgen.diagnosis.selection.model_selection import Weighing
+from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
+from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 
 
 def searcher_of(fitter) -> Searcher:

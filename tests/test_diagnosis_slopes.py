@@ -10,16 +10,16 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import build_model, load_device
-from ctrlgen.diagnosis import slopes as slopes_module
-from ctrlgen.diagnosis.fit import Fitter
-from ctrlgen.diagnosis.hypotheses import PARAMETER, Hypothesis, Seen
-from ctrlgen.diagnosis.noise import Noise
-from ctrlgen.diagnosis.response import Response
-from ctrlgen.diagnosis.screen import Screen
-from ctrlgen.diagnosis.slopes import Slopes
-from ctrlgen.diagnosis.spread import Spread
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.recording import Record, Recording
+from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.estimation.noise import Noise
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen
+from ctrlgen.diagnosis.selection import score_gradient as slopes_module
+from ctrlgen.diagnosis.selection.ltv_propagation import Spread
+from ctrlgen.diagnosis.selection.score_gradient import Slopes
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.recordings.recording import Record, Recording
 
 H, N = 1e-3, 700
 HEXAPOD = load_device(SCENARIOS / "devices" / "mems_hexapod.toml")

@@ -19,14 +19,14 @@ from conftest import DEVICE, SCENARIOS
 
 import ctrlgen.effects
 from ctrlgen import Controller, build_model, simulate
-from ctrlgen.chain import available, channels
+from ctrlgen.core.files import validate
+from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import Device
-from ctrlgen.effect import Effect, Place, Where
-from ctrlgen.files import validate
+from ctrlgen.effects import Effect, Place, Where
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
-from ctrlgen.units import from_si, same_dimension
-from ctrlgen.verification.toolchains import FLAGS
+from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.model.assembly import available, channels
 
 TESTED = {
     "kind": "tested_axis", "name": "tested", "title": "an axis under test", "source": "round numbers",

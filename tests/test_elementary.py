@@ -15,9 +15,9 @@ import pytest
 from ctrlgen.firmware import elementary
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.elementary import TURN_END, TURNS, elementary_text, polynomial
+from ctrlgen.firmware.toolchains import COMPILERS, FLAGS
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import Machine, available
-from ctrlgen.verification.toolchains import COMPILERS, FLAGS
 
 EXACT = np.longdouble
 PRECISE = np.finfo(EXACT).eps < 1e-18  # where it is no longer than a double, doubles are held to libm's own error

@@ -18,7 +18,7 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.fmu import write_fmus
 from ctrlgen.firmware.plant import plant_of, write_plant
-from ctrlgen.verification.toolchains import FLAGS
+from ctrlgen.firmware.toolchains import FLAGS
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is missing, the units were not run: pip install 'ctrlgen[fmi]'")
 from fmpy.fmi1 import FMICallException  # noqa: E402

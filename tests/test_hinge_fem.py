@@ -14,7 +14,7 @@ from ctrlgen.physics.circular_hinge_table import ALPHA, DELTA_Y
 
 pytest.importorskip("skfem", reason="the finite-element hinge needs scikit-fem")
 
-from ctrlgen.reference_models import hinge_fem as fem
+from ctrlgen.physics.reference_models import hinge_fem as fem
 from ctrlgen.reproduce.hinge_errors import draw_hinge_errors, hinge_errors
 
 NU = 0.33

@@ -11,9 +11,9 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import ToolError, build_model, generate, load_scenario, solve
-from ctrlgen.build_record import BUDGETS
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.reporting.build_record import BUDGETS
 from ctrlgen.verification import cores, emulation, in_loop
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import Machine, available

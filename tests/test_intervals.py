@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ctrlgen.firmware.cprint import Real, _heron, print_function
-from ctrlgen.intervals import bounds
+from ctrlgen.numerics.interval_arithmetic import bounds
 
 a, b = ca.SX.sym("a"), ca.SX.sym("b")
 EXPRESSIONS = {

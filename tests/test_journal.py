@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from test_batch import SERVO, servo_poses
 
-from ctrlgen.diagnosis import fit
-from ctrlgen.diagnosis.job import Replicates, diagnose_into, digests, unfinished
-from ctrlgen.diagnosis.journal import Journal, key_of
+from ctrlgen.diagnosis.estimation import fit
+from ctrlgen.diagnosis.estimation.checkpoint import Journal, key_of
+from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests, unfinished
 
 MADE_FROM = {"version": "1", "seed": 0, "files": {"a": "b"}}
 

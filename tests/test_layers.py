@@ -1,107 +1,99 @@
-"""The direction of the data flow: a module imports only what stands above it."""
+"""The direction of the data flow: which package may import which, and no circle among modules."""
 
 from __future__ import annotations
 
 import ast
 import re
+from graphlib import TopologicalSorter
 
 import pytest
 from conftest import ROOT, SCENARIOS
 
 PACKAGE = ROOT / "ctrlgen"
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
-LAYERS = [
-    "_version errors units",
-    "executor", "files", "reference_models reference_models.hinge_fem", "measuring_chain",
-    "physics.screw", "physics.flexure", "physics.circular_hinge", "physics.circular_hinge_table",
-    "physics.thermal_actuator", "physics.xy_stage physics.hexapod physics.meso_hexapod",
-    "physics.piezo_stack", "physics.rrr_stage",
-    "effect lattice turning play", "event frame", "effects",
-    "devices.section", "devices.ports", "devices.sensor", "devices.base", "devices.hinge",
-    "devices.mems_hexapod devices.rrr_stage devices.meso_hexapod devices.axis devices.servo devices.tested_axis devices.user", "devices",
-    "calibration pose_errors",
-    "chain", "model", "marking conditioning recording_formats recording_file", "gate", "recording",
-    "exponential", "motion", "simulation inverse", "readings intervals", "controller linearisation",
-    "paths", "scenario", "workspace", "programme", "shortfall", "solution",
-    "firmware firmware.cprint firmware.templates firmware.misra firmware.deviations firmware.spline firmware.fourier",
-    "firmware.compression firmware.elementary",
-    "firmware.online firmware.player firmware.plant firmware.fmi_calls", "firmware.vectors firmware.package", "firmware.folder",
-    "verification verification.toolchains verification.reference verification.check", "verification.host verification.cores",
-    "verification.emulation", "firmware.fmu",
-    "verification.tracking", "verification.comparison verification.rules verification.hostile verification.in_loop verification.qemu",
-    "measures", "figures", "bode report", "build_record build_figures", "build_page",
-    "reproduce reproduce.row reproduce.rounding reproduce.s0_data", "reproduce.hinge_errors reproduce.s3_tables",
-    "reproduce.s3_lengths",
-    "reproduce.s0 reproduce.s0_figures reproduce.s1 reproduce.s2 reproduce.s2_figures reproduce.s3 reproduce.s3_hinges",
-    "reproduce.all",
-    "diagnosis.plain diagnosis.mapped diagnosis.equations", "diagnosis.carried",
-    "diagnosis.response diagnosis.hypotheses diagnosis.probe diagnosis.noise diagnosis.pitches diagnosis.journal diagnosis.descent "
-    "diagnosis.quiet diagnosis.spikes",
-    "diagnosis.structure", "diagnosis.fit", "diagnosis.learnt",
-    "diagnosis.laws diagnosis.scatter", "diagnosis.spread diagnosis.profile", "diagnosis.slopes", "diagnosis.together",
-    "diagnosis.screen diagnosis.adequacy diagnosis.resolved diagnosis.forecast", "diagnosis.trial", "diagnosis.weighing",
-    "diagnosis.search",
-    "diagnosis.diagnosis", "diagnosis.read_off", "diagnosis.dead",
-    "diagnosis.along diagnosis.lines", "diagnosis.where diagnosis.free diagnosis.memory diagnosis.drives",
-    "diagnosis.empirical diagnosis.detectable diagnosis.experiment", "diagnosis.unknown diagnosis.proposal",
-    "diagnosis.evidence", "diagnosis", "diagnosis.words diagnosis.record",
-    "diagnosis.writeback diagnosis.picture_maps diagnosis.picture_sure", "diagnosis.pictures", "diagnosis.page",
-    "diagnosis.bootstrap", "diagnosis.job", "batch",
-    "job", "terminal", "commands commands.app", "commands.controllers commands.devices commands.recordings", "cli", "", "__main__",
-]  # fmt: skip
-RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row.split(" ")}
+FOUNDATION = "core numerics"
+PHYSICS = f"{FOUNDATION} physics effects devices model"
+STAGES = f"{PHYSICS} trajectory recordings firmware verification reporting"
+MAY_IMPORT = {  # package -> packages; every module may import its own package and the program's version
+    "core": "", "numerics": "",
+    "physics": FOUNDATION, "effects": FOUNDATION, "devices": f"{FOUNDATION} physics effects",
+    "model": f"{FOUNDATION} devices effects",
+    "trajectory": PHYSICS, "recordings": PHYSICS,
+    "firmware": f"{PHYSICS} trajectory", "verification": f"{PHYSICS} trajectory firmware",
+    "reporting": f"{PHYSICS} trajectory firmware verification",
+    "diagnosis.hypotheses": PHYSICS,
+    "diagnosis.estimation": f"{PHYSICS} recordings diagnosis.hypotheses",
+    "diagnosis.selection": f"{PHYSICS} recordings diagnosis.hypotheses diagnosis.estimation",
+    "diagnosis.evidence": f"{PHYSICS} recordings diagnosis.hypotheses diagnosis.estimation diagnosis.selection",
+    "diagnosis.report": f"{PHYSICS} recordings reporting diagnosis.hypotheses diagnosis.estimation diagnosis.selection",
+    "diagnosis": f"{PHYSICS} recordings diagnosis.hypotheses diagnosis.estimation diagnosis.selection diagnosis.evidence diagnosis.report",
+    "reproduce": STAGES,
+    "app": f"{STAGES} reproduce diagnosis diagnosis.selection diagnosis.evidence diagnosis.report",
+}  # fmt: skip
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
 def name_of(path) -> str:
-    """'physics.screw' for ctrlgen/physics/screw.py; effects count as one layer; '' is the package itself."""
+    """'physics.screw' for ctrlgen/physics/screw.py; '' is the package itself."""
     parts = list(path.relative_to(PACKAGE).with_suffix("").parts)
-    if parts[-1] == "__init__":
-        parts.pop()
-    return "effects" if parts[:1] == ["effects"] else ".".join(parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+NAMES = {name_of(path): path for path in MODULES}
+
+
+def package_of(name: str) -> str:
+    """'diagnosis.report' for 'diagnosis.report.plots', 'diagnosis' for 'diagnosis.pipeline', '' for '__main__'."""
+    folder = NAMES[name].parent.relative_to(PACKAGE).parts
+    return ".".join(folder[: 2 if folder[:1] == ("diagnosis",) else 1])
 
 
 def our_imports(path) -> set[str]:
-    """Modules of ours that a file imports at its top level; a type-checking block does not run."""
+    """Modules of ours that a file imports, those that it imports late or for type checkers included."""
     names = set()
-    for node in ast.parse(path.read_text()).body:  # not what only type checkers see
+    for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "ctrlgen":
             module = node.module.removeprefix("ctrlgen").removeprefix(".")
             inside = {f"{module}.{a.name}".removeprefix(".") for a in node.names}
-            names |= {name for name in inside if name in RANK} or {module}
+            names |= {name for name in inside if name in NAMES} or {module}
         elif isinstance(node, ast.Import):
             names |= {a.name.removeprefix("ctrlgen.") for a in node.names if a.name.startswith("ctrlgen.")}
     return names
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_imports_point_upwards(path):
-    name = name_of(path)
-    for imported in our_imports(path):
-        imported = "effects" if imported.startswith("effects") else imported
-        if imported == "" and name == "__main__":
-            continue
-        assert RANK[imported] <= RANK[name], f"{name} imports {imported}, which stands below it in the layout"
+@pytest.mark.parametrize("path", [p for p in MODULES if p.parent != PACKAGE], ids=name_of)
+def test_a_package_imports_only_what_it_may(path):
+    own = package_of(name_of(path))
+    allowed = {own, *MAY_IMPORT[own].split()}
+    for imported in our_imports(path) - {"_version"}:
+        assert package_of(imported) in allowed, f"{name_of(path)} imports {imported}"
 
 
-@pytest.mark.parametrize("path", [p for p in MODULES if "physics" in p.parts], ids=name_of)
-def test_the_physics_knows_no_device_file(path):
-    assert all(imported.startswith("physics") for imported in our_imports(path))
+def test_no_modules_import_each_other_in_a_circle():
+    graph = {name: {m for m in our_imports(path) if m != name} for name, path in NAMES.items() if name}
+    graph = {
+        name: {m for m in found if m and m != "effects"} for name, found in graph.items()
+    }  # that package finds its laws
+    TopologicalSorter(graph).prepare()  # raises CycleError
+
+
+def test_packages_do_not_import_each_other_in_a_circle():
+    TopologicalSorter({name: allowed.split() for name, allowed in MAY_IMPORT.items()}).prepare()
 
 
 @pytest.mark.parametrize(
-    "path", [p for p in MODULES if p.parent.name == "effects" and p.stem != "__init__"], ids=lambda p: p.stem
+    "path", [p for p in MODULES if p.parent.name == "effects" and not p.stem.startswith("_")], ids=lambda p: p.stem
 )
-def test_an_effect_needs_the_extension_point_and_nothing_else(path):
-    assert our_imports(path) - {"event", "frame", "lattice", "play", "turning"} == {
-        "effect"
-    }  # what several laws have in common
+def test_a_law_needs_the_extension_point_and_shared_helpers_and_nothing_else(path):
+    imported = our_imports(path)
+    assert "effects" in imported
+    assert all(name == "effects" or name.startswith("effects._") or name.startswith("numerics.") for name in imported)
 
 
 SHOWN = {  # the papers' figures are drawn from these, and their numbers compared
     "reproduce.all": {"circle20", "xy_stage_force"},
     "reproduce.s0_data": {"nist_hexapod"},
-    "commands.app": {"circle20"},  # the example of --help
+    "app.commands.app": {"circle20"},  # the example of --help
 }
 WORDS = {"raster", "spiral", "unreachable"}  # names of scenarios that are words: kinds of path, an exception
 

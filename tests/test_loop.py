@@ -12,7 +12,7 @@ from conftest import ROOT
 pytest.importorskip("exudyn", reason="no Exudyn: the loop needs the independent plant; pip install ctrlgen[plant]")
 
 from ctrlgen import build_model, load_device
-from ctrlgen.recording import load_recordings
+from ctrlgen.recordings.reader import load_recordings
 from plants.excitation import DRAWN, HELD, powers_held_out, powers_to_fit, record
 from plants.loop import Loop, close
 from plants.mems_hexapod import MemsHexapod

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrlgen.marking import spikes, stuck
+from ctrlgen.recordings.outliers import spikes, stuck
 
 
 @pytest.mark.parametrize("at", [1, 2, 3, 100, -4, -3, -2])

@@ -7,8 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ctrlgen import measuring_chain as chain
-from ctrlgen.measuring_chain import SENSORS, Adc, Interferometer, Recording, calibrate, find_fringes, move, record
+from ctrlgen.physics import sensor_models as chain
+from ctrlgen.physics.sensor_models import (
+    SENSORS,
+    Adc,
+    Interferometer,
+    Recording,
+    calibrate,
+    find_fringes,
+    move,
+    record,
+)
 
 LASER = Interferometer()
 NM, UM, CELSIUS = 1e-9, 1e-6, 273.15

@@ -8,8 +8,8 @@ from scipy.linalg import expm
 
 from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.devices.mems_hexapod import matrices
-from ctrlgen.linearisation import equilibrium, linearise
-from ctrlgen.motion import next_sample
+from ctrlgen.model.discretisation import next_sample
+from ctrlgen.model.linearisation import equilibrium, linearise
 from ctrlgen.physics import thermal_actuator, xy_stage
 
 POSE = np.array([0, 0, 0, 5e-6, -3e-6, 20e-6])
@@ -147,8 +147,8 @@ def test_a_voltage_drive_heats_with_its_square(device):
 
     from conftest import DEVICE
 
+    from ctrlgen.core.files import validate
     from ctrlgen.devices import Device
-    from ctrlgen.files import validate
 
     table = tomllib.loads(DEVICE.read_text())
     table["actuator"]["drive"] = "voltage"
@@ -166,8 +166,8 @@ def test_heat_crosstalk_is_in_watts_whatever_the_drive():
 
     from conftest import DEVICE
 
+    from ctrlgen.core.files import validate
     from ctrlgen.devices import Device
-    from ctrlgen.files import validate
 
     file = tomllib.loads(DEVICE.read_text())
     file["actuator"]["drive"] = "voltage"

@@ -16,8 +16,8 @@ from ctrlgen.firmware.compression import ANGLE, BUDGET, LENGTH, SHARE, compress,
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import generate
 from ctrlgen.firmware.fourier import series
-from ctrlgen.simulation import simulate
-from ctrlgen.verification.toolchains import FLAGS
+from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.model.simulation import simulate
 
 KINDS = ["closed", "raster", "limited", "short", "single", "three drives"]
 

@@ -10,12 +10,12 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import InputError, build_model, load_device
+from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.files import validate
-from ctrlgen.measuring_chain import PEAK_TO_PEAK, SENSORS, find_fringes
-from ctrlgen.model import Model
-from ctrlgen.readings import record_readings
-from ctrlgen.simulation import Trace, simulate
+from ctrlgen.model.model import Model
+from ctrlgen.model.simulation import Trace, simulate
+from ctrlgen.model.virtual_sensors import simulate_sensors
+from ctrlgen.physics.sensor_models import PEAK_TO_PEAK, SENSORS, find_fringes
 
 NM, UM, CELSIUS = 1e-9, 1e-6, 273.15
 EDDY = {"kind": "displacement", "at": "delta_x", "model": "3316"}
@@ -51,7 +51,7 @@ def test_a_recording_is_the_simulated_reading_but_for_the_stated_noise(stage):
     volts = np.tile([100.0, 40.0, 90.0], (100, 1))
     trace = simulate(stage, volts, 0.1)
     for filtered in (False, True):
-        records = record_readings(stage, trace, seed=1, filtered=filtered)
+        records = simulate_sensors(stage, trace, seed=1, filtered=filtered)
         for k, (record, sensor) in enumerate(zip(records, stage.device.sensor, strict=True)):
             settled = record.time > 1.0
             error = record.value[settled] - trace.signals["reading"][-1, k]
@@ -64,30 +64,30 @@ def test_a_recording_is_the_simulated_reading_but_for_the_stated_noise(stage):
 
 def test_the_same_seed_gives_the_same_recording_and_sensors_do_not_share_noise(stage):
     trace = ramp(stage, "delta_x", 0.0, 0.2)
-    first, again, other = (record_readings(stage, trace, seed=seed) for seed in (1, 1, 2))
+    first, again, other = (simulate_sensors(stage, trace, seed=seed) for seed in (1, 1, 2))
     assert np.array_equal(first[0].volts, again[0].volts) and not np.array_equal(first[0].volts, other[0].volts)
     twins = with_sensors("rrr_case2", EDDY, EDDY | {"at": "delta_y"})
-    one, two = record_readings(twins, ramp(twins, "delta_x", 0.0, 0.2))
+    one, two = simulate_sensors(twins, ramp(twins, "delta_x", 0.0, 0.2))
     assert not np.array_equal(one.volts, two.volts)
 
 
 def test_a_warm_room_shifts_what_a_user_makes_of_the_volts(stage):
     trace = ramp(stage, "delta_x", 0.0, 0.2)
-    cold, warm = (record_readings(stage, trace, temperature=CELSIUS + T)[0].value.mean() for T in (22, 24))
+    cold, warm = (simulate_sensors(stage, trace, temperature=CELSIUS + T)[0].value.mean() for T in (22, 24))
     assert warm - cold == pytest.approx(2 * 89e-3 * 10.264e-6, rel=0.01)  # S2 A.6.2
 
 
 def test_a_falling_sensor_is_read_the_right_way_round():
     far = {**EDDY, "sensitivity": "-10.264 um/V", "home": "10 um"}
     model = with_sensors("rrr_case2", far)
-    (record,) = record_readings(model, ramp(model, "delta_x", 50 * UM, 2.0))
+    (record,) = simulate_sensors(model, ramp(model, "delta_x", 50 * UM, 2.0))
     assert np.diff(record.volts[[0, -1]])[0] < -4.5
     assert record.value[-1] == pytest.approx(50 * UM, abs=0.05 * UM)
 
 
 def test_an_interferometer_on_the_meso_hexapod_counts_the_way():
     model = with_sensors("meso_hexapod", {"kind": "interferometer", "at": "delta_z"})
-    (record,) = record_readings(model, ramp(model, "delta_z", 20 * UM, 4.0))
+    (record,) = simulate_sensors(model, ramp(model, "delta_z", 20 * UM, 4.0))
     assert record.value is None
     fringes = find_fringes(record.volts)
     travelled = 20 * UM * np.diff(fringes.at[[0, -1]]).item() / (record.volts.size - 1)
@@ -112,12 +112,12 @@ def test_a_motion_beyond_the_range_is_refused_with_every_sensor_s_name(stage):
     with pytest.raises(
         InputError, match=r"(?s)sensor\[0\], delta_x.*-60 um.*-51\.3.*sensor\[1\], delta_y.*change home"
     ):
-        record_readings(stage, trace)
+        simulate_sensors(stage, trace)
 
 
 def test_a_device_without_sensors_says_how_to_add_one(model):
     with pytest.raises(InputError, match=r"\[\[sensor\]\]"):
-        record_readings(model, ramp(model, "delta_z", 0.0, 0.1))
+        simulate_sensors(model, ramp(model, "delta_z", 0.0, 0.1))
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ import pytest
 from conftest import ROOT
 
 import ctrlgen
-from ctrlgen.errors import InputError
-from ctrlgen.model import build_model
-from ctrlgen.pose_errors import PoseErrors
-from ctrlgen.recording import load_recordings
+from ctrlgen.core.errors import InputError
+from ctrlgen.model.model import build_model
+from ctrlgen.recordings.pose_errors import PoseErrors
+from ctrlgen.recordings.reader import load_recordings
 
 SCENARIOS = ROOT / "scenarios"
 DATA = ROOT.parent / "shared" / "recordings"

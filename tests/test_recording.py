@@ -12,9 +12,9 @@ from conftest import ROOT, SCENARIOS
 from recorded import AXES, COLUMNS, N, csv_text, described, refused, samples, two
 
 from ctrlgen import build_model, load_device
-from ctrlgen.marking import spikes, stuck
-from ctrlgen.recording import load_recordings
-from ctrlgen.recording_formats import read_table
+from ctrlgen.recordings.formats import read_table
+from ctrlgen.recordings.outliers import spikes, stuck
+from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.reproduce.s0_data import load_s0
 
 MEASURED = Path(os.environ.get("CTRLGEN_RECORDINGS", ROOT.parent / "shared" / "recordings"))

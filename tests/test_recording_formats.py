@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from recorded import csv_text, described, samples
 
-from ctrlgen.errors import InputError
-from ctrlgen.recording import load_recordings
-from ctrlgen.recording_formats import READERS, read_table
+from ctrlgen.core.errors import InputError
+from ctrlgen.recordings.formats import READERS, read_table
+from ctrlgen.recordings.reader import load_recordings
 
 
 def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:

@@ -24,13 +24,13 @@ from battery.hexapod_cases import FAULTS
 from battery.plant_hexapod import Faults, Hexapod
 from ctrlgen import load_device
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.fit import Fitter
-from ctrlgen.diagnosis.hypotheses import HALF, Hypothesis
-from ctrlgen.diagnosis.noise import estimate
-from ctrlgen.diagnosis.screen import Screen
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.effect import Effect
-from ctrlgen.recording import Recording
+from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.estimation.noise import estimate
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import HALF, Hypothesis
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.effects import Effect
+from ctrlgen.recordings.recording import Recording
 
 N = 2500
 COMPONENTS = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")

@@ -5,8 +5,8 @@ from collections import Counter
 
 import pytest
 
-from ctrlgen.measuring_chain import SENSORS
 from ctrlgen.physics import circular_hinge_table as table
+from ctrlgen.physics.sensor_models import SENSORS
 from ctrlgen.reproduce import all as everything
 from ctrlgen.reproduce import s2, s3_hinges
 from ctrlgen.reproduce.row import Row, Status

@@ -17,7 +17,7 @@ from ctrlgen.devices import rrr_stage as device_module
 from ctrlgen.physics import circular_hinge_table, piezo_stack, rrr_stage
 from ctrlgen.reproduce import s3, s3_lengths, s3_tables
 from ctrlgen.reproduce.row import Row, Status, half_unit
-from ctrlgen.workspace import Workspace
+from ctrlgen.trajectory.workspace import Workspace
 
 CASES = (1, 2)
 ROTATION_SCALE = np.array([1.0, 1.0, 30e-3])  # rotations as motion of a point 30 mm away

@@ -14,12 +14,12 @@ import pytest
 from conftest import SCENARIOS, effect_device
 
 from ctrlgen import Controller, build_model, load_scenario
-from ctrlgen.controller import Status
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.folder import CFolder, generate, write_harness
 from ctrlgen.firmware.misra import ADVISORY, MANDATORY, rule_class
+from ctrlgen.model.feedforward import Status
 from ctrlgen.verification.check import Check
 from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile

@@ -11,12 +11,12 @@ import pytest
 from conftest import ROOT, SCENARIOS
 from scipy.stats import t as student
 
-from ctrlgen.calibration import calibrate
+from ctrlgen.core.errors import InputError
 from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import matrices
-from ctrlgen.errors import InputError
 from ctrlgen.physics import meso_hexapod
-from ctrlgen.pose_errors import drift, opposites, parasitic, pose_errors, repeatability
+from ctrlgen.recordings.calibration import calibrate
+from ctrlgen.recordings.pose_errors import drift, opposites, parasitic, pose_errors, repeatability
 from ctrlgen.reproduce import s0, s0_figures
 from ctrlgen.reproduce.rounding import carried, half_units
 from ctrlgen.reproduce.row import Status

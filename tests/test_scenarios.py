@@ -10,7 +10,7 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import InputError, Unreachable, load_scenario, run
-from ctrlgen.measures import expectations, measure
+from ctrlgen.trajectory.metrics import expectations, measure
 
 ALL = sorted(path.parent.name for path in SCENARIOS.glob("*/scenario.toml"))
 
@@ -41,7 +41,7 @@ def test_scenario_gives_what_it_expects(name, tmp_path, compiler):
 
 
 def test_the_trajectory_file_has_its_columns_and_numbers(circle, tmp_path):
-    from ctrlgen.report import write_trajectory
+    from ctrlgen.reporting.report import write_trajectory
 
     write_trajectory(circle, tmp_path / "t.csv")
     with open(tmp_path / "t.csv") as file:
@@ -59,8 +59,8 @@ def test_the_trajectory_file_has_its_columns_and_numbers(circle, tmp_path):
 def test_the_report_is_one_file_that_refers_to_nothing_outside(circle, tmp_path):
     import re
 
-    from ctrlgen.figures import draw_all
-    from ctrlgen.report import write_report
+    from ctrlgen.reporting.plots import draw_all
+    from ctrlgen.reporting.report import write_report
 
     write_report(tmp_path, circle, None, expectations(circle), None, draw_all(circle))
     page = (tmp_path / "report.html").read_text()
@@ -81,7 +81,7 @@ def test_an_expectation_of_something_that_does_not_exist_is_refused(circle, name
 def test_an_expectation_that_is_missed_is_reported(circle):
     from dataclasses import replace
 
-    from ctrlgen.scenario import Expectation
+    from ctrlgen.trajectory.scenario import Expectation
 
     wrong = Expectation(value="force.1X.max", range=("1 N", "2 N"))
     file = circle.scenario.file.model_copy(update={"expect": (wrong,)})

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from ctrlgen.units import from_si, parse, same_dimension, show, to_si
+from ctrlgen.core.units import from_si, parse, same_dimension, show, to_si
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ctrlgen
-from ctrlgen.diagnosis.diagnosis import EXPLAINED
-from ctrlgen.effect import Effect
-from ctrlgen.errors import InputError
-from ctrlgen.units import to_si
+from ctrlgen.core.errors import InputError
+from ctrlgen.core.units import to_si
+from ctrlgen.diagnosis.selection.diagnosis import EXPLAINED
+from ctrlgen.effects import Effect
 
 INERTIA, WEIGHT, DAMPING, MOTOR = 2e-4, 0.02, 4e-4, 0.015
 STEP = 2e-3

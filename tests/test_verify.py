@@ -17,13 +17,14 @@ from conftest import SCENARIOS
 from markupsafe import escape
 from typer.testing import CliRunner
 
-from ctrlgen import ToolError, generate, job
-from ctrlgen.build_page import write_build
-from ctrlgen.build_record import BUDGETS, Build, record
-from ctrlgen.commands import controllers  # noqa: F401, it registers the command
-from ctrlgen.commands.app import app
+from ctrlgen import ToolError, generate
+from ctrlgen.app import pipeline
+from ctrlgen.app.commands import controllers  # noqa: F401, it registers the command
+from ctrlgen.app.commands.app import app
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.package import verify_package
+from ctrlgen.reporting.build_page import write_build
+from ctrlgen.reporting.build_record import BUDGETS, Build, record
 from ctrlgen.verification.check import Check, Finding, not_run
 from ctrlgen.verification.comparison import Comparison, Row
 from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun
@@ -179,11 +180,11 @@ def test_what_did_not_run_is_listed_and_is_neither_passed_nor_failed(example, tm
 def stubbed(monkeypatch, compiler):
     """Everything but solving, generating and writing replaced by an answer at once."""
     monkeypatch.setattr(
-        job, "run_in_loop", lambda *_: InLoop((), (), (("emulated cores", "pip install unicorn pyelftools"),))
+        pipeline, "run_in_loop", lambda *_: InLoop((), (), (("emulated cores", "pip install unicorn pyelftools"),))
     )
-    monkeypatch.setattr(job, "check_on_boards", lambda *_: ())
-    monkeypatch.setattr(job, "check_hostile", lambda *_, **__: ())
-    monkeypatch.setattr(job, "check_rules", lambda *_, **__: ())
+    monkeypatch.setattr(pipeline, "check_on_boards", lambda *_: ())
+    monkeypatch.setattr(pipeline, "check_hostile", lambda *_, **__: ())
+    monkeypatch.setattr(pipeline, "check_rules", lambda *_, **__: ())
     return monkeypatch
 
 
@@ -191,7 +192,7 @@ def stubbed(monkeypatch, compiler):
 def test_a_failing_check_gives_status_1_and_the_page_is_written(stubbed, tmp_path):
     finding = Finding("a.c", 3, "misra-c2012-15.1", "advisory", "MISRA C:2012 rule 15.1")
     failing = Check("cppcheck --addon=misra", "2.10", (), "failed", (finding,))
-    stubbed.setattr(job, "check_rules", lambda *_, **__: (failing,))
+    stubbed.setattr(pipeline, "check_rules", lambda *_, **__: (failing,))
     out = tmp_path / "out"
     done = CliRunner().invoke(app, ["verify", str(SCENARIOS / "rrr_circle"), "--out", str(out)])
     assert done.exit_code == 1
@@ -203,13 +204,13 @@ def test_c_that_a_compiler_refuses_leaves_nothing_behind(stubbed, tmp_path):
     def refuse(*_):
         raise ToolError("gcc refuses the C:\nunused")
 
-    stubbed.setattr(job, "compare", refuse)
+    stubbed.setattr(pipeline, "compare", refuse)
     with pytest.raises(ToolError, match="refuses the C"):
-        job.verify(SCENARIOS / "rrr_circle", tmp_path / "out")
+        pipeline.verify(SCENARIOS / "rrr_circle", tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.long
 def test_the_circle_passes_everything_that_is_there(compiler, tmp_path):
-    build = job.verify(SCENARIOS / "circle20", tmp_path / "out")
+    build = pipeline.verify(SCENARIOS / "circle20", tmp_path / "out")
     assert build.passed, build.failures

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from ctrlgen import InputError
-from ctrlgen.controller import Controller
-from ctrlgen.workspace import Workspace
+from ctrlgen.model.feedforward import Controller
+from ctrlgen.trajectory.workspace import Workspace
 
 UM = 1e-6
 

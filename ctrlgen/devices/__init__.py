@@ -7,9 +7,9 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file is read
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import read_toml, validate
 from ctrlgen.devices.base import Device, Limit, Links, Signal
-from ctrlgen.errors import Fault, InputError
-from ctrlgen.files import read_toml, validate
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")

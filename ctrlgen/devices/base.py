@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 import casadi as ca
 from pydantic import Field
 
+from ctrlgen.core.units import Quantity
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
-from ctrlgen.effect import Effect
-from ctrlgen.units import Quantity
+from ctrlgen.effects import Effect
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Links:
-    """The physics of one device as a chain of symbolic maps; `ctrlgen.model` joins them.
+    """The physics of one device as a chain of symbolic maps; `ctrlgen.model.model` joins them.
 
     drive u -> `heat` -> state x by `rates` -> `force` on the axis == `resistance` of the displacement d -> `pose`.
     Each map takes and gives SX column vectors in SI. A device whose actuators remember nothing has no `state` and

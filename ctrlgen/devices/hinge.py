@@ -10,10 +10,10 @@ from typing import Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
+from ctrlgen.core.units import quantity
 from ctrlgen.devices.base import Section
 from ctrlgen.physics import circular_hinge_table as table
 from ctrlgen.physics.screw import Matrix, Scalar
-from ctrlgen.units import quantity
 
 Length = quantity("mm", positive=True)
 Group = Literal[

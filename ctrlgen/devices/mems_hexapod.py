@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
+from ctrlgen.core.units import quantity
 from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
-from ctrlgen.units import quantity
 
 Length = quantity("um", positive=True)
 Angle = quantity("deg")

@@ -8,9 +8,9 @@ from typing import Literal
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.units import quantity
 from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
 from ctrlgen.physics import meso_hexapod
-from ctrlgen.units import quantity
 
 Length = quantity("mm", positive=True)
 Angle = quantity("deg")

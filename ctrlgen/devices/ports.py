@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from ctrlgen.errors import Fault
+from ctrlgen.core.errors import Fault
 
 Law = Callable[..., Any] | ca.Function
 

@@ -9,12 +9,12 @@ import casadi as ca
 import numpy as np
 from pydantic import model_validator
 
+from ctrlgen.core.units import quantity
 from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.physics import piezo_stack, rrr_stage
 from ctrlgen.physics.rrr_stage import Kinetostatics
 from ctrlgen.physics.screw import Matrix
-from ctrlgen.units import quantity
 
 Length = quantity("mm", positive=True)
 

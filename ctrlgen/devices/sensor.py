@@ -15,10 +15,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ctrlgen import measuring_chain as chain
+from ctrlgen.core.errors import Fault
+from ctrlgen.core.units import from_si, quantity, same_dimension
 from ctrlgen.devices.section import Section
-from ctrlgen.errors import Fault
-from ctrlgen.units import from_si, quantity, same_dimension
+from ctrlgen.physics import sensor_models as chain
 
 NUMBERS = (
     "sensitivity", "gain", "bandwidth", "noise", "filtered_noise", "filter_cutoff", "offset_rate", "calibrated_at",

@@ -7,8 +7,8 @@ from typing import Literal
 
 import casadi as ca
 
+from ctrlgen.core.units import quantity, written_unit
 from ctrlgen.devices.base import Device, Limit, Links, Signal
-from ctrlgen.units import quantity, written_unit
 
 Travel = quantity("deg", positive=True) | quantity("um", positive=True)
 

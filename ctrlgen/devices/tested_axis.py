@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 
 import casadi as ca
 
+from ctrlgen.core.units import quantity
 from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
-from ctrlgen.units import quantity
 
 
 class Mechanics(Section):

@@ -17,12 +17,12 @@ import casadi as ca
 import numpy as np
 from pydantic import create_model
 
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import validate
+from ctrlgen.core.units import Quantity, quantity, read_quantity, same_dimension, to_si, written_unit
 from ctrlgen.devices.base import Device, Limit, Links, Signal
 from ctrlgen.devices.ports import Law, Ports, ask
 from ctrlgen.devices.section import Section
-from ctrlgen.errors import Fault, InputError
-from ctrlgen.files import validate
-from ctrlgen.units import Quantity, quantity, read_quantity, same_dimension, to_si, written_unit
 
 SECTIONS = {
     "mechanism": "mechanism",

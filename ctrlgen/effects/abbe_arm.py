@@ -1,6 +1,6 @@
 """A sensor that does not stand in line with the point it should measure."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class AbbeArm(Effect):

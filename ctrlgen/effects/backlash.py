@@ -2,8 +2,8 @@
 
 import casadi as ca
 
-from ctrlgen.effect import Effect, Param, Place, State
-from ctrlgen.turning import turned_at
+from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects._reversal_points import turned_at
 
 
 class Backlash(Effect):

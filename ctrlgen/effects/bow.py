@@ -1,6 +1,6 @@
 """A sensor that is not straight: the first even term of its nonlinearity."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Bow(Effect):

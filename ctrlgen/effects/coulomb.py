@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Param, Place, State
 
 STILL = 1e-6  # of v_s: keeps 0/0 away
 

@@ -1,6 +1,6 @@
 """One stage carries its neighbour along."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Coupling(Effect):

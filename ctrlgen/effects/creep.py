@@ -1,6 +1,6 @@
 """A flexure or its glue keeps moving after the load has settled."""
 
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Param, Place, State
 
 RATIO = 4.0  # of the two relaxation times: between them lie two octaves, which a mixture of both spans evenly
 

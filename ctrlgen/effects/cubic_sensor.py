@@ -1,6 +1,6 @@
 """A sensor that flattens, or steepens, toward both ends of its range."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class CubicSensor(Effect):

@@ -4,7 +4,7 @@ import math
 
 import casadi as ca
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Cyclic(Effect):

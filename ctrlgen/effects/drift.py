@@ -1,6 +1,6 @@
 """A reading that moves with time alone."""
 
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Param, Place, State
 
 
 class Drift(Effect):

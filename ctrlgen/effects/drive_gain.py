@@ -1,6 +1,6 @@
 """An amplifier that delivers more or less than it is told."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class DriveGain(Effect):

@@ -1,7 +1,7 @@
 """Hysteresis of a piezo stack: the displacement lags behind the voltage."""
 
-from ctrlgen.effect import Effect, Param, Place, State
-from ctrlgen.play import followed, lagging, names
+from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects._play_operators import followed, lagging, names
 
 
 class DriveHysteresis(Effect):

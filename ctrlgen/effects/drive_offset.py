@@ -1,6 +1,6 @@
 """An amplifier that delivers something when it is told nothing."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class DriveOffset(Effect):

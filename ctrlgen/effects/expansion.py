@@ -1,6 +1,6 @@
 """Beams whose expansion, or stiffness, changes with temperature otherwise than the model says."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Expansion(Effect):

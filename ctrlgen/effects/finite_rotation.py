@@ -1,6 +1,6 @@
 """Rotations that are not infinitesimal: links turn as the mechanism moves, its Jacobian is not the one at home."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class FiniteRotation(Effect):

@@ -1,7 +1,7 @@
 """A force that sets in at a moment: something dropped on the stage, a cable that drags, air that is switched on."""
 
-from ctrlgen.effect import Effect, Param, Place
-from ctrlgen.event import CLOCK, WHEN, happened
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._smooth_step import CLOCK, WHEN, happened
 
 
 class ForceStep(Effect):

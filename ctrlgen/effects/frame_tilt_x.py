@@ -1,7 +1,7 @@
 """A frame tilted about x against the drawing."""
 
-from ctrlgen.effect import Effect, Param, Place
-from ctrlgen.frame import turned
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._rotated_frame import turned
 
 
 class FrameTiltX(Effect):

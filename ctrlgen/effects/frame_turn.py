@@ -1,7 +1,7 @@
 """A platform frame turned against the drawing: one direction leaks into another."""
 
-from ctrlgen.effect import Effect, Param, Place
-from ctrlgen.frame import turned
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._rotated_frame import turned
 
 
 class FrameTurn(Effect):

@@ -1,6 +1,6 @@
 """A heater whose resistance changes as it gets hot, under an amplifier set for the cold one."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class HeaterResistance(Effect):

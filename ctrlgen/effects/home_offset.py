@@ -1,6 +1,6 @@
 """A sensor that does not read zero at home."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class HomeOffset(Effect):

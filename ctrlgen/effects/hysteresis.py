@@ -1,8 +1,8 @@
 """Hysteresis of many small slipping contacts."""
 
-from ctrlgen.effect import Effect, Param, Place, State
-from ctrlgen.play import followed, lagging, names
-from ctrlgen.turning import turned_at
+from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects._play_operators import followed, lagging, names
+from ctrlgen.effects._reversal_points import turned_at
 
 
 class Hysteresis(Effect):

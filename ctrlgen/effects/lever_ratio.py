@@ -1,6 +1,6 @@
 """A lever whose arms are not as drawn."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class LeverRatio(Effect):

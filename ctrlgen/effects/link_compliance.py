@@ -1,6 +1,6 @@
 """A joint or strut that gives way: the platform tilts when it is moved."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class LinkCompliance(Effect):

@@ -1,6 +1,6 @@
 """Stages that stiffen: they yield less to the load of the links, the further they are driven."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class LinkLoad(Effect):

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Param, Place, State
 
 TIMES = tuple(10 ** (j / 2) for j in range(9))  # of relaxation, per shortest one
 

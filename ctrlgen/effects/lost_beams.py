@@ -1,7 +1,7 @@
 """Beams, or a winding, that break at a moment."""
 
-from ctrlgen.effect import Effect, Param, Place
-from ctrlgen.event import CLOCK, WHEN, happened
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._smooth_step import CLOCK, WHEN, happened
 
 
 class LostBeams(Effect):

@@ -1,6 +1,6 @@
 """A lever that gives way under the force it carries."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class LostMotion(Effect):

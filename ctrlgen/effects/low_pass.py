@@ -1,6 +1,6 @@
 """A sensor, or its filter, that comes late."""
 
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Param, Place, State
 
 
 class LowPass(Effect):

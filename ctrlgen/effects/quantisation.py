@@ -3,8 +3,8 @@
 import casadi as ca
 import numpy as np
 
-from ctrlgen.effect import Effect, Param, Place
-from ctrlgen.lattice import lattice
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.numerics.quantisation_step import lattice
 
 
 class Quantisation(Effect):

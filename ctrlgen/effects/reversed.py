@@ -1,6 +1,6 @@
 """An actuator connected the wrong way round."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Reversed(Effect):

@@ -1,6 +1,6 @@
 """A second thermal mass between heater and beams: part of the heat comes late."""
 
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Param, Place, State
 
 
 class SecondPole(Effect):

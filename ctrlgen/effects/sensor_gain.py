@@ -1,6 +1,6 @@
 """A sensor whose scale is off."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class SensorGain(Effect):

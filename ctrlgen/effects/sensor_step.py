@@ -1,7 +1,7 @@
 """A reading that jumps at a moment: counts lost, a target touched."""
 
-from ctrlgen.effect import Effect, Param, Place
-from ctrlgen.event import CLOCK, WHEN, happened
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._smooth_step import CLOCK, WHEN, happened
 
 
 class SensorStep(Effect):

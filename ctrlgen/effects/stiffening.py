@@ -1,6 +1,6 @@
 """A clamped flexure stretches as it bends."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Stiffening(Effect):

@@ -1,6 +1,6 @@
 """A stage stiffer, or softer, than the drawing says."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Stiffness(Effect):

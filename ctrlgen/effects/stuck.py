@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Stuck(Effect):

@@ -1,6 +1,6 @@
 """Two actuators whose leads are exchanged."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class Swapped(Effect):

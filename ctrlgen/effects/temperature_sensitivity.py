@@ -1,6 +1,6 @@
 """A reading that moves with the temperature of the surroundings."""
 
-from ctrlgen.effect import Effect, Param, Place
+from ctrlgen.effects import Effect, Param, Place
 
 
 class TemperatureSensitivity(Effect):

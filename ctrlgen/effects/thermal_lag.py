@@ -1,6 +1,6 @@
 """A share of the actuator's action that needs time to build up."""
 
-from ctrlgen.effect import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Param, Place, State
 
 THIRD = 9 / 25  # of the second time constant: a rod heated at one end has them as 1, 1/9, 1/25
 

@@ -12,14 +12,14 @@ from functools import cache
 
 import numpy as np
 
-from ctrlgen.errors import SolverError
+from ctrlgen.core.errors import SolverError
+from ctrlgen.core.units import same_dimension
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.fourier import FEWEST, Fourier, series
 from ctrlgen.firmware.spline import Spline, fit
-from ctrlgen.model import Model
-from ctrlgen.simulation import simulate
-from ctrlgen.solution import Solution
-from ctrlgen.units import same_dimension
+from ctrlgen.model.model import Model
+from ctrlgen.model.simulation import simulate
+from ctrlgen.trajectory.solution import Solution
 
 LENGTH, ANGLE = 1e-10, 1e-8  # m, rad: what a compressed drive may move what is followed
 SHARE = 0.8  # of that; the rest is left to compilers that fuse a product and a sum

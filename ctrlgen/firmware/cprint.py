@@ -21,8 +21,8 @@ from enum import Enum
 import casadi as ca
 import numpy as np
 
-from ctrlgen.errors import CtrlgenError
-from ctrlgen.intervals import EVERYTHING, Interval, intervals, product_of, quotient_of
+from ctrlgen.core.errors import CtrlgenError
+from ctrlgen.numerics.interval_arithmetic import EVERYTHING, Interval, intervals, product_of, quotient_of
 
 
 class Real(Enum):

@@ -20,17 +20,17 @@ from typing import Any
 import numpy as np
 
 from ctrlgen._version import __version__
-from ctrlgen.controller import Controller
-from ctrlgen.errors import CtrlgenError, Fault, InputError, ToolError
-from ctrlgen.files import whole_folder, write_bytes
+from ctrlgen.core.errors import CtrlgenError, Fault, InputError, ToolError
+from ctrlgen.core.files import whole_folder, write_bytes
+from ctrlgen.core.units import base_unit, exponents, from_si
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.fmi_calls import FOREIGN_TYPES, REFUSED_2, REFUSED_3
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.plant import Plant, plant_of, write_plant
 from ctrlgen.firmware.templates import comment, write
-from ctrlgen.scenario import Scenario
-from ctrlgen.units import base_unit, exponents, from_si
-from ctrlgen.verification.toolchains import compile_c, find_compilers
+from ctrlgen.firmware.toolchains import compile_c, find_compilers
+from ctrlgen.model.feedforward import Controller
+from ctrlgen.trajectory.scenario import Scenario
 
 VERSIONS = (3, 2)
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)  # of every file in an FMU, so that the same input gives the same bytes

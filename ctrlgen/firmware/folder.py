@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ctrlgen.controller import Controller
 from ctrlgen.firmware.compression import Compression, compress
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.deviations import deviations_context
@@ -24,9 +23,10 @@ from ctrlgen.firmware.package import write_package
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.vectors import played_vectors, vectors
-from ctrlgen.model import Model
-from ctrlgen.scenario import Scenario
-from ctrlgen.solution import Solution
+from ctrlgen.model.feedforward import Controller
+from ctrlgen.model.model import Model
+from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.solution import Solution
 
 PIECES = ("online", "player", "selftest", "vectors")
 
@@ -64,7 +64,7 @@ def generate(
 ) -> CFolder:
     """Writes the package of `scenario` to `out`; with a `solution` also its player. Raises CtrlgenError.
 
-    `figures` (name -> SVG text, as `ctrlgen.figures.draw_all` gives) are put beside the README.
+    `figures` (name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives) are put beside the README.
     """
     controller = Controller(model, scenario.file.follow, scenario.sample_time)
     played = solution if scenario.sample_time else None

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from ctrlgen._version import __version__
-from ctrlgen.controller import INSET, SLACK, TRIALS, Controller
+from ctrlgen.core.units import base_unit, show
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
-from ctrlgen.scenario import Scenario
-from ctrlgen.units import base_unit, show
+from ctrlgen.model.feedforward import INSET, SLACK, TRIALS, Controller
+from ctrlgen.trajectory.scenario import Scenario
 
 FLOAT_SLACK = 4e-6  # as SLACK of the controller, for float: 0.4 mK, which four roundings of a temperature amount to
 

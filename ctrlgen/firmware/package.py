@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from ctrlgen._version import __version__
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import read_text, write_text
+from ctrlgen.core.units import base_unit
 from ctrlgen.devices.base import Signal
-from ctrlgen.errors import Fault, InputError
-from ctrlgen.files import read_text, write_text
 from ctrlgen.firmware.compression import Candidate
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.templates import comment, write
-from ctrlgen.scenario import Scenario
-from ctrlgen.units import base_unit
+from ctrlgen.trajectory.scenario import Scenario
 
 MANIFEST = "manifest.json"
 LICENCE = "The generated code belongs to the user of ctrlgen who generated it; no warranty."

@@ -1,10 +1,10 @@
-"""Model -> the plant as freestanding C99: what `ctrlgen.simulation.simulate` computes, one sample a call.
+"""Model -> the plant as freestanding C99: what `ctrlgen.model.simulation.simulate` computes, one sample a call.
 
     x' = step(x, z, u),  0 = g(x', z', u) by Newton's method, then every signal of (x', z', u)
 
 with the drive u held over the sample. A stage with inertia takes the exponential steps of
-`ctrlgen.exponential` for (x, z) instead. The memories of effects are part of x. The sensors' readings are those before
-the measuring chain: its noise and its converter (`ctrlgen.readings`) are not in the C.
+`ctrlgen.model.integrators` for (x, z) instead. The memories of effects are part of x. The sensors' readings are those before
+the measuring chain: its noise and its converter (`ctrlgen.model.virtual_sensors`) are not in the C.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen._version import __version__
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
-from ctrlgen.errors import Fault, InputError
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment, write
-from ctrlgen.model import Model, build_model
-from ctrlgen.motion import balanced, next_sample
-from ctrlgen.scenario import Scenario
-from ctrlgen.units import base_unit
+from ctrlgen.model.discretisation import balanced, next_sample
+from ctrlgen.model.model import Model, build_model
+from ctrlgen.trajectory.scenario import Scenario
 
-NEWTON_MOST = 50  # steps, as of the balance in `ctrlgen.simulation`
+NEWTON_MOST = 50  # steps, as of the balance in `ctrlgen.model.simulation`
 ROUNDS = 100  # of state, then displacement, on the way to an equilibrium
 ARRIVED = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-5}  # of a typical size: a Newton step so short leaves rounding only
 

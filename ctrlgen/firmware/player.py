@@ -9,7 +9,7 @@ import numpy as np
 from ctrlgen.firmware.compression import BUDGET, Candidate, Compression, Table
 from ctrlgen.firmware.spline import Spline
 from ctrlgen.firmware.templates import comment
-from ctrlgen.solution import Solution
+from ctrlgen.trajectory.solution import Solution
 
 
 def player_context(solution: Solution, compression: Compression, prefix: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import jinja2
 
-from ctrlgen.files import write_text
+from ctrlgen.core.files import write_text
 
 
 def codegen_folder() -> Path:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller import Controller, Status
 from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.online import FLOAT_SLACK
+from ctrlgen.model.feedforward import Controller, Status
 
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
 PLAYED = 17  # samples of the player

@@ -9,15 +9,15 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 
-from ctrlgen.figures import STYLE, draw_path, draw_signal, draw_stage_force, svg
-from ctrlgen.files import write_text
-from ctrlgen.model import build_model
-from ctrlgen.report import render
+from ctrlgen.core.files import write_text
+from ctrlgen.model.model import build_model
+from ctrlgen.reporting.html import render
+from ctrlgen.reporting.plots import STYLE, draw_path, draw_signal, draw_stage_force, svg
 from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
 from ctrlgen.reproduce.row import Row
 from ctrlgen.reproduce.s0_data import SCENARIOS
-from ctrlgen.scenario import load_scenario
-from ctrlgen.solution import solve
+from ctrlgen.trajectory.scenario import load_scenario
+from ctrlgen.trajectory.solution import solve
 
 
 def _s3_rows() -> list[Row]:

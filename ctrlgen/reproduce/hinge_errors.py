@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ctrlgen.figures import COLOURS, STYLE, svg
 from ctrlgen.physics import circular_hinge_table as table
-from ctrlgen.reference_models import hinge_fem
+from ctrlgen.physics.reference_models import hinge_fem
+from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 RATIOS = tuple(np.round(np.arange(0.05, 0.801, 0.025), 3))
 POISSON = 0.33  # S3 Table 1

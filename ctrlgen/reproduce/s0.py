@@ -13,13 +13,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.meso_hexapod import MesoHexapod
 from ctrlgen.physics import meso_hexapod
-from ctrlgen.pose_errors import CHANNELS, parasitic, pose_errors
+from ctrlgen.recordings.pose_errors import CHANNELS, parasitic, pose_errors
 from ctrlgen.reproduce.rounding import carried, half_units
 from ctrlgen.reproduce.row import Row, half_unit
 from ctrlgen.reproduce.s0_data import Recordings, load_s0
-from ctrlgen.units import from_si, to_si
 
 UNITS = ("deg",) * 3 + ("um",) * 3
 SCALE = np.array([to_si(1.0, unit) for unit in UNITS])

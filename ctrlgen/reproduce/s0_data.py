@@ -10,14 +10,14 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import read_text
+from ctrlgen.core.units import parse
 from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import MesoHexapod
-from ctrlgen.errors import Fault, InputError
-from ctrlgen.files import read_text
-from ctrlgen.paths import Frame, read_poses
 from ctrlgen.physics import meso_hexapod
-from ctrlgen.pose_errors import CHANNELS
-from ctrlgen.units import parse
+from ctrlgen.recordings.pose_errors import CHANNELS
+from ctrlgen.trajectory.paths import Frame, read_poses
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 FRAME = Frame(CHANNELS, ("rad",) * 3 + ("um",) * 3)

@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.figures import COLOURS, STYLE, svg
-from ctrlgen.pose_errors import BOX, CHANNELS, Parasitic, PoseErrors, parasitic, pose_errors
+from ctrlgen.core.units import from_si
+from ctrlgen.recordings.pose_errors import BOX, CHANNELS, Parasitic, PoseErrors, parasitic, pose_errors
+from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 from ctrlgen.reproduce.s0_data import Recordings, load_s0
-from ctrlgen.units import from_si
 
 BLUE, RED = COLOURS[0], COLOURS[2]
 PARTS = {"rotation": (slice(0, 3), "deg"), "translation": (slice(3, 6), "um")}

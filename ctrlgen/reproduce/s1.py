@@ -7,13 +7,13 @@ from typing import cast
 
 import numpy as np
 
-from ctrlgen.controller import Controller
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mems_hexapod import MemsHexapod, matrices
-from ctrlgen.model import Model, build_model
+from ctrlgen.model.feedforward import Controller
+from ctrlgen.model.model import Model, build_model
 from ctrlgen.physics import hexapod, xy_stage
 from ctrlgen.reproduce.row import Row, half_unit
-from ctrlgen.workspace import Workspace
+from ctrlgen.trajectory.workspace import Workspace
 
 DEVICE = Path(__file__).resolve().parents[2] / "scenarios" / "devices" / "mems_hexapod.toml"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import pi
 
-from ctrlgen.measuring_chain import SENSORS, Sensor, max_deviation
+from ctrlgen.core.units import parse, to_si
+from ctrlgen.physics.sensor_models import SENSORS, Sensor, max_deviation
 from ctrlgen.reproduce.row import Row
-from ctrlgen.units import parse, to_si
 
 UNPUBLISHED = "measured; the recordings behind it are not published"
 NM, UM = 1e9, 1e6

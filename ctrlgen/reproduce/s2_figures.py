@@ -6,9 +6,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ctrlgen.figures import COLOURS, STYLE, svg
-from ctrlgen.measuring_chain import SENSORS, Interferometer, calibrate, find_fringes, record
-from ctrlgen.units import from_si, to_si
+from ctrlgen.core.units import from_si, to_si
+from ctrlgen.physics.sensor_models import SENSORS, Interferometer, calibrate, find_fringes, record
+from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 SECONDS = 12.0  # of a recording; the printed ones are not published
 TEMPERATURES = (19.0, 26.0)  # degC

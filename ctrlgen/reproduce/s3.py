@@ -9,6 +9,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.units import from_si
 from ctrlgen.devices.rrr_stage import stage
 from ctrlgen.physics.rrr_stage import Kinetostatics
 from ctrlgen.reproduce.row import Row, half_unit
@@ -24,7 +25,6 @@ from ctrlgen.reproduce.s3_tables import (
     entries,
     unit,
 )
-from ctrlgen.units import from_si
 
 POINT = 0.1  # percentage points that Table 6 may be off: it and the entries of Table 5 are rounded
 COMPLETE = {"C_inFin": "input_compliance", "J": "complete_J"}  # the same with the platform-held compliance

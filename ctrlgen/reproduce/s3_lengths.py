@@ -16,11 +16,11 @@ from typing import cast
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.units import to_si
 from ctrlgen.devices import load_device
 from ctrlgen.devices.rrr_stage import RrrStage, stage
 from ctrlgen.reproduce.row import half_unit
 from ctrlgen.reproduce.s3_tables import CASES, SIGN_LOST_4, TABLE_4, entries, unit
-from ctrlgen.units import to_si
 
 DEVICES = Path(__file__).parents[2] / "scenarios" / "devices"
 LENGTHS = ("l1", "l2", "l3", "l4", "l5", "l6")

@@ -1,7 +1,7 @@
 """The generated C against the model: build it strictly, run it, say where it first differs.
 
 Every compiler present builds every arithmetic. Three references: the controller evaluated by CasADi
-(`ctrlgen.controller`), IPOPT's solution of the scenario, and the model simulated forward with the
+(`ctrlgen.model.feedforward`), IPOPT's solution of the scenario, and the model simulated forward with the
 drives that the C computed.
 """
 
@@ -17,18 +17,18 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller import INSET, Status
+from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.firmware import compression as compressed
 from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder, write_harness
-from ctrlgen.model import Model
-from ctrlgen.simulation import simulate, trace
-from ctrlgen.solution import Solution
-from ctrlgen.units import from_si, same_dimension
+from ctrlgen.firmware.toolchains import COMPILERS, find_compilers
+from ctrlgen.model.feedforward import INSET, Status
+from ctrlgen.model.model import Model
+from ctrlgen.model.simulation import simulate, trace
+from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.host import build_host, run_host
 from ctrlgen.verification.reference import Reference
-from ctrlgen.verification.toolchains import COMPILERS, find_compilers
 from ctrlgen.verification.tracking import reached
 
 # What a difference may be, and why.

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ctrlgen.errors import ToolError
+from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.verification.cores import Core
 

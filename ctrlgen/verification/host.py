@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ctrlgen.errors import ToolError
+from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder, write_harness
+from ctrlgen.firmware.toolchains import compile_c, find_compilers
 from ctrlgen.verification.reference import Reference
-from ctrlgen.verification.toolchains import compile_c, find_compilers
 
 
 def build_host(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:

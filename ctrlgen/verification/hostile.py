@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller import Controller, Status
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import write
-from ctrlgen.model import Model
-from ctrlgen.scenario import Scenario
+from ctrlgen.model.feedforward import Controller, Status
+from ctrlgen.model.model import Model
+from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.verification.check import LEFT_OUT, Check, Finding, judged, not_run, run_tool, version_of
 
 RANDOM, FUZZER = "sanitizers, random calls", "libFuzzer"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller import Controller
-from ctrlgen.simulation import trace
-from ctrlgen.solution import Solution
+from ctrlgen.model.feedforward import Controller
+from ctrlgen.model.simulation import trace
+from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
 

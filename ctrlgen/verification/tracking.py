@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.simulation import simulate, trace
+from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.verification.host import Host
 from ctrlgen.verification.reference import Reference
 

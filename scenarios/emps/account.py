@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 import ctrlgen
-from ctrlgen.model import build_model
-from ctrlgen.recording import load_recordings
+from ctrlgen.model.model import build_model
+from ctrlgen.recordings.reader import load_recordings
 
 HERE = Path(__file__).parent
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 import ctrlgen
-from ctrlgen.calibration import calibrate
-from ctrlgen.diagnosis import Diagnosis
-from ctrlgen.diagnosis.structure import Structure
-from ctrlgen.model import build_model
-from ctrlgen.pose_errors import PoseErrors
-from ctrlgen.recording import load_recordings
+from ctrlgen import Diagnosis
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.model.model import build_model
+from ctrlgen.recordings.calibration import calibrate
+from ctrlgen.recordings.pose_errors import PoseErrors
+from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.reproduce.s0_data import load_s0
 
 HERE = Path(__file__).parent

@@ -1,0 +1,244 @@
+"""Many recordings, one diagnosis each: a list in, a folder with one result folder a recording and a table out.
+
+    seed = 0                              # optional
+    [[job]]
+    device = "devices/stage.toml"         # paths as seen from this file
+    recordings = ["runs/*", ["a", "b"]]   # every match is a diagnosis of its own; a list in the list is joined to one
+    name = "stage"                        # optional: begin of the result folders' names, the device file's by default
+
+A result folder appears whole when its diagnosis is done. What is there already, made from the same files by the same
+version, is not made again: a batch that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from ctrlgen._version import __version__
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
+from ctrlgen.core.parallel import Failure, run_all
+from ctrlgen.devices.section import Section
+from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests
+
+MADE_FROM = "made_from.json"  # in each result folder
+TABLE = "results.csv"
+
+Progress = Callable[[int, int], None]
+
+
+class JobTable(Section):
+    """One [[job]] as written."""
+
+    device: str
+    recordings: Annotated[tuple[str | tuple[str, ...], ...], Field(min_length=1)]
+    name: str | None = Field(default=None, pattern=r"^[\w.-]+$")
+
+
+class BatchFile(Section):
+    """The list as written."""
+
+    seed: int = 0
+    job: Annotated[tuple[JobTable, ...], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One diagnosis: `name` of its result folder, its files, and what decides its result."""
+
+    name: str
+    device: str
+    recordings: tuple[str, ...]
+    seed: int
+    replicates: int = 0
+
+    def made_from(self) -> dict[str, Any]:
+        """What the result depends on. Raises InputError where a file cannot be read."""
+        found = digests(Path(self.device), [Path(r) for r in self.recordings])
+        return {"version": __version__, "seed": self.seed, "replicates": self.replicates, "files": found}
+
+    def __call__(self) -> dict[str, bytes]:
+        """The files of the result folder by their names; nothing is written but in a temporary folder."""
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "result"
+            replicates = Replicates(self.replicates, jobs=0) if self.replicates else None
+            diagnose_into(self.device, list(self.recordings), out, self.seed, replicates=replicates)
+            paths = sorted(p for p in out.rglob("*") if p.is_file() and p.name != MARKER)
+            return {str(p.relative_to(out)): p.read_bytes() for p in paths}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table. `state`: "done", "done before" or "failed" (then `error` says why)."""
+
+    name: str
+    state: str
+    verdict: str = ""
+    findings: str = ""
+    channel: str = ""
+    before: float | None = None
+    after: float | None = None
+    noise: float | None = None
+    unit: str = ""
+    error: str = ""
+
+
+def load_batch(path: Path | str, seed: int | None = None, replicates: int = 0) -> tuple[Task, ...]:
+    """The diagnoses that a list asks for. Raises InputError with every fault."""
+    path = Path(path)
+    written = validate(BatchFile, read_toml(path), path)
+    tasks, faults = [], []
+    for k, job in enumerate(written.job):
+        device = path.parent / job.device
+        if not device.is_file():
+            faults.append(Fault(f"job[{k}].device", f"{device} does not exist; check the path"))
+        for group in _groups(job, path.parent):
+            if isinstance(group, Fault):
+                faults.append(Fault(f"job[{k}].recordings", group.what))
+                continue
+            name = f"{job.name or device.stem}--{'+'.join(_name(p) for p in group)}"
+            paths = tuple(str(p.resolve()) for p in group)
+            tasks.append(Task(name, str(device.resolve()), paths, written.seed if seed is None else seed, replicates))
+    names = [task.name for task in tasks]
+    for name in sorted({n for n in names if names.count(n) > 1}):
+        faults.append(
+            Fault("job", f"{name} would be the result folder of {names.count(name)} diagnoses; give each job a name")
+        )
+    if faults:
+        raise InputError(path, faults)
+    return tuple(tasks)
+
+
+def _groups(job: JobTable, folder: Path) -> Iterator[list[Path] | Fault]:
+    """The recordings that belong to one diagnosis each; a fault for what is not there."""
+    for given in job.recordings:
+        matches = [_matches(folder, text) for text in ((given,) if isinstance(given, str) else given)]
+        for text, found in zip((given,) if isinstance(given, str) else given, matches, strict=True):
+            if not found:
+                yield Fault("", f"nothing matches {text!r}")
+        if isinstance(given, str):
+            yield from ([path] for path in matches[0])
+        elif all(matches):
+            yield [path for found in matches for path in found]
+
+
+def _matches(folder: Path, text: str) -> list[Path]:
+    """Folders and .toml files; a pattern takes of folders only those with a recording."""
+    if not re.search(r"[*?\[]", text):
+        return [folder / text] if (folder / text).exists() else []
+    found = sorted(Path("/").glob(text[1:]) if text.startswith("/") else folder.glob(text))
+    return [p for p in found if (p.is_dir() and (p / "recording.toml").is_file()) or p.suffix == ".toml"]
+
+
+def _name(path: Path) -> str:
+    return re.sub(r"[^\w.-]+", "_", path.resolve().stem if path.suffix == ".toml" else path.resolve().name)
+
+
+def run_batch(
+    tasks: Sequence[Task],
+    out: Path | str,
+    scheduler: str | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[Row, ...]:
+    """Every diagnosis into its folder in `out`, and the table results.csv, which is kept up with every one.
+
+    Where it runs is `ctrlgen.core.parallel`'s business; only this process writes. A diagnosis that fails is a row that says
+    why. Raises InputError where `out` cannot be written or the scheduler does not answer.
+    """
+    out, rows = Path(out), {}
+    to_do: list[tuple[Task, dict[str, Any]]] = []
+    for task in tasks:
+        try:
+            made_from = task.made_from()
+        except (InputError, OSError) as error:
+            rows[task.name] = Row(task.name, "failed", error=_one_line(str(error)))
+            continue
+        if _is_there(out / task.name, made_from):
+            rows[task.name] = _row(task.name, "done before", (out / task.name / "diagnosis.json").read_bytes())
+        else:
+            to_do.append((task, made_from))
+    before = len(tasks) - len(to_do)
+    _write_table(tasks, rows, out)
+
+    def told(done: int, _: int) -> None:
+        if progress is not None:
+            progress(before + done, len(tasks))
+
+    if progress is not None:
+        progress(before, len(tasks))
+    for k, result in run_all(_work, [task for task, _ in to_do], scheduler, jobs, told):
+        task, made_from = to_do[k]
+        rows[task.name] = _kept(task, made_from, result, out)
+        _write_table(tasks, rows, out)
+    return tuple(rows[task.name] for task in tasks)
+
+
+def _work(task: Task) -> dict[str, bytes]:
+    return task()
+
+
+def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Failure, out: Path) -> Row:
+    """The result written whole into its folder, as a row."""
+    if isinstance(result, Failure):
+        return Row(task.name, "failed", error=_one_line(result.what))
+    try:
+        with whole_folder(out / task.name) as draft:
+            for name, content in result.items():
+                (draft / name).parent.mkdir(parents=True, exist_ok=True)
+                (draft / name).write_bytes(content)
+            (draft / MADE_FROM).write_text(json.dumps(made_from, indent=1) + "\n", encoding="utf-8")
+    except InputError as error:  # somebody else's files stand there
+        return Row(task.name, "failed", error=_one_line(str(error)))
+    return _row(task.name, "done", result["diagnosis.json"])
+
+
+def _is_there(folder: Path, made_from: dict[str, Any]) -> bool:
+    try:
+        return json.loads((folder / MADE_FROM).read_text(encoding="utf-8")) == made_from
+    except (OSError, ValueError):
+        return False
+
+
+def _row(name: str, state: str, content: bytes) -> Row:
+    """A line of the table from a diagnosis.json: the channel whose error is largest beside its noise."""
+    found = json.loads(content)
+    causes = "; ".join(f"{f['effect']} at {f['location']}" for f in found["findings"])
+
+    def size(item: tuple[str, dict[str, Any]]) -> float:
+        e = item[1]
+        return (e["rms_before"] or 0.0) / (e["noise_floor"] or e["rms_after"] or 1.0)
+
+    channel, e = max(found["held_out"].items(), key=size)
+    return Row(
+        name, state, found["verdict"], causes, channel, e["rms_before"], e["rms_after"], e["noise_floor"], e["unit"]
+    )  # fmt: skip
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _write_table(tasks: Sequence[Task], rows: dict[str, Row], out: Path) -> None:
+    """results.csv: a line for every diagnosis that is done, was done before or failed."""
+    text = io.StringIO()
+    table = csv.DictWriter(
+        text, [f for f in Row.__dataclass_fields__ if f != "state"], lineterminator="\n", extrasaction="ignore"
+    )
+    table.writeheader()
+    table.writerows(asdict(rows[task.name]) for task in tasks if task.name in rows)
+    try:
+        write_text(out / TABLE, text.getvalue())
+    except OSError as error:
+        what = f"cannot be written ({error.strerror}); name a folder you may write"
+        raise InputError(out, [Fault("--out", what)]) from None

@@ -1,0 +1,54 @@
+"""Command line: every command, and one clear message for everything that can go wrong."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import warnings
+from collections.abc import Callable
+
+import typer
+
+from ctrlgen.app.commands import controllers, devices, recordings  # noqa: F401, they register their commands
+from ctrlgen.app.commands.app import app
+from ctrlgen.app.console import CHECK, complain, err, show_warning
+from ctrlgen.core.errors import CtrlgenError, Unreachable
+
+for command in app.registered_commands:  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
+    command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback))
+
+
+def execute(check: Callable[[], None] = lambda: None) -> int:
+    """Parses and runs the command line; the exit status, with one clear message for everything that can go wrong.
+
+    `check` is called before each stage of long work and raises KeyboardInterrupt when that should end.
+    """
+    try:
+        CHECK.set(check)
+        warnings.showwarning = show_warning
+        status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
+        return status if isinstance(status, int) else 0
+    except Unreachable as error:
+        err.print("[bold red]unreachable[/bold red]: ", end="")
+        err.print(str(error), markup=False, soft_wrap=True)
+        return 1
+    except CtrlgenError as error:
+        complain(error)
+        return 1
+    except typer.Abort:
+        return 130
+    except OSError as error:
+        said = (
+            f"{error.strerror}: {error.filename}" if error.strerror else str(error)
+        )  # a library's own may have no number
+        err.print(f"error: {said}", markup=False, soft_wrap=True)
+        return 1
+    except Exception as error:
+        if not hasattr(error, "format_message"):
+            raise
+        if not error.format_message():  # no command at all: typer has shown the help
+            return 2
+        context = getattr(error, "ctx", None)
+        err.print(f"error: {error.format_message()}", markup=False, soft_wrap=True)
+        err.print(f"try: {context.command_path if context else 'ctrlgen'} --help", markup=False)
+        return 2

@@ -1,0 +1,129 @@
+"""Scenarios and their C: run, solve, generate, compare, verify, fmu."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from ctrlgen.app import pipeline
+from ctrlgen.app.commands.app import OutFolder, ScenarioPath, app
+from ctrlgen.app.console import out, print_build, print_comparison, print_solution, progress
+from ctrlgen.trajectory.scenario import load_scenario
+
+
+@app.command()
+def run(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+    """Solve a scenario, generate its C, compare the C with the model, and report.
+
+    Leaves in --out: report.html (open this first), summary.json, trajectory.csv, figures/, and c/ with its
+    CMake file and test. The exit status is 1 when anything is out of tolerance or unreachable.
+
+    Example:  ctrlgen run scenarios/circle20 --out out/circle20
+    """
+    with progress(pipeline.STAGES) as advance:
+        outcome = pipeline.run(scenario, out_folder, advance)
+    print_solution(outcome)
+    print_comparison(outcome)
+    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+    _exit(outcome)
+
+
+@app.command()
+def solve(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+    """Solve a scenario for its drives (IPOPT) and report the margin to every limit; no C.
+
+    Example:  ctrlgen solve scenarios/raster --out out/raster
+    """
+    with progress(2) as advance:
+        outcome = pipeline.solve_into(scenario, out_folder, advance)
+    print_solution(outcome)
+    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+    _exit(outcome)
+
+
+@app.command()
+def generate(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+    """Write the C of a scenario: online controller and player, double and float; needs no compiler.
+
+    Leaves in --out a folder that drops into a firmware project as it is; its README.md says how.
+
+    Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
+    """
+    with progress(2) as advance:
+        c = pipeline.generate_into(scenario, out_folder, advance)
+    for name in [*c.online.values(), *c.player.values()]:
+        out.print(f"{out_folder / name}.c", soft_wrap=True, markup=False)
+    out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
+
+
+@app.command()
+def compare(scenario: ScenarioPath) -> None:
+    """Generate the C, build it with every compiler present, and compare it with the model; keeps nothing.
+
+    Example:  ctrlgen compare scenarios/circle20
+    """
+    with progress(pipeline.STAGES - 1) as advance:
+        outcome = pipeline.compare_only(scenario, advance)
+    print_comparison(outcome)
+    _exit(outcome)
+
+
+@app.command()
+def verify(
+    scenario: ScenarioPath,
+    out_folder: OutFolder,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Leave out cppcheck and the fuzzer, over half of the time; both are then listed as not run."
+        ),
+    ] = False,
+) -> None:
+    """All that is known of a scenario's C on one page: limits, cost on each target, equivalence, rules, provenance.
+
+    Solves, generates, compares with every compiler, runs the C on emulated Cortex-M4F and M7 and boards, analyses it and calls
+    it with hostile inputs. Leaves in --out: build.html (open this first), build.json (every number), and c/. The exit status
+    is 1 when anything failed. A tool that is missing fails nothing and passes nothing: what it would have checked is listed as
+    not run, with the command that installs it.
+
+    Example:  ctrlgen verify scenarios/circle20 --out out/verify
+    """
+    with progress(pipeline.VERIFY_STAGES) as advance:
+        build = pipeline.verify(scenario, out_folder, advance, quick)
+    print_build(build)
+    out.print(f"[bold]page[/bold]  {escape(str(out_folder / 'build.html'))}", soft_wrap=True)
+    if not build.passed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def fmu(
+    scenario: ScenarioPath,
+    out_folder: OutFolder,
+    fmi: Annotated[int, typer.Option(help="Version of the FMI standard, 3 or 2.")] = 3,
+) -> None:
+    """Write controller and plant as FMI co-simulation units, for Simulink, Dymola, OpenModelica, FMPy and others.
+
+    The controller takes targets and gives drives; the plant takes drives and gives every signal of the model. Both
+    wrap the C that runs elsewhere, step by whole samples, and hold their sources; binaries are for this computer and
+    need a C compiler. In a loop step the controller first, hand its drives on, then step the plant: a target is what
+    stands at the end of the step. With start_settled = true both start in the equilibrium at their first inputs.
+
+    Example:  ctrlgen fmu scenarios/circle20 --out out/fmu
+    """
+    from ctrlgen.firmware.fmu import write_fmus
+
+    made = write_fmus(load_scenario(scenario), out_folder, fmi)
+    for path in made.paths:
+        out.print(str(path), soft_wrap=True, markup=False)
+    out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)
+    if made.remark:
+        out.print(made.remark, markup=False, soft_wrap=True)
+
+
+def _exit(outcome: pipeline.Outcome) -> None:
+    if not outcome.passed:
+        out.print("[red]out of tolerance[/red]")
+        raise typer.Exit(1)

@@ -1,0 +1,162 @@
+"""Devices and the papers' numbers: check, bode, workspace, reproduce."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ctrlgen.app import pipeline
+from ctrlgen.app.commands.app import DevicePath, OutFolder, app
+from ctrlgen.app.console import out, print_recording, print_reproduced, print_workspace, progress
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import read_toml
+from ctrlgen.core.units import show
+from ctrlgen.devices import load_device
+from ctrlgen.devices.sensor import describe
+from ctrlgen.firmware.package import MANIFEST, verify_package
+from ctrlgen.model.model import build_model
+from ctrlgen.recordings.reader import load_recordings
+from ctrlgen.recordings.schema import FILE as RECORDING
+from ctrlgen.trajectory.paths import Frame
+from ctrlgen.trajectory.scenario import load_scenario
+
+
+@app.command()
+def check(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="A device file, a scenario, generated C, or with --device a recording; or its folder.",
+            show_default=False,
+        ),
+    ],
+    device_path: Annotated[
+        Path | None, typer.Option("--device", help="The device that a recording was made on.", show_default=False)
+    ] = None,
+) -> None:
+    """Read a device, scenario or recording and list every fault, or say what it describes. Nothing is computed.
+
+    Of a generated folder it says which files were changed.
+
+    Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
+    """
+    if device_path is not None:
+        print_recording(load_recordings([file], build_model(load_device(device_path))))
+        return
+    if (file / RECORDING).is_file() or (file.name == RECORDING and file.is_file()):
+        raise InputError(file, [Fault("--device", "is missing; name the device file that this recording was made on")])
+    if (file / MANIFEST).is_file():
+        if faults := verify_package(file):
+            raise InputError(file, faults)
+        out.print(f"{file}: every file is as it was generated", markup=False)
+        return
+    if file.is_dir() or "kind" not in read_toml(file):
+        scenario = load_scenario(file)
+        count = len(scenario.command(build_model(scenario.device)))
+        out.print(f"{scenario.file.title}: {count} samples, device {scenario.device.name}", markup=False)
+        return
+    device = load_device(file)
+    model = build_model(device)
+    numbers = list(device.quantities())
+    unsourced = [path for path, q in numbers if q.source is None]
+    out.print(
+        f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators",
+        markup=False,
+    )
+    for limit in model.limits:
+        low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
+        out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
+    units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
+    for sensor in device.sensor:
+        out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
+    for remark in device.remarks():
+        out.print(f"  note: {remark}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def bode(
+    device: DevicePath,
+    picture: Annotated[Path, typer.Option("--out", help="The picture to write, .svg or .png.", show_default=False)],
+    at: Annotated[str, typer.Option(help="Pose to linearise at: channel=value, separated by commas.")] = "delta_z=20um",
+) -> None:
+    """Draw the frequency response from every drive to the pose, linearised at a pose.
+
+    Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --out bode.svg --at delta_x=5um,delta_z=20um
+    """
+    from ctrlgen.reporting.bode import draw_bode  # python-control takes most of a second to import
+
+    model = build_model(load_device(device))
+    signal_ = model.signals["pose"]
+    pose = Frame(signal_.channels, signal_.units).pose(at, "--at")
+    if picture.suffix not in (".svg", ".png"):
+        raise InputError("--out", [Fault(str(picture), "must end in .svg or .png")])
+    draw_bode(model, pose, picture)
+    out.print(str(picture), soft_wrap=True, markup=False)
+
+
+@app.command()
+def workspace(
+    device: DevicePath,
+    out_folder: OutFolder,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Pose of a slice, channel=value, separated by commas; repeat for more.",
+            show_default="delta_z at 10, 20 and 30 um; without a third translation the middle of the drives",
+        ),
+    ] = None,
+) -> None:
+    """Map the poses a device can hold under all its limits: ranges, slices, the largest ball inside.
+
+    Leaves workspace.svg and workspace.json in --out.
+
+    Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
+    """
+    print_workspace(pipeline.map_workspace(load_device(device), at or [], out_folder))
+    out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
+
+
+@app.command()
+def reproduce(
+    source: Annotated[
+        list[str] | None, typer.Argument(help="S0, S1, S2, S3; all by default.", show_default=False)
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print the rows as a JSON list instead of a table.")] = False,
+    page: Annotated[
+        Path | None, typer.Option("--out", help="Also write a page with the figures (.html).", show_default=False)
+    ] = None,
+    differing: Annotated[bool, typer.Option("--differing", help="Show only rows that are not reproduced.")] = False,
+) -> None:
+    """Compare every number the papers print with the program's own: printed, ours, difference, status and why.
+
+    Example:  ctrlgen reproduce S3 --differing
+    """
+    from ctrlgen.reproduce import all as everything  # scientific work of seconds; other commands need none of it
+    from ctrlgen.reproduce.row import Status
+
+    chosen = [name.upper() for name in source or everything.SOURCES]
+    unknown = [name for name in chosen if name not in everything.SOURCES]
+    if unknown:
+        raise InputError(
+            "reproduce", [Fault(name, f"is not a source; known: {', '.join(everything.SOURCES)}") for name in unknown]
+        )
+    if page is not None and page.suffix != ".html":
+        raise InputError("--out", [Fault(str(page), "must end in .html")])
+    with progress(len(chosen)) as advance:
+        rows = []
+        for name in chosen:
+            advance(f"{name}, {everything.TITLES[name]}")
+            rows += everything.reproduce([name])
+    if page is not None:
+        everything.write_page(rows, page)
+    if json_:
+        print(json.dumps(everything.as_json(rows), indent=1))
+        return
+    print_reproduced([row for row in rows if not (differing and row.status is Status.REPRODUCED)])
+    counts = everything.counts(rows)
+    for name in chosen:
+        numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in Status)
+        out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)

@@ -1,0 +1,123 @@
+"""Recordings: diagnose, batch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from ctrlgen.app.commands.app import BootstrapCount, DevicePath, JobCount, OutFolder, SchedulerAddress, app
+from ctrlgen.app.console import (
+    complain,
+    counted,
+    err,
+    out,
+    print_batch,
+    print_bootstrap,
+    print_diagnosis,
+    progress,
+)
+from ctrlgen.core.errors import InputError
+
+
+@app.command()
+def diagnose(
+    device: DevicePath,
+    recording: Annotated[
+        list[Path],
+        typer.Argument(help="A recording.toml, or the folder that holds one; several are joined.", show_default=False),
+    ],
+    out_folder: OutFolder,
+    seed: Annotated[int, typer.Option(help="Of everything drawn at random; the same seed gives the same answer.")] = 0,
+    bootstrap: BootstrapCount = 0,
+    scheduler: SchedulerAddress = None,
+    jobs: JobCount = None,
+) -> None:
+    """Find what a device file leaves out: where, which physics by name, with
+    numbers, proved on held-out records.
+
+    A recording.toml names files (CSV, MATLAB, HDF5, TDMS, MDF4, JSON), their
+    columns, units and roles (fit, hold_out, rest);
+    scenarios/nist_hexapod/recording.toml is one, and ctrlgen check FILE
+    --device DEVICE says what is wrong with yours.
+
+    Leaves in --out: report.html (open this first), diagnosis.json,
+    device.next.toml, the device file with what was found, and next_experiment/
+    where another recording would settle a doubt.
+
+    It answers: consistent, explained, partly (a little remains, or nothing
+    proves it), ambiguous (two causes explain alike), or unexplained. The exit
+    status is 0 whatever it answers, and 2 for input that cannot be used. What
+    is interrupted goes on from its fits when it is asked again.
+
+    Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
+    """
+    from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, unfinished
+
+    if (scheduler is not None or jobs is not None) and not bootstrap:
+        raise typer.BadParameter(
+            "only the replicates of --bootstrap run elsewhere; add --bootstrap 200, or leave it out"
+        )
+    try:
+        replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
+        with progress() as advance:
+            found = diagnose_into(device, recording, out_folder, seed, advance, replicates)
+    except KeyboardInterrupt:
+        kept = unfinished(out_folder)
+        if kept.exists():
+            err.print(f"the fits so far are in {escape(str(kept))}; the same command goes on from them", soft_wrap=True)
+        raise
+    except InputError as error:
+        complain(error)
+        raise typer.Exit(2) from None
+    print_diagnosis(found)
+    if replicates is not None:
+        print_bootstrap(found.extra["bootstrap"])
+    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+
+
+@app.command()
+def batch(
+    list_: Annotated[
+        Path, typer.Argument(metavar="JOBS.toml", help="What to diagnose, see above.", show_default=False)
+    ],
+    out_folder: Annotated[
+        Path, typer.Option("--out", help="Gets one result folder a diagnosis, and results.csv.", show_default=False)
+    ],
+    seed: Annotated[
+        int | None, typer.Option(help="Of everything drawn at random, instead of the list's.", show_default=False)
+    ] = None,
+    bootstrap: BootstrapCount = 0,
+    scheduler: SchedulerAddress = None,
+    jobs: JobCount = None,
+) -> None:
+    """Diagnose many recordings, on all cores or on a cluster; results that are
+    there already are kept.
+
+    JOBS.toml, paths as seen from it:
+
+    \b
+      [\\[job]]
+      device = "devices/stage.toml"
+      recordings = ["runs/*", ["a", "b"]]   # a diagnosis each; a and b joined
+
+    Stop it whenever you like: every finished diagnosis stays, and the same
+    command goes on with the rest. The exit status is 1 when a diagnosis failed,
+    and 2 for a list that cannot be used.
+
+    Example:  ctrlgen batch jobs.toml --out out/jobs --scheduler tcp://cluster:8786
+    """
+    from ctrlgen.app.batch import load_batch, run_batch
+
+    try:
+        with counted("diagnosing") as told:
+            rows = run_batch(load_batch(list_, seed, bootstrap), out_folder, scheduler, jobs, told)
+    except InputError as error:
+        complain(error)
+        raise typer.Exit(2) from None
+    print_batch(rows)
+    out.print(f"[bold]table[/bold]  {escape(str(out_folder / 'results.csv'))}", soft_wrap=True)
+    if any(row.state == "failed" for row in rows):
+        raise typer.Exit(1)

@@ -1,0 +1,305 @@
+"""What the command line shows: tables, progress, and one clear message for what went wrong."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ctrlgen.app import pipeline
+from ctrlgen.core.errors import CtrlgenError
+from ctrlgen.core.units import from_si, show
+from ctrlgen.recordings.recording import Recording
+from ctrlgen.reporting import report
+from ctrlgen.trajectory.metrics import in_unit
+
+if TYPE_CHECKING:
+    from ctrlgen.app.batch import Row
+    from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
+    from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+    from ctrlgen.reporting.build_record import Build
+    from ctrlgen.reproduce.row import Row as Reproduced
+
+out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
+err = Console(stderr=True, highlight=False)
+SHOWN_COSTS = ("scenario", "worst", "player")
+CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
+
+
+def print_solution(outcome: pipeline.Outcome) -> None:
+    """Title, tracking error, margins and expectations."""
+    solution = outcome.solution
+    scenario = solution.scenario
+    rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
+    out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
+    out.print(
+        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, IPOPT {solution.iterations} iterations",
+        soft_wrap=True,
+    )
+    table = table_of(
+        ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
+    )
+    for margin in solution.margins:
+        unit, tightest = margin.limit.unit, margin is solution.tightest
+        share = "" if margin.share is None else f"{100 * margin.share:.1f} %"
+        where = f"{margin.channel}, " + (
+            f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
+        )
+        row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
+        table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
+    out.print(table)
+    if outcome.expected:
+        good = sum(e.passed for e in outcome.expected)
+        out.print(f"expected: {good} of {len(outcome.expected)} values in range")
+    for e in outcome.expected:
+        if not e.passed:
+            measured, low, high = (f"{in_unit(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
+            out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
+
+
+def print_comparison(outcome: pipeline.Outcome) -> None:
+    """One line per arithmetic and comparison."""
+    if outcome.comparison is None or outcome.c is None:
+        return
+    comparison, c = outcome.comparison, outcome.c
+    tools = ", ".join(comparison.compilers)
+    cost = f"{c.operations} operations a sample, {c.worst_operations} at most"
+    out.print(f"[bold]generated C[/bold], built strictly with {tools}; {cost}", soft_wrap=True)
+    for missing in comparison.missing:
+        out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
+    table = table_of(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
+    for row in report.worst_rows(comparison):
+        if row["passed"] and row["what"].endswith("CasADi"):
+            continue
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        verdict = (
+            "[green]ok[/green]" if row["passed"] else f"[red]OUT from sample {row['first']} ({row['build']})[/red]"
+        )
+        table.add_row(
+            row["real"],
+            f"{row['what']}, {row['signal']}",
+            f"{row['worst']:.2g}{unit}",
+            f"{row['limit']:.2g}{unit}",
+            verdict,
+        )
+    out.print(table)
+    good = sum(row.passed for row in comparison.rows)
+    out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+
+
+def print_build(build: Build) -> None:
+    """One line per target and one per check, then what failed and what did not run."""
+    good = sum(row.passed for row in build.comparison.rows)
+    out.print(
+        f"{good} of {len(build.comparison.rows)} comparisons within tolerance, {', '.join(build.comparison.compilers)}"
+    )
+    if build.in_loop.runs:
+        columns = (
+            *((kind, "right") for kind in SHOWN_COSTS),
+            ("stack", "right"),
+            ("code", "right"),
+            ("tables", "right"),
+        )
+        table = table_of(("instructions a sample", "left"), *columns)
+        for run in build.in_loop.runs:
+            most = run.instructions
+            counts = ("-" if most[kind] is None else str(most[kind]) for kind in SHOWN_COSTS)
+            sizes = (f"{size} B" for size in (run.stack, run.code, run.tables))
+            verdict = "[green]equal bits[/green]" if run.passed else "[red]FAILED[/red]"
+            table.add_row(f"{run.core} {run.real.value}, {run.compiler.split()[0]}", *counts, *sizes, verdict)
+        out.print(table)
+    colours = {"passed": "green", "failed": "red", "not run": "yellow"}
+    table = table_of(("check", "left"), ("", "left"))
+    for check in build.checks:
+        table.add_row(escape(check.tool), f"[{colours[check.state]}]{check.state}[/{colours[check.state]}]")
+    out.print(table)
+    for what, remedy in build.not_run:
+        out.print(f"not run: {what}: {remedy}", style="yellow", markup=False, soft_wrap=True)
+    for line in build.failures:
+        out.print(f"failed: {line}", style="red", markup=False, soft_wrap=True)
+
+
+def table_of(*columns: tuple[str, Literal["left", "right"]]) -> Table:
+    """A plain table with a last column for remarks."""
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for name, justify in (*columns, ("", "left")):
+        table.add_column(name, justify=justify, no_wrap=True)
+    return table
+
+
+def print_recording(recording: Recording) -> None:
+    """What the gate lets through, record by record, and its notes."""
+    out.print(f"{recording.title}: {', '.join(recording.channels)}", markup=False, soft_wrap=True)
+    table = table_of(("record", "left"), ("role", "left"), ("samples", "right"), ("marked", "right"))
+    for record in recording.records:
+        marked = int((~record.valid).sum())
+        table.add_row(escape(record.name), record.role, str(len(record.time)), f"{marked} of {record.valid.size}")
+    out.print(table)
+    for note in recording.notes:
+        out.print(f"note: {note}", markup=False, soft_wrap=True)
+
+
+def print_diagnosis(found: Diagnosis) -> None:
+    """The verdict, what was found, and the held-out errors."""
+    from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, number, sentence
+
+    out.print(f"[bold]{escape(sentence(found))}[/bold]", soft_wrap=True)
+    if found.findings:
+        table = table_of(("found", "left"), ("at", "left"), ("number", "left"), ("95 % interval", "left"))
+        for finding in found.findings:
+            rows = [(name, interval(e)) for name, e in finding.parameters.items()]
+            alike = ", ".join(f"{effect} {location}" for effect, location in finding.alternatives)
+            for k, (name, text) in enumerate(rows):
+                first = (finding.effect, finding.location) if k == 0 else ("", "")
+                table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
+        out.print(table)
+    table = table_of(
+        ("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"), ("unsure", "right")
+    )
+    for channel, e in found.held_out.items():
+        values = (e.rms_before, e.rms_after, e.noise_floor, e.uncertainty)
+        table.add_row(channel, *("not known" if v is None else f"{number(v)} {e.unit}" for v in values))
+    out.print(table)
+    for note in gathered(found.notes):
+        out.print(f"note: {note}", markup=False, soft_wrap=True)
+    for step in next_steps(found):
+        out.print(f"next: {step}", markup=False, soft_wrap=True)
+
+
+def print_reproduced(rows: Sequence[Reproduced]) -> None:
+    """Printed, ours, status and why, number by number."""
+    from ctrlgen.reproduce.row import Status
+
+    colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
+    table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
+    for words in (table.columns[1], table.columns[-1]):
+        words.no_wrap = False  # long words break; the numbers never make way for them
+    for row in rows:
+        ours = "" if row.ours is None else f"{row.ours:.6g}"
+        status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
+        table.add_row(
+            row.source,
+            escape(row.where),
+            escape(row.printed if row.unit == "1" else f"{row.printed} {row.unit}"),
+            ours,
+            status,
+            escape(row.reason),
+        )
+    out.print(table)
+
+
+def print_bootstrap(found: Bootstrap) -> None:
+    """Percentile intervals, and how often a finding vanished."""
+    from ctrlgen.diagnosis.report.narrative import interval
+
+    out.print(f"bootstrap: {found.replicates} replicates; {found.note}", markup=False, soft_wrap=True)
+    table = table_of(("number", "left"), ("95 % of the replicates", "left"))
+    for path, estimate in found.values.items():
+        table.add_row(escape(path), interval(estimate))
+    out.print(table)
+    for name, share in found.vanished.items():
+        out.print(f"{name} vanished in {share:.0%} of them", markup=False, soft_wrap=True)
+    for reason in found.failed:
+        out.print(f"some failed: {reason}", markup=False, soft_wrap=True)
+
+
+def print_batch(rows: Sequence[Row]) -> None:
+    """One line a diagnosis, then what failed and why."""
+    from ctrlgen.diagnosis.report.narrative import number
+
+    names = ("verdict", "left"), ("found", "left"), ("before", "right"), ("after", "right"), ("noise", "right")
+    table = table_of(("result", "left"), *names)
+    for row in rows:
+        if row.state == "failed":
+            table.add_row(escape(row.name), "[red]failed[/red]")
+            continue
+        known = ["not known" if v is None else f"{number(v)} {row.unit}" for v in (row.before, row.after, row.noise)]
+        table.add_row(escape(row.name), row.verdict, escape(row.findings) or "-", *known)
+    out.print(table)
+    for row in rows:
+        if row.error:
+            out.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
+    made, kept, failed = (sum(row.state == state for row in rows) for state in ("done", "done before", "failed"))
+    out.print(f"{made} diagnosed, {kept} there already, {failed} failed")
+
+
+@contextmanager
+def counted(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on standard error for work whose pieces are counted."""
+    check = CHECK.get()
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=err, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+
+        def told(done: int, of: int) -> None:
+            check()
+            bar.update(task, completed=done, total=of)
+
+        yield told
+
+
+@contextmanager
+def progress(stages: int | None = None) -> Iterator[Any]:
+    """A progress bar on standard error, none where nobody knows how many stages come; each call names the next one."""
+    check = CHECK.get()
+    bar_column = () if stages is None else (BarColumn(),)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), *bar_column, TimeElapsedColumn())
+    with Progress(*columns, console=err, transient=True) as bar:
+        task = bar.add_task("reading", total=stages)
+
+        def advance(what: str) -> None:
+            check()
+            bar.update(task, advance=1, description=what)
+
+        yield advance
+
+
+def complain(error: CtrlgenError) -> None:
+    """One clear message on standard error."""
+    err.print("[bold red]error[/bold red]: ", end="")
+    err.print(str(error), markup=False, soft_wrap=True)
+
+
+def show_warning(message: Warning | str, *_: Any) -> None:
+    """One line without the place in our code, which tells a user nothing."""
+    err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
+
+
+def print_workspace(found: pipeline.WorkspaceSummary) -> None:
+    """Ranges of every channel at some poses and anywhere, the largest balls, and the sizes that scale these."""
+    signal_ = found.workspace.model.signals["pose"]
+    named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
+
+    def place(pose: Any) -> str:
+        shown = (f"{c} {from_si(pose[i], u):.4g} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i])
+        return ", ".join(shown) or "home"
+
+    table = table_of(("from", "left"), *((place(base), "right") for base in found.bases), ("anywhere", "right"))
+    for i, (channel, unit) in named:
+        rounding = 1e-9 * signal_.scale[i]
+        ends = (np.where(np.abs(r[i]) > rounding, r[i], 0.0) for r in (*found.ranges, found.extent))
+        table.add_row(
+            escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
+        )
+    out.print(table)
+    for what, ball in (("translations", found.translations), ("all channels", found.everything)):
+        out.print(
+            f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",
+            soft_wrap=True,
+        )
+    sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
+    out.print(f"typical sizes: {sizes}")

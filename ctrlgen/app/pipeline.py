@@ -1,0 +1,209 @@
+"""The whole job: solve a scenario, generate its C, compare, report; nothing appears unless all of it is there."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.files import whole_folder, write_text
+from ctrlgen.core.units import from_si
+from ctrlgen.devices import Device
+from ctrlgen.firmware.folder import CFolder, generate
+from ctrlgen.firmware.toolchains import find_compilers
+from ctrlgen.model.model import build_model
+from ctrlgen.reporting import plots, report
+from ctrlgen.reporting.build_page import write_build
+from ctrlgen.reporting.build_record import Build
+from ctrlgen.trajectory.metrics import Expected, expectations
+from ctrlgen.trajectory.paths import Frame
+from ctrlgen.trajectory.scenario import Scenario, load_scenario
+from ctrlgen.trajectory.solution import Solution, solve
+from ctrlgen.trajectory.workspace import Ball, Workspace
+from ctrlgen.verification.comparison import Comparison, compare
+from ctrlgen.verification.hostile import check_hostile
+from ctrlgen.verification.in_loop import run_in_loop
+from ctrlgen.verification.qemu import check_on_boards
+from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.rules import check_rules
+from ctrlgen.verification.tracking import tracking_errors
+
+Progress = Callable[[str], None]
+STAGES = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
+VERIFY_STAGES = 27  # in `verify`, every tool there: `run`'s, the reference, errors, six emulated, three boards, four analyzers, two hostile
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run produced; `c` and `comparison` are None where they were not asked for."""
+
+    solution: Solution
+    c: CFolder | None
+    comparison: Comparison | None
+    expected: tuple[Expected, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything that was checked is within tolerance."""
+        return report.passed(self.comparison, self.expected)
+
+
+def quiet(_: str) -> None:
+    """No progress."""
+
+
+def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) -> Solution:
+    """Loads and solves. Raises InputError, Unreachable, SolverError."""
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    progress("symbolic model")
+    solution = solve(scenario, build_model(scenario.device), progress)
+    if scenario.file.outcome == "unreachable":
+        raise SolverError(
+            f"{scenario.path}: outcome = 'unreachable', but the path can be followed; remove that line or move the path"
+        )
+    return solution
+
+
+def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
+    """Solve, generate, compare, report into the folder `out`, which is replaced whole or left alone.
+
+    Raises InputError, Unreachable, SolverError, ToolError; out of tolerance is not an error but `passed` False.
+    """
+    find_compilers()
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        expected = expectations(solution)
+        progress("C sources")
+        drawn = plots.draw_all(solution)
+        c = generate(solution.scenario, solution.model, draft / "c", solution, drawn)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
+        progress("report")
+        report.write_report(draft, solution, comparison, expected, c, drawn)
+        return Outcome(solution, c, comparison, expected)
+
+
+def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet, quick: bool = False) -> Build:
+    """Solve, generate, compare, run on emulated targets, analyse, call with hostile inputs; one page into the folder `out`.
+
+    Left there: build.html, build.json, c/. `quick` leaves out cppcheck and the fuzzer, which take most of the time; they
+    are then listed as not run. Raises InputError, Unreachable, SolverError, ToolError (no C compiler, or one that refuses the
+    C); whatever else fails is in `failures` of what is returned, and what did not run in `not_run`.
+    """
+    find_compilers()
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        expected = expectations(solution)
+        progress("C sources")
+        c = generate(solution.scenario, solution.model, draft / "c", solution, plots.draw_all(solution))
+        progress("reference")
+        reference = Reference(solution)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"), reference)
+        progress("error along the trajectory")
+        errors = tracking_errors(c, reference)
+        in_loop = run_in_loop(c, reference, lambda target: progress(f"emulated: {target}"))
+        checks = (
+            *check_on_boards(c, lambda board: progress(f"board: {board}")),
+            *check_rules(c, lambda tool: progress(f"rules: {tool}"), quick=quick),
+            *check_hostile(
+                c, solution.scenario, solution.model, lambda tool: progress(f"hostile: {tool}"), quick=quick
+            ),
+        )
+        progress("page")
+        build = Build(solution, c, expected, comparison, in_loop, checks, errors)
+        write_build(draft, build)
+        return replace(build, c=replace(c, path=Path(out) / "c"))
+
+
+def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
+    """Solve and report into `out`, without C."""
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        expected = expectations(solution)
+        report.write_report(draft, solution, None, expected, None, plots.draw_all(solution))
+        return Outcome(solution, None, None, expected)
+
+
+def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> CFolder:
+    """Solve and write only the C folder, which needs no compiler."""
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        c = generate(solution.scenario, solution.model, draft, solution, plots.draw_all(solution))
+    return replace(c, path=Path(out))
+
+
+def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) -> Outcome:
+    """Solve, generate into a scratch folder, compare; nothing is kept."""
+    find_compilers()
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
+        solution = solve_scenario(scenario, progress)
+        progress("C sources")
+        c = generate(solution.scenario, solution.model, Path(scratch), solution)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
+    return Outcome(solution, c, comparison, ())
+
+
+@dataclass(frozen=True)
+class WorkspaceSummary:
+    """What `map_workspace` found; `ranges` per base pose and `extent` anywhere (channels, 2), SI."""
+
+    workspace: Workspace
+    bases: list[np.ndarray]
+    ranges: list[np.ndarray]
+    extent: np.ndarray
+    translations: Ball
+    everything: Ball
+
+
+def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSummary:
+    """Ranges of each degree of freedom alone at some poses and anywhere, slices, the largest balls; workspace.json and a figure.
+
+    `poses` such as "delta_x=5um,delta_z=20um", channels left out zero; without any those of `Workspace.bases`. The one in the middle of the
+    list is where the balls and the ends are looked for.
+    """
+    model = build_model(device)
+    workspace, signal = Workspace(model), model.signals["pose"]
+    if len(signal.channels) < 2 or not workspace.translations:
+        raise InputError(
+            device.name, [Fault("workspace", "is mapped for platforms with a translation and another channel")]
+        )
+    frame = Frame(signal.channels, signal.units)
+    bases = [frame.pose(pose, "--at") for pose in poses] or workspace.bases()
+    ranges = [workspace.ranges(base) for base in bases]
+    middle = bases[len(bases) // 2]
+    balls = workspace.ball(middle, workspace.translations), workspace.ball(middle, tuple(range(len(signal.channels))))
+    found = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
+    with whole_folder(out) as draft:
+        with plots.plt.rc_context(plots.STYLE):
+            write_text(draft / "workspace.svg", plots.svg(plots.draw_workspace(workspace, bases, balls[0])))
+        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(found), indent=1) + "\n")
+    return found
+
+
+def _workspace_numbers(found: WorkspaceSummary) -> dict[str, Any]:
+    """Plain numbers in the reader's units."""
+    signal = found.workspace.model.signals["pose"]
+    named = list(zip(signal.channels, signal.units, strict=True))
+
+    def row(values: np.ndarray) -> dict[str, Any]:
+        return {f"{c} [{u}]": np.asarray(from_si(values[i], u)).tolist() for i, (c, u) in enumerate(named)}
+
+    return {
+        "device": found.workspace.model.name,
+        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(found.bases, found.ranges, strict=True)],
+        "anywhere": row(found.extent),
+        "largest_ball": [
+            {
+                "channels": [signal.channels[i] for i in ball.channels],
+                "centre": row(ball.centre),
+                "radius_in_typical_sizes": ball.radius,
+            }
+            for ball in (found.translations, found.everything)
+        ],
+        "typical_sizes": row(np.array(signal.scale)),
+    }

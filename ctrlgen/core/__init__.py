@@ -1,0 +1,1 @@
+"""What everything else stands on: units at the border, errors, files in and out, parallel work."""

@@ -1,0 +1,52 @@
+"""Readings that stand alone: a fault of the sensor, which no mechanism could follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ctrlgen.recordings.recording import Record, Recording
+
+SPIKE = 7.0
+MOST_SPIKES = 0.01
+WIDEST_SPIKE = 2  # samples
+BESIDE = 0.3  # of a spike: what its neighbours have at most
+
+
+def marked(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> tuple[Recording, str]:
+    """A series with what stands alone, for one or two samples, in what `predicted` leaves over as not valid; how many.
+
+    A mechanism cannot jump there and back within two samples, so this takes no physics away.
+    """
+    if recording.kind == "poses":
+        return recording, ""
+    records, count = [], 0
+    for record in recording.records:
+        if record.role == "rest":
+            records.append(record)
+            continue
+        left = np.where(record.valid, record.observed - predicted(record), 0.0)
+        spikes = record.valid & alone(np.nan_to_num(left))
+        count += int(spikes.sum())
+        records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
+    said = f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
+    return replace(recording, records=tuple(records)), said
+
+
+def alone(left: np.ndarray) -> np.ndarray:
+    """Samples (n, n_y) more than `SPIKE` robust deviations from the median of their neighbours; never over one percent, nor wide ones."""
+    rough = left - median_filter(left, size=(7, 1), mode="nearest")
+    near = SPIKE * np.maximum(
+        1.4826 * np.median(np.abs(rough), axis=0), median_filter(np.abs(rough), size=(51, 1)) * 1.4826
+    )
+    found = np.abs(rough) > near
+    found[:, found.mean(axis=0) > MOST_SPIKES] = False
+    for column, size in zip(found.T, np.abs(rough).T, strict=True):
+        for run in np.split(np.flatnonzero(column), np.flatnonzero(np.diff(np.flatnonzero(column)) > 1) + 1):
+            beside = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)] if len(run) else []
+            if len(run) > WIDEST_SPIKE or (beside and max(beside) > BESIDE * size[run].max()):
+                column[run] = False  # a mass that is pushed moves before and after too
+    return found

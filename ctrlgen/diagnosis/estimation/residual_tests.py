@@ -1,0 +1,105 @@
+"""Steps 3 and 9: does a structure leave anything over? Judged on the held-out records, the fitted ones, and at rest.
+
+The numbers are judged where the held-out records are most likely, at the price of how well the fit knows them: then the
+squares are those of the noise alone, also of a stage that drifts or saturates, where a little uncertainty goes far. What is
+left of the records to fit must be noise in size too. At rest, where the noise was learnt, its size says nothing; but
+stationary noise leaves neither memory nor heavy tails after whitening, and a stage that moves by itself does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.noise import LAGS, ljung_box, without_lines
+from ctrlgen.numerics.quantisation_step import lattice
+
+STEPS = 20  # at most, to where the held-out records are most likely, as the numbers are known
+RATIO = 1.10  # held-out error over what is expected: the gate of the design
+SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
+NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
+SIGMAS = 2.6  # standard deviations of the noise's own estimate that are granted
+RESTLESS = 1e-6  # p below which what is left at rest is no noise
+ROUNDED = 0.5  # of the noise: steps of the readings from which on these tests see the steps
+SMALL_SAMPLE = 0.001  # p of so large an error by chance, above which the gate's ratio says nothing
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """`ratio` of held-out error to what is expected, per channel; the smallest p of each test; `restless` channels, which
+    do at rest what no noise does; `passed` all of it."""
+
+    ratio: tuple[float, ...]
+    p_values: dict[str, float]
+    passed: bool
+    restless: tuple[str, ...] = ()
+
+    @property
+    def worst(self) -> float:
+        """The largest ratio of any channel."""
+        return max(self.ratio, default=float("nan"))
+
+
+def judge(fitter: Fitter, fit: Fit) -> Adequacy:
+    """Ratio per channel, Ljung-Box (memory), McLeod-Li (size that comes and goes), correlation with the drive."""
+    n_y = len(fitter.recording.channels)
+    moved, price, _ = fitter.as_known(fit, STEPS)
+    squares, expected = np.full(n_y, price / n_y), np.zeros(n_y)
+    p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
+    for record in fitter.held:
+        white = fitter.whitened(moved, record)
+        usable = fitter.noise.usable(record.valid)
+        squares += np.sum(white**2, axis=0)
+        expected += usable.sum(axis=0)
+        if fitter.recording.kind == "series":
+            for i in range(n_y):
+                e = white[usable[:, i], i]
+                if len(e) > 5 * LAGS:
+                    p["memory"].append(ljung_box(e))
+                    p["variance"].append(ljung_box(e**2 - np.mean(e**2)))
+                    p["drive"].append(cross_correlation(e, record.drive[usable[:, i]]))
+    ratio = tuple(np.sqrt(squares / np.maximum(expected, 1.0)))
+    smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
+    rejected = any(value < SURE for value in smallest.values()) and max(ratio, default=0.0) > NOTICED
+    doubt = 1 + SIGMAS / np.sqrt(2 * np.maximum(fitter.noise.count, 1.0))  # the noise itself is known no better
+    chance = min(1.0, n_y * min(map(float, stats.chi2.sf(squares / doubt**2, np.maximum(expected, 1.0)))))
+    smallest["size"] = chance
+    above = any(r > RATIO * d for r, d in zip(ratio, doubt, strict=True)) and chance < SMALL_SAMPLE
+    free = max(fit.n - len(fit.theta), 1)  # what shows in the records to fit alone is no less left out
+    smallest["fitted"] = float(stats.chi2.sf(fit.chi2 / max(doubt) ** 2, free))
+    above |= np.sqrt(fit.chi2 / free) > RATIO * max(doubt) and smallest["fitted"] < SMALL_SAMPLE
+    restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
+    passed = bool(np.isfinite(ratio).all()) and not (above or rejected or restless)
+    return Adequacy(ratio, smallest, passed, restless)
+
+
+def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
+    """Whether what is left of channel i at rest has a memory beyond the noise's, or tails that noise has not."""
+    for record in fitter.recording.records:
+        if record.role != "rest" or fitter.recording.kind != "series":
+            continue
+        e = fitter.whitened(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
+        read = record.observed[record.valid[:, i], i]
+        step = lattice(read)
+        if len(e) < 5 * LAGS or np.ptp(read) == 0 or step > ROUNDED * fitter.noise.floor[i]:
+            continue
+        e = without_lines(e)  # a vibration is looked for by itself
+        if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESTLESS:
+            return True
+    return False
+
+
+def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = LAGS) -> float:
+    """p of the hypothesis that white `e` is uncorrelated with the drive's changes at lags 0 ... `lags` (Bonferroni)."""
+    n, worst = len(e), 0.0
+    for u in drive.T:
+        u = u - np.mean(u)
+        if np.std(u) == 0:
+            continue
+        for k in range(lags + 1):
+            a, b = e[k:], u[: n - k]
+            worst = max(worst, abs(float(a @ b)) / (np.std(e) * np.linalg.norm(b)))
+    return float(min(1.0, 2 * stats.norm.sf(worst) * (lags + 1) * drive.shape[1]))

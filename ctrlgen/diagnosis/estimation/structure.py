@@ -1,0 +1,247 @@
+"""A device with some causes added and some of its numbers free: what a fit works on.
+
+The nominal device is nested in every structure: an effect at its `off`, a number at its nominal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from ctrlgen.core.units import Quantity, written_unit
+from ctrlgen.devices import Device
+from ctrlgen.devices.section import Section
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.hypotheses.hypotheses import (
+    PARAMETER,
+    Hypothesis,
+    nominal_links,
+    nuisances,
+    numbers,
+    written,
+)
+from ctrlgen.effects import Param, Where
+from ctrlgen.model.assembly import channels
+from ctrlgen.model.model import movable
+from ctrlgen.recordings.recording import Recording
+
+FAR = 100.0  # standard deviations that a number may be off: the price of being off holds it, not a bound
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One free number [SI]: `sd` is its stated deviation from `nominal`, None where nothing is known beforehand.
+
+    `cause` is the place of its hypothesis in the structure, None for the device's own uncertain numbers.
+    """
+
+    path: str
+    unit: str
+    nominal: float
+    low: float
+    high: float
+    size: float
+    sd: float | None = None
+    cause: int | None = None
+    amplitude: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of the parameter in its effect; "value" for a number of the device."""
+        return self.path.rpartition(".")[2] if self.path.startswith("effect[") else "value"
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """`device` as described, with `causes` and their starting values ({parameter: SI}, one mapping a cause).
+
+    `own`: where a fit begins of the device's uncertain numbers, by path [SI]; those not given begin as stated.
+    """
+
+    device: Device
+    causes: tuple[Hypothesis, ...] = ()
+    starts: tuple[dict[str, float], ...] = ()
+    own: dict[str, float] = field(default_factory=dict)
+
+    def with_cause(self, cause: Hypothesis, start: dict[str, float]) -> Structure:
+        """The same with one cause more."""
+        return replace(self, causes=(*self.causes, cause), starts=(*self.starts, start))
+
+    def without(self, index: int) -> Structure:
+        """The same with one cause less."""
+        keep = [k for k in range(len(self.causes)) if k != index]
+        return replace(self, causes=tuple(self.causes[k] for k in keep), starts=tuple(self.starts[k] for k in keep))
+
+    def begun(self, index: int, start: dict[str, float]) -> Structure:
+        """The same with the fit of one cause begun elsewhere."""
+        return replace(self, starts=(*self.starts[:index], start, *self.starts[index + 1 :]))
+
+    @property
+    def rarity(self) -> float:
+        """Of its causes."""
+        return sum(c.law.rarity for c in self.causes if c.effect != PARAMETER)
+
+    def usual(self, unknown: Unknown) -> tuple[float, float] | None:
+        """The range [SI] outside of which an amplitude means something else than its effect's name says."""
+        cause = self.causes[unknown.cause]
+        p = None if cause.effect == PARAMETER else cause.law.amplitude()
+        if p is None or p.usual is None:
+            return None
+        return tuple(self.place(cause).si(end, p) for end in p.usual)
+
+    def place(self, cause: Hypothesis) -> Where:
+        """The channel at which a cause acts; the first one where it acts at all of them."""
+        where = channels(nominal_links(self.device), cause.law.place)
+        here = where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
+        return here if cause.of is None else here.beside(next(w for w in where if w.channel == cause.of))
+
+    @cached_property
+    def described(self) -> Device:
+        """The device with the causes' effects at their starting values."""
+        added, values = [], {}
+        for cause, start in zip(self.causes, self.starts, strict=True):
+            if cause.effect == PARAMETER:
+                number = next(q for path, _, q in numbers(self.device) if path == cause.path)
+                low, high = _reach(number)
+                values[cause.path] = min(max(start["value"], low), high)  # a stage of negative size cannot be built
+                continue
+            where = self.place(cause)
+            law = cause.law
+            numbers_ = {
+                p.name: written(_inside(_settled(start[p.name], p, where), p, where), where.unit_of(p))
+                for p in law.params
+            }
+            added.append(law(cause.at, numbers_, cause.of))
+        return changed(self.device, values).model_copy(update={"effect": (*self.device.effect, *added)})
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The device's uncertain numbers, then every parameter of every cause."""
+        causes = {c.path for c in self.causes if c.effect == PARAMETER}
+        acting = _movable(self.device)
+        sections = {path: (section, number) for path, section, number in numbers(self.device)}
+        rows = []
+        for path, sd in nuisances(self.device).items():
+            if path in acting and path not in causes:
+                q = sections[path][1]
+                rows.append(Unknown(path, written_unit(q.text), q.si, *_around(q.si, FAR * sd), sd, sd))
+        k = len(self.device.effect)
+        for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
+            if cause.effect == PARAMETER:
+                q = sections[cause.path][1]
+                rows.append(
+                    Unknown(
+                        cause.path,
+                        written_unit(q.text),
+                        q.si,
+                        *_reach(q),
+                        (abs(q.si) or 1e-3) * 1e-3,
+                        None,
+                        index,
+                        True,
+                    )
+                )
+                continue
+            where, law = self.place(cause), cause.law
+            for p in law.params:
+                if p.expected:  # it is so or it is not: nothing to fit
+                    continue
+                low, high = cause.bounds(p, where)
+                off = 0.0 if p.off is None else where.si(p.off, p)
+                size = (
+                    max(abs(start[p.name] - off), 1e-6 * (high - low))
+                    if p.off is not None
+                    else abs(start[p.name]) or high - low
+                )
+                rows.append(
+                    Unknown(
+                        f"effect[{k}].{p.name}",
+                        where.unit_of(p),
+                        off,
+                        low,
+                        high,
+                        size,
+                        None,
+                        index,
+                        p is law.amplitude(),
+                    )
+                )
+            k += 1
+        return tuple(rows)
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """Where a fit begins, one SI number an unknown."""
+        values = []
+        for unknown in self.unknowns:
+            if unknown.cause is None:
+                values.append(min(max(self.own.get(unknown.path, unknown.nominal), unknown.low), unknown.high))
+            else:
+                values.append(min(max(self.starts[unknown.cause][unknown.name], unknown.low), unknown.high))
+        return np.array(values)
+
+    def responses(self, recording: Recording, cache: dict) -> dict[tuple[float, bool], Response]:
+        """One response for every sample time and drive convention in the recording."""
+        kinds = {(r.sample_time, r.linear) for r in recording.records}
+        free = tuple(u.path for u in self.unknowns)
+        found = {}
+        for h, linear in kinds:
+            key = (self.causes, h, linear, tuple(cause.effect for cause in self.causes))
+            if key not in cache:
+                cache[key] = Response(self.described, free, recording.channels, h, linear)
+            found[h, linear] = cache[key]
+        return found
+
+
+def _settled(value: float, p: Param, where: Where) -> float:
+    """The middle of the range that an amplitude is expected in, where it is; else the value."""
+    return value if p.expected is None else where.si(sum(p.expected) / 2, p)
+
+
+def _inside(value: float, p: Param, where: Where) -> float:
+    low, high = (where.si(b, p) for b in p.bounds)
+    return min(max(value, low), high)
+
+
+def _around(value: float, reach: float) -> tuple[float, float]:
+    """Bounds of an uncertain number, which does not change its sign."""
+    low, high = value - reach, value + reach
+    return (max(low, 1e-3 * value), high) if value > 0 else (low, min(high, 1e-3 * value)) if value < 0 else (low, high)
+
+
+def _reach(number: Quantity) -> tuple[float, float]:
+    """How far a suspected number is looked for [SI]: a tenth to ten times of it, half a radian for an angle."""
+    span = (abs(number.si) or 1e-3) * 0.9 if written_unit(number.text) not in ("deg", "rad") else 0.5
+    return number.si - span, number.si + 10 * span
+
+
+_MOVABLE: dict[int, tuple[Device, frozenset[str]]] = {}
+
+
+def _movable(device: Device) -> frozenset[str]:
+    if id(device) not in _MOVABLE:
+        _MOVABLE.clear()  # the device is kept with its answer, so that no other one gets its id meanwhile
+        _MOVABLE[id(device)] = (device, frozenset(movable(device)))
+    return _MOVABLE[id(device)][1]
+
+
+def changed(device: Device, values: dict[str, float]) -> Device:
+    """The device with some of its numbers at other values [SI]."""
+
+    def walk(node: object, prefix: str) -> object:
+        if isinstance(node, Quantity):
+            return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
+        if isinstance(node, Section):
+            fields = {
+                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key)
+                for key in type(node).model_fields
+                if key != "effect"
+            }
+            return node.model_copy(update=fields)
+        if isinstance(node, tuple):
+            return tuple(walk(member, f"{prefix}[{i}]") for i, member in enumerate(node))
+        return node
+
+    return walk(device, "") if values else device

@@ -1,0 +1,114 @@
+"""What a recording could have shown: the smallest effect of each kind that would have been seen, and what stays hidden.
+
+An amplitude a gives z = a/sd; it is seen where |z| exceeds the screen's threshold, and named where z^2 also exceeds what
+the search asks for. A law whose slope lies in the span of the free numbers' slopes cannot be seen at any size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ctrlgen.core.units import difference, written_unit
+from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, numbers
+from ctrlgen.diagnosis.selection.model_selection import MATERIAL
+from ctrlgen.diagnosis.selection.screen import Screened
+
+ALIKE = 0.98  # |cos| from which two causes cannot be told apart
+MOST_ALIKE = 3
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """The smallest amplitude of one kind that would have been seen, `named_from` which it would also have been named,
+    in `unit`, at the place where it shows most; `alike` what it would be taken for there."""
+
+    effect: str
+    location: str
+    amplitude: str
+    seen_from: float
+    named_from: float
+    unit: str
+    alike: tuple[tuple[str, str], ...]
+    everywhere: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A cause that this recording cannot show, and what it hides behind."""
+
+    effect: str
+    location: str
+    behind: str
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """`smallest` by kind, and the `hidden` causes."""
+
+    smallest: dict[str, Smallest]
+    hidden: tuple[Hidden, ...]
+
+
+def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
+    """What would have been seen besides the causes of `fit`, by the screen of its residual over `n` samples.
+
+    Where `fit` leaves more than the noise, that counts as noise here.
+    """
+    louder = max(1.0, (fit.chi2 / max(n, 1)) ** 0.5)
+    need = max(screened.threshold, MATERIAL * n**0.5)
+    nominal = {path: number for path, _, number in numbers(fit.structure.device)}
+    kinds: dict[str, dict[Hypothesis, tuple[float, float, str]]] = {}
+    for suspect in screened.suspects:
+        h = suspect.hypothesis
+        sd = louder * screened.amplitude_sd[h.effect, h.location]
+        if h.effect == PARAMETER:
+            unit, weight = written_unit(nominal[h.path].text), 1 / max(abs(nominal[h.path].si), 1e-300)
+        else:
+            where = fit.structure.place(h)
+            unit, weight = where.unit_of(h.law.amplitude()), 1 / abs(where.si(_span(h), h.law.amplitude()))
+        kinds.setdefault(h.effect, {})[h] = (float(difference(sd, unit)), sd * weight, unit)
+    beyond = [h for places in kinds.values() for h, (_, weight, _) in places.items() if screened.threshold * weight > 1]
+    kinds = {kind: left for kind, p in kinds.items() if (left := {h: row for h, row in p.items() if h not in beyond})}
+    smallest = {kind: _smallest(kind, places, screened, need) for kind, places in sorted(kinds.items())}
+    free = {u.path for u in fit.structure.unknowns}
+    hidden = tuple(
+        Hidden(h.effect, h.location, _behind(fit, k)) for h, k in screened.hidden.items() if h.path not in free
+    )
+    too_small = tuple(Hidden(h.effect, h.location, "the noise: it would show only beyond its bounds") for h in beyond)
+    return Detectable(smallest, hidden + too_small)
+
+
+def _span(h: Hypothesis) -> float:
+    low, high = h.law.amplitude().bounds
+    return high - low
+
+
+def _smallest(
+    kind: str, places: dict[Hypothesis, tuple[float, float, str]], screened: Screened, need: float
+) -> Smallest:
+    best = min(places, key=lambda h: places[h][1])
+    sd, _, unit = places[best]
+    own = next(s for s in screened.suspects if s.hypothesis == best)
+    others = sorted((s for s in screened.suspects if s.hypothesis != best), key=lambda s: -screened.alike(own, s))
+    alike = tuple(
+        (s.hypothesis.effect, s.hypothesis.location)
+        for s in others[:MOST_ALIKE] if screened.alike(own, s) >= ALIKE
+    )  # fmt: skip
+    name = best.path.rpartition(".")[2] if kind == PARAMETER else best.law.amplitude().name
+    everywhere = {h.location: screened.threshold * value for h, (value, *_) in places.items()}
+    return Smallest(kind, best.location, name, screened.threshold * sd, need * sd, unit, alike, everywhere)
+
+
+def _behind(fit: Fit, column: int) -> str:
+    """The free number in words."""
+    unknowns = fit.structure.unknowns
+    if column < 0:
+        return "nothing: it does not reach these readings"
+    if column >= len(unknowns):
+        return "what the records start with"
+    unknown = unknowns[column]
+    if unknown.cause is None:
+        return f"the device's own {unknown.path}"
+    cause = fit.structure.causes[unknown.cause]
+    return f"{cause.effect} at {cause.location}"

@@ -1,0 +1,138 @@
+"""A small family of drives for any device: what a next experiment may be chosen from.
+
+Shapes run over -1 ... 1 and are scaled into what the device's limits allow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
+from ctrlgen.recordings.recording import Record
+
+STRENGTHS = (
+    0.001,
+    0.002,
+    0.005,
+    0.01,
+    0.02,
+    0.05,
+    0.1,
+    0.2,
+    0.3,
+    0.4,
+    0.6,
+    0.8,
+    1.0,
+)  # of the range of the drives; the largest that keeps every limit
+SLACK = 1e-6  # of a limit's own size
+LINES = 15
+LEVELS = (0.0, 1.0, 0.0, -1.0, 0.0, 0.5, 0.0, -0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A drive of order one, (n, n_u), with what it is in words."""
+
+    kind: str
+    said: str
+    values: np.ndarray
+
+
+def shapes(n: int, n_u: int, rate: float, seed: int) -> Iterator[Shape]:
+    """Series of `n` samples for `n_u` actuators; `rate` samples a second."""
+    rng, s = np.random.default_rng(seed), np.arange(n) / n
+    for kind, highest in (("slow multisine", 40), ("fast multisine", n // 10)):
+        harmonics = np.unique(np.geomspace(1, max(highest, 2), LINES).astype(int) // 2 * 2 + 1)
+        waves = np.cos(2 * np.pi * (np.multiply.outer(s, harmonics)[:, None] + rng.random((n_u, len(harmonics)))))
+        values = waves.sum(axis=2)
+        top = harmonics.max() * rate / n
+        yield Shape(kind, f"{kind}, odd lines up to {top:.3g} Hz", values / np.abs(values).max())
+    triangle = 1 - 2 * np.abs(2 * ((2 * s + 0.25) % 1) - 1)
+    yield Shape("slow triangle", "two slow triangles, without rest", _together(triangle, n_u))
+    levels = np.array(LEVELS)[np.minimum((s * len(LEVELS)).astype(int), len(LEVELS) - 1)]
+    yield Shape("steps and rests", f"steps with rests of {n / len(LEVELS) / rate:.3g} s", _together(levels, n_u))
+    once = np.where((s >= 0.1) & (s < 0.5), 1.0, 0.0)
+    yield Shape("on and off", "off, on for 40 % of the time, off for the rest", _together(once, n_u))
+    square = np.where((8 * s) % 2 < 1, 1.0, -1.0)
+    yield Shape("on/off cycles", "four cycles between the limits", _together(square, n_u))
+    if n_u > 1:
+        turns = np.minimum((s * n_u).astype(int), n_u - 1)
+        own = (s * n_u) % 1
+        wave = np.where(own < 0.25, 0.0, np.where(own < 0.6, 1.0, -1.0))
+        yield Shape(
+            "one axis at a time", "each actuator stepped and returned alone", wave[:, None] * np.eye(n_u)[turns]
+        )
+
+
+def poses(n: int, n_u: int, seed: int) -> Iterator[Shape]:
+    """Sets of `n` settled poses."""
+    rng = np.random.default_rng(seed)
+    turns, steps = np.arange(n) % n_u, np.arange(n) // n_u
+    level = np.linspace(-1, 1, max(steps.max() + 1, 2))[steps]
+    yield Shape("one axis at a time", "each actuator alone over its range", level[:, None] * np.eye(n_u)[turns])
+    yield Shape("all together", "all actuators alike over their range", _together(np.linspace(-1, 1, n), n_u))
+    yield Shape("corners", "every actuator at one of its ends", rng.choice([-1.0, 1.0], (n, n_u)))
+    yield Shape("anywhere", "poses spread evenly over the range", rng.uniform(-1, 1, (n, n_u)))
+
+
+def _together(values: np.ndarray, n_u: int) -> np.ndarray:
+    return np.repeat(values[:, None], n_u, axis=1)
+
+
+def admissible(
+    shape: Shape, response: Response, p: np.ndarray, template: Record, first: float
+) -> tuple[Record, float] | None:
+    """`shape` as a record from time `first` [s] as strong as every limit of the device allows, and its strength; None
+    where even the weakest breaks one. `template` gives clock, convention and, where the device states none, the range.
+    """
+    low, high = response.model.u_bounds
+    low = np.where(np.isfinite(low), low, template.drive.min(axis=0))
+    high = np.where(np.isfinite(high), high, template.drive.max(axis=0))
+    n = len(shape.values)
+    h = template.sample_time if np.isfinite(template.sample_time) else 1.0
+    one_sided, best = low >= 0, None
+    first_left, last_left = 0, len(STRENGTHS) - 1
+    while first_left <= last_left:
+        middle = (first_left + last_left + 1) // 2
+        half = STRENGTHS[middle] * np.where(one_sided, (high - low) / 2, np.minimum(high, -low))
+        centre = np.where(one_sided, low + half, 0.0)
+        drive = np.clip(centre + half * shape.values, low, high)
+        record = Record(
+            f"next: {shape.kind}", "fit", first + np.arange(n) * h, template.sample_time, drive,
+            np.zeros((n, template.observed.shape[1])), template.linear, None,
+            np.ones((n, template.observed.shape[1]), bool),
+        )  # fmt: skip
+        if _kept(response, p, record):
+            best, first_left = (record, STRENGTHS[middle]), middle + 1
+        else:
+            last_left = middle - 1
+    return best
+
+
+def _kept(response: Response, p: np.ndarray, record: Record) -> bool:
+    """Whether the predicted motion breaks no limit."""
+    m = response.model
+    after = motion(response, record, p, None)[1]
+    if not np.all(np.isfinite(after)):
+        return False
+    given = [ca.vertcat(m.x, m.z), m.u, m.p, response.ambient]
+    expr = ca.vertcat(*(ca.substitute(limit.expr, m.heat, m.heat_of_drive) for limit in m.limits))
+    n = len(after)
+    f = ca.Function("limits", given, [expr]).map(n)
+    values = f(after.T, record.drive.T, np.tile(p[:, None], (1, n)), np.zeros((1, n))).full().T
+    first = 0
+    for limit in m.limits:
+        own = values[:, first : first + limit.expr.numel()]
+        first += limit.expr.numel()
+        size = max(abs(limit.lower or 0.0), abs(limit.upper or 0.0))
+        if limit.lower is not None and own.min() < limit.lower - SLACK * size:
+            return False
+        if limit.upper is not None and own.max() > limit.upper + SLACK * size:
+            return False
+    return True

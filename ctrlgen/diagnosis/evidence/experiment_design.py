@@ -1,0 +1,160 @@
+"""Step 12: the next experiment, the drive that best separates what this recording leaves open.
+
+T-optimal with refitted rivals (A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57), linearised: with Delta the
+difference of two rivals' whitened readings and J the slopes of the one that is refitted to the other's prediction,
+
+    separation^2 = min over delta of |Delta - J delta|^2,
+
+over this recording and the new one together; the smaller of both directions, in standard deviations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
+from ctrlgen.diagnosis.evidence.excitation_signals import admissible, poses, shapes
+from ctrlgen.diagnosis.selection.candidate_model import Search
+from ctrlgen.recordings.recording import Record
+
+MOST_SAMPLES = 4000  # of a proposed series
+MOST_POSES = 100
+MOST_RIVALS = 2
+SUSPECTS = 2
+SETTLES = 3.0  # standard deviations that settle a doubt
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One drive and the separation in standard deviations that it promises, with this recording."""
+
+    kind: str
+    said: str
+    strength: float
+    separation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """The best `drive` (a record without readings) between `rivals` (their causes), `separation` now and after it; all
+    `candidates`, best first."""
+
+    rivals: tuple[str, str]
+    reason: str
+    before: float
+    after: float
+    candidates: tuple[Candidate, ...]
+    record: Record
+
+    @property
+    def settles(self) -> bool:
+        """Whether it would tell them apart."""
+        return self.after >= SETTLES
+
+
+def next_experiment(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> Experiment | None:
+    """The drive that best tells the chosen structure from its rivals or, where the recording stays unexplained, the two
+    most conspicuous suspects from one another; None where nothing is open that a drive of the family could settle."""
+    pairs, reason = _open(fitter, search, explained)
+    if not pairs:
+        return None
+    return max(
+        (found for a, b in pairs if (found := separate(fitter, a, b, reason, seed)) is not None),
+        key=lambda e: -e.before,
+        default=None,
+    )
+
+
+def _open(fitter: Fitter, search: Search, explained: bool) -> tuple[list[tuple[Fit, Fit]], str]:
+    """Pairs of fits between which the recording does not decide."""
+    rivals = sorted((t for rows in search.rivals for t in rows), key=lambda t: t.total)
+    chosen = search.chosen.fit
+    if rivals:
+        return [(chosen, t.fit) for t in rivals[:MOST_RIVALS]], "both explain this recording alike"
+    if explained or not search.rounds or search.rounds[-1].before.fit is not chosen:
+        return [], ""
+    tried: dict[str, Fit] = {}
+    for trial in search.rounds[-1].trials:  # none of them was good enough
+        tried.setdefault(trial.cause.effect, trial.fit)
+    fits = [*list(tried.values())[:SUSPECTS], chosen][:SUSPECTS]
+    return ([tuple(fits)] if len(fits) == SUSPECTS else []), "neither explains this recording; they come closest"
+
+
+def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:
+    """The drive of the family that best separates two fits."""
+    template = max(fitter.to_fit, key=lambda r: len(r.time))
+    settled = not np.isfinite(template.sample_time)
+    n, n_u = min(len(template.time), MOST_POSES if settled else MOST_SAMPLES), template.drive.shape[1]
+    family = poses(n, n_u, seed) if settled else shapes(n, n_u, 1 / template.sample_time, seed)
+    first = 0.0 if settled else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
+    response = a.structure.responses(fitter.recording, fitter.cache)[template.sample_time, template.linear]
+    now = [_Sums.present(fitter, *pair) for pair in ((a, b), (b, a))]
+    rows = []
+    for shape in family:
+        given = admissible(shape, response, a.theta, template, first)
+        if given is None:
+            continue
+        record, strength = given
+        both = [s.plus(fitter, *pair, record).separation for s, pair in zip(now, ((a, b), (b, a)), strict=True)]
+        if np.all(np.isfinite(both)):
+            rows.append((Candidate(shape.kind, shape.said, strength, min(both)), record))
+    if not rows:
+        return None
+    rows.sort(key=lambda row: -row[0].separation)
+    best, record = rows[0]
+    before = min(s.separation for s in now)
+    return Experiment((_named(a, b), _named(b, a)), reason, before, best.separation, tuple(r[0] for r in rows), record)
+
+
+def _named(fit: Fit, other: Fit) -> str:
+    """The causes that the other one does not have."""
+    own = [c for c in fit.structure.causes if c not in other.structure.causes]
+    return " and ".join(f"{c.effect} at {c.location}" for c in own) or "the device without it"
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Inner products of J and Delta over some records, what the records start with projected out."""
+
+    N: np.ndarray
+    g: np.ndarray
+    s: float
+
+    @property
+    def separation(self) -> float:
+        """Standard deviations that are left when J has taken what it can."""
+        if not (np.isfinite(self.N).all() and np.isfinite(self.g).all()):  # the motion left the numbers
+            return float("nan")
+        d = np.sqrt(np.maximum(np.diag(self.N), 1e-300))
+        taken = (self.g / d) @ np.linalg.pinv(self.N / np.outer(d, d), rcond=1e-12) @ (self.g / d)
+        return float(np.sqrt(max(self.s - taken, 0.0)))
+
+    @classmethod
+    def present(cls, fitter: Fitter, truth: Fit, refitted: Fit) -> _Sums:
+        """On the records to fit; the rows of the prior hold the refitted one's numbers."""
+        n = sum(r.valid.size for r in fitter.to_fit)
+        delta = np.zeros(len(refitted.residual))
+        delta[:n] = refitted.residual[:n] - truth.residual[:n]
+        return cls._of(-refitted.J, delta, len(refitted.theta))
+
+    def plus(self, fitter: Fitter, truth: Fit, refitted: Fit, record: Record) -> _Sums:
+        """With one record more."""
+        response = refitted.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+        y, slopes = response.sensitivities(record, refitted.theta)
+        other = truth.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+        delta = fitter.noise.whiten(other.outputs(record, truth.theta) - y, record.valid).ravel()
+        J = fitter.noise.whiten(slopes, record.valid).reshape(len(delta), -1)
+        sizes = start_sizes(response)
+        prior = np.hstack([np.zeros((len(sizes), len(refitted.theta))), np.diag(1 / sizes)])
+        new = _Sums._of(np.vstack([J, prior]), np.concatenate([delta, np.zeros(len(sizes))]), len(refitted.theta))
+        return _Sums(self.N + new.N, self.g + new.g, self.s + new.s)
+
+    @classmethod
+    def _of(cls, J: np.ndarray, delta: np.ndarray, k: int) -> _Sums:
+        theta, start = J[:, :k], J[:, k:]
+        if start.shape[1]:
+            q = np.linalg.qr(start / np.maximum(np.linalg.norm(start, axis=0), 1e-300))[0]
+            theta, delta = theta - q @ (q.T @ theta), delta - q @ (q.T @ delta)
+        return cls(theta.T @ theta, theta.T @ delta, float(delta @ delta))

@@ -1,0 +1,95 @@
+"""The next experiment as files: the drive as CSV, a recording.toml to fill in, and a scenario that the solver runs."""
+
+from __future__ import annotations
+
+import json
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.units import difference
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.evidence.experiment_design import Experiment
+from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
+from ctrlgen.model.model import Model
+
+DRIVE, RECORDING, SCENARIO, COMMAND = "drive.csv", "recording.toml", "scenario.toml", "displacement.csv"
+FITTED = 0.6  # of the proposed record; the rest is held out
+
+
+def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
+    """Contents by file name. `device_file` is the device as the diagnosis corrected it, seen from these files.
+
+    A device in which masses move has no scenario: the solver knows devices that stand in balance.
+    """
+    record = chosen.record
+    response = fit.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+    found = {DRIVE: _drive(response, chosen), RECORDING: _recording(fitter, response, chosen)}
+    return found | (_scenario(response, fit, chosen, device_file) if _solved(response.model) else {})
+
+
+def _solved(m: Model) -> bool:
+    """Whether the solver knows the device: it stands in balance and carries something in space."""
+    return not m.inertial and not m.device.links(m.device.values()).imposed and len(m.signals["pose"].channels) > 1
+
+
+def _csv(header: list[str], columns: np.ndarray) -> str:
+    rows = [",".join(header), *(",".join(f"{value:.9g}" for value in row) for row in columns)]
+    return "\n".join(rows) + "\n"
+
+
+def _drive(response: Response, chosen: Experiment) -> str:
+    signal, record = response.model.signals["drive"], chosen.record
+    units = zip(record.drive.T, signal.units, strict=True)
+    columns = [difference(u, unit) for u, unit in units]
+    header = [f"{c} [{u}]" for c, u in zip(signal.channels, signal.units, strict=True)]
+    if not np.isfinite(record.sample_time):
+        return _csv(header, np.column_stack(columns))
+    time = record.sample_time * np.arange(len(record.drive))
+    return _csv(["time [s]", *header], np.column_stack([time, *columns]))
+
+
+def _recording(fitter: Fitter, response: Response, chosen: Experiment) -> str:
+    """A recording.toml that names the drive's columns and leaves the readings' to the reader."""
+    recording, record, signal = fitter.recording, chosen.record, response.model.signals["drive"]
+    n = len(record.drive)
+    cut = int(FITTED * n)
+    lines = [
+        f"# {chosen.candidates[0].said}. Add the readings as columns of {DRIVE}, under the names below.",
+        f"title  = {json.dumps(f'next experiment after: {recording.title}')}",
+        f"device = {json.dumps(recording.device)}",
+        f"kind   = {json.dumps(recording.kind)}",
+    ]
+    timed = np.isfinite(record.sample_time)
+    for role, rows in (("fit", [0, cut]), ("hold_out", [cut, n])):
+        lines += ["", "[[record]]", f'file = "{DRIVE}"', f'role = "{role}"', f"rows = {rows}"]
+        if timed:
+            start = json.dumps(f"{rows[0] * record.sample_time:.9g} s")
+            lines += ['time = { column = "time [s]", unit = "s" }', f"start = {start}"]
+        if record.linear:
+            lines.append('between_samples = "linear"')
+    lines += ["", "[columns]"]
+    for c, u in zip(signal.channels, signal.units, strict=True):
+        lines.append(f'"drive.{c}" = {{ column = "{c} [{u}]", unit = "{u}" }}')
+    for name, u in zip(recording.channels, recording.units, strict=True):
+        lines.append(f'"{name}" = {{ column = "{name} [{u}]", unit = "{u}" }}')
+    return "\n".join(lines) + "\n"
+
+
+def _scenario(response: Response, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
+    """The predicted displacements as a command; the solver finds the drives again."""
+    m, record = response.model, chosen.record
+    after = motion(response, record, fit.theta, None)[1]
+    f = ca.Function("z", [ca.vertcat(m.x, m.z)], [m.z]).map(len(after))
+    signal = m.signals["displacement"]
+    z = f(after.T).full().T
+    columns = np.column_stack([difference(c, u) for c, u in zip(z.T, signal.units, strict=True)])
+    header = [f"{c} [{u}]" for c, u in zip(signal.channels, signal.units, strict=True)]
+    rate = f'sample_rate = "{1 / record.sample_time:.9g} Hz"\n' if np.isfinite(record.sample_time) else ""
+    text = (
+        f"title = {json.dumps(f'next experiment: {chosen.candidates[0].said}')}\n"
+        f"device = {json.dumps(device_file)}\n"
+        f'follow = "displacement"\n{rate}\n[path]\nkind = "poses"\nfile = "{COMMAND}"\n'
+    )
+    return {SCENARIO: text, COMMAND: _csv(header, columns)}

@@ -1,0 +1,160 @@
+"""A fitted structure linearised along the motion of one record: how a disturbance at any place and moment reaches the
+readings.
+
+    D+ = F_S D + F_f f,   y = H_S D + H_f f
+
+f are the probes' disturbances, in the unit of their place, D what they do to the state. What is left of a recording is
+judged in the coordinates of the readings (`residual`, `white`) or, through these slopes, in those of the actuators.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.devices import Links
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
+from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_links
+from ctrlgen.effects import Place
+from ctrlgen.recordings.recording import Record
+
+BLOCK = 5000  # samples linearised at a time
+STANDS = 1e-3  # of the fastest motion: below, a stage counts as standing
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """One record along the motion of one fit, SI.
+
+    `residual` (n, n_y) observed - predicted, zero where not valid; `white` the same as unit white noise, zero where not
+    `usable`; `displacement` and `velocity` (n, n_axes); `F_S`, `F_f`, `H_S`, `H_f` (n, ., .) with one column of f for
+    each axis at `place`; `start_sd` (n_s,) how far the state may start from rest, `state_scale` its typical size.
+    """
+
+    record: Record
+    place: Place
+    axes: tuple[str, ...]
+    units: tuple[str, ...]
+    travel_unit: str
+    residual: np.ndarray
+    white: np.ndarray
+    usable: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    F_S: np.ndarray
+    F_f: np.ndarray
+    H_S: np.ndarray
+    H_f: np.ndarray
+    start_sd: np.ndarray
+    state_scale: np.ndarray
+
+    @property
+    def settled(self) -> bool:
+        """Whether the samples are separate poses."""
+        return not np.isfinite(self.record.sample_time)
+
+    def readings(self, f: np.ndarray, axis: np.ndarray) -> np.ndarray:
+        """What disturbances f (n, m), column j at `axis`[j], add to the readings: (n, n_y, m), SI."""
+        following = f if self.settled else np.vstack([f[1:], f[-1:]])
+        into = self.F_f[:, :, axis] * ((f + following) / 2)[:, None, :]
+        direct = self.H_f[:, :, axis] * f[:, None, :]
+        states = np.empty_like(into)
+        D = np.zeros(into.shape[1:])
+        for k in range(len(f)):
+            states[k] = D
+            D = self.F_S[k] @ D + into[k]
+        return self.H_S @ states + direct
+
+    def steady(self) -> np.ndarray:
+        """Readings per lasting unit disturbance (n_y, n_axes), SI, where the motion is typical (its middle sample)."""
+        k = len(self.F_S) // 2
+        held = np.linalg.lstsq(np.eye(self.F_S.shape[1]) - self.F_S[k], self.F_f[k], rcond=1e-10)[0]
+        return self.H_S[k] @ held + self.H_f[k]
+
+    def direction(self) -> np.ndarray:
+        """Sign of the motion of each axis, (n, n_axes), 0 where it stands."""
+        fastest = np.abs(self.velocity).max(axis=0)
+        return np.where(np.abs(self.velocity) > STANDS * fastest, np.sign(self.velocity), 0.0)
+
+
+def acts_at(links: Links) -> Place:
+    """Where unknown physics is sought: a force, where one moves a mass or is read; else a displacement."""
+    return Place.FORCE if links.mass is not None or links.imposed else Place.DISPLACEMENT
+
+
+def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
+    """The linearisation of `fit` along `record`."""
+    links = nominal_links(fit.structure.device)
+    place = acts_at(links)
+    response, p, chosen = _probed(fitter, fit, record, place)
+    start = _start(fitter, fit, record)
+    before, after, y = motion(response, record, p, start)
+    if start is None:
+        y = fitter.predicted(fit, record)
+    F_S, F_f, H_S, H_f = _linearised(response, record, p, chosen, before)
+    at = before if np.isfinite(record.sample_time) else after
+    m = response.model
+    z = at[:, response.n_x :]
+    noise = fitter.noise
+    residual = np.where(record.valid, record.observed - y, 0.0)
+    probes = m.device.effect[len(fit.structure.described.effect) :]
+    placed = [probe for probe in probes if probe.place is place]
+    sd = np.zeros(response.n_s)
+    sd[list(response.initial)] = start_sizes(response)
+    return Along(
+        record, place, tuple(probe.at for probe in placed),
+        tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), links.travel_unit,
+        residual,
+        noise.whiten(residual, record.valid), noise.usable(record.valid), z, _velocity(response, record, at, z),
+        F_S, F_f, H_S, H_f, sd, np.concatenate([m.x_scale, m.z_scale]),
+    )  # fmt: skip
+
+
+def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Response, np.ndarray, list[int]]:
+    """The response with probes, its parameters, and which of them are the probes at `place`."""
+    known = [unknown.path for unknown in fit.structure.unknowns]
+    device, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
+    paths = [path for (where, _), path in probes.items() if where is place]
+    key = ("along", fit.structure.causes, record.sample_time, record.linear)
+    if key not in fitter.cache:
+        fitter.cache[key] = Response(
+            device, [*known, *paths], fitter.recording.channels, record.sample_time, record.linear
+        )
+    p = np.concatenate([fit.theta, np.zeros(len(paths))])
+    return fitter.cache[key], p, list(range(len(known), len(p)))
+
+
+def _start(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray | None:
+    """What a record to fit was found to start with; others are linearised along the motion from rest."""
+    places = [k for k, r in enumerate(fitter.to_fit) if r is record]
+    return fit.starts[places[0]] if places and fit.starts else None
+
+
+def motion(
+    r: Response, record: Record, p: np.ndarray, start: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """S before and after each sample, (n, n_s), and the readings (n, n_y)."""
+    after, y = r.motion(record, p, start)
+    return np.vstack([r._start(record, p, start), after[:-1]]), after, y
+
+
+def _linearised(
+    r: Response, record: Record, p: np.ndarray, chosen: list[int], before: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """F_S, F_f, H_S, H_f along the motion."""
+    linear, inputs = r.linearised(p, chosen), (before, *r._inputs(record))
+    parts = [linear.along(*(x[a : a + BLOCK] for x in inputs)) for a in range(0, len(before), BLOCK)]
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+
+
+def _velocity(r: Response, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Of the axes, (n, n_axes) [SI]; between settled poses the step from the pose before."""
+    n_v = r.model.v.numel()
+    if n_v:
+        return at[:, r.n_x - n_v : r.n_x]
+    if not np.isfinite(record.sample_time):
+        return np.vstack([z[:1], np.diff(z, axis=0)])
+    return np.gradient(z, record.sample_time, axis=0) if len(z) > 1 else np.zeros_like(z)

@@ -1,0 +1,76 @@
+"""What an unknown force might depend on: dimensionless features of position, speed, history and drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
+
+PLAYS = (0.02, 0.05, 0.1, 0.2, 0.4)  # half widths, of the largest displacement
+STOPS = (0.4, 0.6, 0.8)  # of the largest displacement, where something one-sided may begin
+LAGS = 5  # relaxation times, logarithmic between four samples and a third of the record
+SOFT_SIGN = 0.02  # of the largest speed
+
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """What features are counted in: the largest `travel` and `speed` [SI] of an axis, the largest `drives` (n_u,), the
+    longest `time` [s]; `lags` [s] the relaxation times."""
+
+    travel: float
+    speed: float
+    drives: np.ndarray
+    time: float
+    lags: tuple[float, ...]
+
+
+def sizes(to_fit: list[Along], axis: int) -> Sizes:
+    """Of the records to fit."""
+    travel, speed = (
+        max(float(np.abs(getattr(a, k)[:, axis]).max()) for a in to_fit) for k in ("displacement", "velocity")
+    )
+    drives = np.max([np.abs(a.record.drive).max(axis=0) for a in to_fit], axis=0)
+    h, longest = to_fit[0].record.sample_time, max(len(a.white) for a in to_fit)
+    lags = () if to_fit[0].settled else tuple(np.geomspace(4 * h, longest * h / 3, LAGS))
+    time = max(float(np.abs(a.record.time).max()) for a in to_fit)
+    return Sizes(travel or 1.0, speed or 1.0, np.where(drives > 0, drives, 1.0), time or 1.0, lags)
+
+
+def features(left: Along, axis: int, size: Sizes) -> dict[str, np.ndarray]:
+    """Features (n,) by their formula, of order one. Separate poses have neither speed nor history."""
+    d = left.displacement[:, axis] / size.travel
+    found = {"1": np.ones_like(d), "d": d, "d^2": d**2, "d^3": d**3, "d^4": d**4, "d^5": d**5, "|d|": np.abs(d)}
+    found |= {f"max(d - {x:g}, 0)": np.maximum(d - x, 0) for x in STOPS}
+    found |= {f"min(d + {x:g}, 0)": np.minimum(d + x, 0) for x in STOPS}
+    for k, u in enumerate((left.record.drive / size.drives).T):
+        found |= {f"u{k + 1}": u, f"u{k + 1}^2": u**2, f"u{k + 1}^3": u**3}
+    for k, other in enumerate(left.displacement.T / size.travel):
+        if k != axis:
+            found |= {f"d({left.axes[k]})": other, f"d d({left.axes[k]})": d * other}
+    if left.settled:
+        return found
+    v = left.velocity[:, axis] / size.speed
+    found |= {"v": v, "v|v|": v * np.abs(v), "v^3": v**3, "d v": d * v, "d^2 v": d**2 * v, "|v|": np.abs(v)}
+    found["sign(v)"] = np.tanh(v / SOFT_SIGN)
+    found["|d| sign(v)"] = np.abs(d) * found["sign(v)"]
+    plays = play(d, np.array(PLAYS))
+    found |= {f"play(d, {r:g})": d - p for r, p in zip(PLAYS, plays.T, strict=True)}
+    for tau in size.lags:
+        a = np.exp(-left.record.sample_time / tau)
+        for name, x in (("d", d), ("d^2", d**2), ("u1^2", found["u1^2"])):
+            found[f"lag({name}, {tau:.3g} s)"] = lfilter([0.0, 1 - a], [1.0, -a], x)
+    found["t"] = left.record.time / size.time
+    return found
+
+
+def play(d: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """p = max(d - r, min(d + r, p)), (n, len(r)): what follows d with the slack r."""
+    p, out = np.full(len(r), d[0]), np.empty((len(d), len(r)))
+    low, high = d[:, None] - r, d[:, None] + r
+    for k in range(len(d)):
+        p = np.maximum(low[k], np.minimum(high[k], p))
+        out[k] = p
+    return out

@@ -1,0 +1,112 @@
+"""An empirical term for what no law explains: a sparse sum of the features of `memory`.
+
+Each feature is sent through the linearised device and fitted jointly with the free numbers, r = W(S a + J delta); terms
+are added while BIC and the excess gain. It is a description, not a cause, and never gets a physical name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.core.units import difference
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
+from ctrlgen.diagnosis.evidence.regressors import Sizes, features, sizes
+
+MOST_TERMS = 5
+WORTH = 0.01  # of the excess: a smaller term is not added
+ALREADY = 1e-6  # of a feature's squares left after projection: below, free numbers and earlier terms do as well
+
+
+@dataclass(frozen=True)
+class Empirical:
+    """sum of `terms` (coefficient [`unit`] by feature) at `axis`; d is counted in `travel`, v in `speed`, u in `drives`
+    (SI). `held_out_gain` is the share of the squares left over the noise on the held-out records that goes with it."""
+
+    label: str
+    axis: str
+    terms: dict[str, float]
+    unit: str
+    travel: float
+    speed: float
+    drives: tuple[float, ...]
+    held_out_gain: float
+
+
+def empirical(fitter: Fitter, fit: Fit, left: list[Along], i: int) -> Empirical | None:
+    """The term at axis `i` for what `fit` leaves, None where the held-out records do not gain by it."""
+    to_fit = [a for a in left if a.record.role == "fit"]
+    size = sizes(to_fit, i)
+    parts = [_slopes(fitter, a, i, size) for a in to_fit]
+    names, S = parts[0][1], np.vstack([values for values, _ in parts])
+    scale = np.linalg.norm(fit.J, axis=0)
+    scale[scale == 0] = 1.0
+    J, n = fit.J / scale, len(S)  # below the n readings stands the prior, which knows no feature
+    into = np.linalg.pinv(J.T @ J, rcond=1e-12) @ (J[:n].T @ S)
+    G = S.T @ S - (J[:n].T @ S).T @ into
+    c = S.T @ fit.residual[:n] - into.T @ (J.T @ fit.residual)
+    a = _sparse(np.diag(S.T @ S), G, c, max(fit.chi2 - fit.n, 0.0), fit.n)
+    if not np.any(a):
+        return None
+    delta = (into @ a / scale)[: len(fit.theta)]
+    held = [_held(fitter, fit, h, _slopes(fitter, h, i, size)[0] @ a, delta) for h in left if h.record.role != "fit"]
+    before, after = (sum(part) for part in zip(*held, strict=True))
+    if not (before > 0 and 1 - after / before > WORTH):
+        return None
+    unit = left[0].units[i]
+    terms = {name: float(difference(value, unit)) for name, value in zip(names, a, strict=True) if value}
+    drives = tuple(float(u) for u in size.drives)
+    return Empirical(
+        "empirical", left[0].axes[i], terms, unit, size.travel, size.speed, drives, float(1 - after / before)
+    )
+
+
+def _slopes(fitter: Fitter, a: Along, i: int, size: Sizes) -> tuple[np.ndarray, list[str]]:
+    """Whitened readings per unit [SI] of each feature, (n * n_y, features)."""
+    given = features(a, i, size)
+    y = a.readings(np.column_stack(list(given.values())), np.full(len(given), i))
+    return np.nan_to_num(fitter.noise.whiten(y, a.record.valid).reshape(-1, len(given))), list(given)
+
+
+def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n: int) -> np.ndarray:
+    """Coefficients by forward selection, zero where a feature was not chosen; `G`, `c` the inner products of projected
+    slopes with one another and with the residual, `squares` of the slopes before projection."""
+    size = np.sqrt(np.where(squares > 0, squares, 1.0))
+    G, c = G / np.outer(size, size), c / size
+    chosen: list[int] = []
+    explained, need = 0.0, max(12.0 + np.log(max(n, 2)), WORTH * excess)
+    while len(chosen) < MOST_TERMS:
+        gains = np.full(len(c), -np.inf)
+        for j in range(len(c)):
+            trial = [*chosen, j]
+            if j not in chosen and np.linalg.eigvalsh(G[np.ix_(trial, trial)])[0] > ALREADY:
+                gains[j] = c[trial] @ np.linalg.solve(G[np.ix_(trial, trial)], c[trial]) - explained
+        best = int(np.argmax(gains))
+        if not gains[best] > need:
+            break
+        chosen.append(best)
+        explained += gains[best]
+    a = np.zeros(len(c))
+    if chosen:
+        a[chosen] = np.linalg.solve(G[np.ix_(chosen, chosen)], c[chosen])
+    return a / size
+
+
+def _held(fitter: Fitter, fit: Fit, held: Along, term: np.ndarray, delta: np.ndarray) -> tuple[float, float]:
+    """Excess squares of one held-out record without the term and with it, the start fitted anew."""
+    response = fit.structure.responses(fitter.recording, fitter.cache)[held.record.sample_time, held.record.linear]
+    slopes = response.sensitivities(held.record, fit.theta)[1]
+    Y = np.nan_to_num(fitter.noise.whiten(slopes, held.record.valid)).reshape(
+        held.record.valid.size, -1 if slopes.size else 0
+    )
+    r = held.white.ravel()
+    # fit.J is the residual's slope, hence + : the numbers move back by what the term takes over
+    changed = r - term - Y[:, : len(delta)] @ delta
+    starts = Y[:, len(delta) :] * held.start_sd[held.start_sd > 0][None, : Y.shape[1] - len(delta)]
+    with_prior = np.vstack([starts, np.eye(starts.shape[1])])
+    x = np.linalg.lstsq(with_prior, np.concatenate([changed, np.zeros(starts.shape[1])]), rcond=None)[0]
+    changed = changed - starts @ x
+    n = float(held.usable.sum())
+    return float(r @ r) - n, max(float(changed @ changed) - n, 0.0)

@@ -1,0 +1,1 @@
+"""What could have been left out: every law at every place of a device."""

@@ -1,0 +1,38 @@
+"""A unit disturbance at every place of a device: how an effect's term, whatever its law, reaches the readings."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import casadi as ca
+
+from ctrlgen.core.units import Quantity
+from ctrlgen.devices import Device, Links
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.model.assembly import channels
+
+
+class _Probe(Effect, listed=False):
+    """Delta = delta, constant over a sample."""
+
+    source = "definition"
+    params = (Param("delta", "channel", (-1.0, 1.0), "the disturbance", off=0.0),)
+
+    def __init__(self, place: Place, at: str, unit: str) -> None:
+        super().__init__(at, {"delta": Quantity(0.0, f"0 {unit}")})
+        self.place = place
+
+    def term(self, s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
+        return p.delta
+
+
+def with_probes(device: Device, links: Links) -> tuple[Device, dict[tuple[Place, int], str]]:
+    """The device with a probe everywhere, and the path of each by place and channel."""
+    probes, paths = [], {}
+    for place in Place:
+        if place is Place.HEAT and links.heat_signal is None:
+            continue
+        for i, where in enumerate(channels(links, place)):
+            paths[place, i] = f"effect[{len(device.effect) + len(probes)}].delta"
+            probes.append(_Probe(place, where.channel, where.unit))
+    return device.model_copy(update={"effect": (*device.effect, *probes)}), paths

@@ -1,0 +1,193 @@
+"""Step 5: what could have been left out.
+
+Every effect of the library at every place where it can act, and every number of the device that could be off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+from ctrlgen.core.units import Quantity, from_si
+from ctrlgen.devices import Device, Links
+from ctrlgen.devices.base import Section
+from ctrlgen.effects import Effect, Param, Place, Where
+from ctrlgen.model.assembly import available, channels
+
+DOMAIN = {
+    Place.DRIVE: "actuator", Place.HEAT: "actuator", Place.FORCE: "stage", Place.DISPLACEMENT: "stage",
+    Place.POSE: "mechanism", Place.SENSOR: "sensor",
+}  # fmt: skip
+PARAMETER = "parameter"
+HALF = 0.49  # of the sampling rate: frequencies beyond look like lower ones, and half of it like nothing or an offset
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the records show at one place, SI: the `most` that the signal ("channel"), the displacement ("travel") and its
+    rate ("travel/s") reach, and a part of the records' time ("s"): a limit beyond shows nowhere. `suggested`: frequencies
+    ("lines") that stand out of what is left over, paths after which it repeats ("pitches"), places of the path at which it
+    jumps ("places"), times between which it may change ("moments")."""
+
+    most: dict[str, float] = field(default_factory=dict)
+    suggested: dict[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One effect at one place, `at` a channel (or "all") `of` another; or, for `effect` "parameter", one number of the device.
+
+    `count` says how many of its kind a structure has there already, where it may have several; `highest` [Hz] what the
+    samples can tell from its aliases, infinite where there is no clock.
+    """
+
+    effect: str
+    location: str
+    at: str = ""
+    of: str | None = None
+    path: str = ""
+    count: int = 0
+    highest: float = float("inf")
+
+    def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
+        """The same where `causes` are there already: itself, one more of it, or None where there can be no more."""
+        if any(
+            (c.family, c.location) == (self.family, self.location) and c.effect != self.effect
+            for c in causes
+            if c.family
+        ):
+            return None
+        there = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
+        if not there:
+            return self
+        several = self.effect != PARAMETER and self.law.several
+        return replace(self, count=1 + max(c.count for c in there)) if several else None
+
+    @property
+    def family(self) -> str | None:
+        """Of the effect."""
+        return None if self.effect == PARAMETER else self.law.family
+
+    @property
+    def law(self) -> type[Effect]:
+        """The effect's class. Raises KeyError for a parameter."""
+        return Effect.library[self.effect]
+
+    def shapes(self, where: Where, seen: Seen) -> list[dict[str, float]]:
+        """Every combination of the values tried of the shape parameters [SI]; one empty one for laws without shape."""
+        shaped = [p for p in self.law.params if p is not self.law.amplitude()]
+        grids = [self._tried(p, where, seen) for p in shaped]
+        return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
+
+    def secants(self, where: Where, seen: Seen) -> list[float]:
+        """The amplitudes [SI] to which the slope from `off` is taken too, where the law bends at once."""
+        p = self.law.amplitude()
+        return self._tried(p, where, seen) if p.grid else []
+
+    def _tried(self, p: Param, where: Where, seen: Seen) -> list[float]:
+        """The grid of a parameter and what the records suggest beside it [SI]."""
+        low, high = self.bounds(p, where)
+        if p.level and p.unit in seen.most:
+            return [min(max(value * seen.most[p.unit], low), high) for value in p.grid]
+        suggested = [*seen.suggested.get(p.seen, ()), *(seen.suggested.get("lines", ()) if p.unit == "Hz" else ())]
+        grid = p.grid or (() if suggested else (sum(p.bounds) / 2,))
+        tried = [*(where.si(value, p) for value in grid), *(value for value in suggested if value >= low)]
+        return [value for value in tried if value <= high] or [(low + high) / 2]
+
+    def bounds(self, p: Param, where: Where) -> tuple[float, float]:
+        """Of a parameter [SI], here and with these samples."""
+        low, high = (where.si(b, p) for b in p.bounds)
+        if p.unit == "Hz":
+            return low, max(low, min(high, self.highest))
+        if p.unit == "s" and p.level and self.law.place is not Place.SENSOR:
+            low = min(
+                high, max(low, HALF / self.highest)
+            )  # within a sample a motion shows the middle of a change, not its length
+        return low, high
+
+
+def hypotheses(
+    device: Device, links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+) -> list[Hypothesis]:
+    """All that can act on `device` and be seen in the channels `observed`."""
+    found = [h for law in Effect.library.values() for h in _of_law(law, links, observed, sample_time, ambient)]
+    return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
+
+
+def _of_law(
+    law: type[Effect], links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+) -> Iterator[Hypothesis]:
+    there = available(links, sample_time) - (frozenset() if ambient else {"ambient"})
+    if not law.needs <= there or (law.place is Place.HEAT and links.heat_signal is None):
+        return
+    domain = law.domain or DOMAIN[law.place]
+    highest = HALF / sample_time if sample_time else float("inf")
+    places = channels(links, law.place)
+    seen = {channel.removeprefix("reading.") for channel in observed}
+    if law.place is Place.SENSOR:
+        places = [where for where in places if where.channel in seen]
+    if law.pairs:
+        for k, where in enumerate(places):
+            for j, other in enumerate(channels(links, law.place)):
+                if law.fits(where.beside(other)) and not (law.mutual and j < k):
+                    yield Hypothesis(
+                        law.kind, f"{domain}:{where.channel}", where.channel, other.channel, highest=highest
+                    )
+        return
+    fitting = [where for where in places if law.fits(where)]
+    for where in () if law.whole else fitting:
+        yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, highest=highest)
+    if law.whole or (len(fitting) > 1 and law.place is not Place.SENSOR):
+        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
+
+
+def _numbers(device: Device) -> Iterator[tuple[str, str]]:
+    """(path, location) of every number that may be off and is not taken as uncertain anyway."""
+    for path, section, number in numbers(device):
+        if not number.whole:
+            yield path, f"{section.domain}:{path.rpartition('.')[2]}"
+
+
+def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
+    """Every number outside the effects with the section that holds it."""
+
+    def walk(node: object, prefix: str, section: Section) -> Iterator[tuple[str, Section, Quantity]]:
+        if isinstance(node, Quantity):
+            yield prefix, section, node
+        elif isinstance(node, Section):
+            for key in type(node).model_fields:
+                if key != "effect":
+                    yield from walk(getattr(node, key), f"{prefix}.{key}" if prefix else key, node)
+        elif isinstance(node, tuple):
+            for i, member in enumerate(node):
+                yield from walk(member, f"{prefix}[{i}]", section)
+
+    yield from walk(device, "", device)
+
+
+_LINKS: dict[int, tuple[Device, Links]] = {}
+
+
+def nominal_links(device: Device) -> Links:
+    """The links of a device with its own numbers, chained once: a hexapod's take a tenth of a second."""
+    if id(device) not in _LINKS:
+        _LINKS.clear()
+        _LINKS[id(device)] = (device, device.links(device.values()))
+    return _LINKS[id(device)][1]
+
+
+def nuisances(device: Device) -> dict[str, float]:
+    """Paths of the numbers that are uncertain by their own statement or their section's tolerance, with that deviation [SI]."""
+    found = {}
+    for path, section, number in numbers(device):
+        sd = number.sd if number.sd is not None else (section.tolerance or 0.0) * abs(number.si)
+        if sd and not number.whole:
+            found[path] = sd
+    return found
+
+
+def written(si: float, unit: str, source: str | None = None) -> Quantity:
+    """A number found, as a device file would state it."""
+    shown = f"{from_si(si, unit):.9g} {'' if unit == '1' else unit}".strip()
+    return Quantity(si, shown, source)

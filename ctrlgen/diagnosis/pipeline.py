@@ -1,0 +1,147 @@
+"""The whole diagnosis: files in, a folder with report.html, diagnosis.json and device.next.toml out, whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ctrlgen._version import __version__
+from ctrlgen.core.files import read_toml, whole_folder, write_text
+from ctrlgen.core.to_json import plain
+from ctrlgen.devices import Device, load_device
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.estimation.checkpoint import Journal
+from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
+from ctrlgen.diagnosis.report.diagnosis_json import as_dict
+from ctrlgen.diagnosis.report.html_report import Provenance, page
+from ctrlgen.diagnosis.report.writeback import write_next
+from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+from ctrlgen.model.model import build_model
+from ctrlgen.recordings.reader import load_recordings
+from ctrlgen.recordings.recording import Recording
+from ctrlgen.recordings.schema import FILE
+
+Progress = Callable[[str], None]
+Paths = Path | str | Sequence[Path | str]
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """How many bootstrap replicates, and where they run (see `ctrlgen.core.parallel`)."""
+
+    count: int
+    scheduler: str | None = None
+    jobs: int | None = None
+
+    def of(self, found: Diagnosis, seed: int, step: Progress) -> Bootstrap:
+        """The bootstrap of a diagnosis; `step` is told how far it is."""
+        step(f"bootstrap, {self.count} replicates")
+
+        def told(done: int, of: int) -> None:
+            step(f"bootstrap, {done} of {of} replicates")
+
+        return bootstrap(found, self.count, seed, self.scheduler, self.jobs, told)
+
+
+def diagnose(
+    device: Device | Path | str,
+    recording: Recording | Paths,
+    seed: int = 0,
+    progress: Progress | None = None,
+    journal: Journal | None = None,
+) -> Diagnosis:
+    """What `device` leaves out that `recording` shows; each may be an object or its file, a recording also several files.
+
+    Deterministic for a given `seed`; `progress` is called with a sentence before each step. Raises InputError.
+    """
+    device = device if isinstance(device, Device) else load_device(device)
+    if not isinstance(recording, Recording):
+        if progress:
+            progress("reading")
+        paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
+        recording = load_recordings(paths, build_model(device))
+    return diagnose_recording(device, recording, seed, progress, journal)
+
+
+def diagnose_into(
+    device: Path | str,
+    recordings: Sequence[Path | str],
+    out: Path | str,
+    seed: int = 0,
+    progress: Progress | None = None,
+    replicates: Replicates | None = None,
+) -> Diagnosis:
+    """The same, reported into the folder `out`, which is replaced whole or left alone. Raises InputError.
+
+    What is stopped leaves its fits in a file beside `out`, and goes on from there when it is asked the same again.
+    With `replicates` bootstrap.json is written too, and stands in the diagnosis' `extra` as "bootstrap".
+    """
+    step = progress or (lambda _: None)
+    with whole_folder(Path(out)) as draft:
+        model = build_model(load_device(device))
+        step("reading")
+        recording = load_recordings(list(recordings), model)
+        journal = _journal(Path(out), device, recordings, seed)
+        if journal.known:
+            step(f"going on after {journal.known} fits")
+        found = diagnose(model.device, recording, seed, step, journal)
+        if replicates is not None:
+            found.extra["bootstrap"] = replicates.of(found, seed, step)
+            write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
+        step("report")
+        write_next(found, Path(device), draft / "device.next.toml")
+        settles = (found.next_experiment or {}).get("settles")
+        for name, content in found.extra["files"].items() if settles else ():
+            write_text(draft / "next_experiment" / name, content)
+        write_text(draft / "diagnosis.json", json.dumps(as_dict(found), indent=1, allow_nan=False) + "\n")
+        write_text(draft / "report.html", page(found, Provenance(digests(Path(device), recordings), seed)))
+    journal.done()  # not before: what is stopped among its replicates need not fit anew
+    return found
+
+
+def unfinished(out: Path) -> Path:
+    """Where a diagnosis into `out` keeps its fits until it is done."""
+    out = out.resolve()  # "." has no name of its own
+    return out.with_name(f"{out.name}.unfinished")
+
+
+def _journal(out: Path, device: Path | str, recordings: Sequence[Path | str], seed: int) -> Journal:
+    """Of the fits of a diagnosis into `out`."""
+    return Journal(unfinished(out), {"version": __version__, "seed": seed, "files": digests(Path(device), recordings)})
+
+
+def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:
+    """SHA-256 of every file that a diagnosis reads, by name."""
+    return {name: _digest(path) for name, path in _files(device, recordings)}
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _files(device: Path, recordings: Sequence[Path | str]) -> Iterator[tuple[str, Path]]:
+    """Name and path of every file that was read; recordings' are named from the folder that all of theirs stand in."""
+    yield device.name, device
+    tables = [given / FILE if given.is_dir() else given for given in map(Path, recordings)]
+    above = os.path.commonpath([table.resolve().parent.parent for table in tables])
+    for table in tables:
+        folder = Path(os.path.relpath(table.resolve().parent, above)).as_posix()
+        for name in dict.fromkeys([table.name, *_named(read_toml(table))]):
+            yield f"{folder}/{name}", table.parent / name
+
+
+def _named(node: Any) -> Iterator[str]:
+    """Every `file` that a recording.toml names, in any of its tables."""
+    if isinstance(node, dict):
+        if isinstance(node.get("file"), str):
+            yield node["file"]
+        for member in node.values():
+            yield from _named(member)
+    elif isinstance(node, list):
+        for member in node:
+            yield from _named(member)

@@ -1,0 +1,155 @@
+"""Figures of how sure a diagnosis is: rivals, what looks alike, intervals and profiles."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ctrlgen.core.to_json import plain
+from ctrlgen.diagnosis.report.narrative import hypothesis_name, number
+from ctrlgen.diagnosis.selection.candidate_model import Round
+from ctrlgen.diagnosis.selection.diagnosis import CI, Diagnosis
+from ctrlgen.diagnosis.selection.search import RIVAL
+from ctrlgen.reporting.plots import COLOURS
+
+FIGURE_WIDTH = 8.6
+SUSPECTS = 8  # in the confusability matrix
+LABEL = 26  # characters of a label before it is broken
+PROFILES = 9
+WIDEST = 300.0  # percent: intervals are shown so far
+FOUND, ALIKE, WORSE = COLOURS[0], COLOURS[2], "#b0b0b0"
+
+
+def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
+    """Round by round: by how much each suspect explains worse than the best one of its round."""
+    rounds = [r for r in diagnosis.search.rounds if r.trials]
+    if not rounds:
+        return None
+    heights = [0.55 + 0.3 * len(r.trials) for r in rounds]
+    figure, axes = plt.subplots(
+        len(rounds), 1, figsize=(FIGURE_WIDTH, 0.6 + sum(heights)), height_ratios=heights, sharex=True, squeeze=False
+    )
+    kept = set(diagnosis.search.chosen.fit.structure.causes)
+    for k, (panel, round_) in enumerate(zip(axes[:, 0], rounds, strict=True)):
+        _rival_bars(panel, round_, kept)
+        gained = round_.before.total - round_.trials[0].total
+        panel.set_title(f"round {k + 1}: the best one gains {number(gained, 3)}", fontsize=9, loc="left")
+    axes[-1, 0].set_xlabel("worse than the best of the round, difference of T (dotted: nearer than that is alike)")
+    return figure
+
+
+def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
+    best = round_.trials[0].total
+    far = max(10 * RIVAL, *(t.total - best for t in round_.trials))
+    for row, trial in enumerate(round_.trials):
+        worse = trial.total - best
+        colour = FOUND if trial.cause in kept else ALIKE if worse < RIVAL else WORSE
+        panel.barh(row, worse, color=colour, height=0.6)
+        panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)
+        _beside(panel, worse, row, number(worse, 3) if row else "best")
+    panel.set_yticks(range(len(round_.trials)), [hypothesis_name(t.cause) for t in round_.trials], fontsize=8)
+    panel.invert_yaxis()
+    panel.set_xscale("symlog", linthresh=RIVAL)
+    panel.set_xlim(0, 30 * far)
+    panel.set_xticks([0, *(10.0**k for k in range(1, int(np.log10(30 * far)) + 1))])
+    panel.axvline(RIVAL, color="#666666", lw=1, ls=":")
+
+
+def _beside(panel: Axes, x: float, y: float, text: str) -> None:
+    """Text a little to the right of a mark."""
+    panel.annotate(text, (x, y), xytext=(6, 0), textcoords="offset points", va="center", fontsize=8)
+
+
+def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
+    """|cos| between what the most conspicuous suspects of the first round do to the readings."""
+    search = diagnosis.search
+    screened = search.rounds[0].screened if search.rounds else search.last
+    top = screened.suspects[:SUSPECTS]
+    if len(top) < 2:
+        return None
+    values = np.array([[screened.alike(a, b) for b in top] for a in top])
+    labels = [textwrap.fill(hypothesis_name(s.hypothesis), LABEL, break_long_words=False) for s in top]
+    figure, panel = plt.subplots(figsize=(FIGURE_WIDTH, 1.9 + 0.42 * len(top)))
+    panel.imshow(values, cmap="Blues", vmin=0, vmax=1, aspect="auto")
+    for row, column in np.ndindex(values.shape):
+        dark = values[row, column] > 0.6
+        panel.text(
+            column, row, _cosine(values[row, column]), ha="center", va="center", fontsize=8, color="w" if dark else "k"
+        )
+    conspicuous = [f"{label}, |z| = {number(abs(s.z), 2)}" for label, s in zip(labels, top, strict=True)]
+    panel.set_yticks(range(len(top)), conspicuous)
+    panel.set_xticks(range(len(top)), labels, rotation=35, ha="right")
+    panel.tick_params(labelsize=7.5)
+    panel.grid(False)
+    return figure
+
+
+def _cosine(value: float) -> str:
+    """Two digits, more where it is nearly one: 0.998 is not 0.98."""
+    return f"{value:.2f}" if value < 0.985 or value > 0.99995 else f"{value:.4f}"
+
+
+def draw_intervals(diagnosis: Diagnosis) -> Figure | None:
+    """Every parameter found, its 95 % interval in percent of its value; left of zero it may be absent."""
+    rows = []
+    for finding in diagnosis.findings:
+        for name, e in finding.parameters.items():
+            if e.value and np.all(np.isfinite([e.value, *e.ci95])):
+                ends = sorted(100 * np.array(e.ci95) / e.value)
+                rows.append((f"{hypothesis_name(finding.cause)}: {name}", ends))
+    if not rows:
+        return None
+    figure, panel = plt.subplots(figsize=(FIGURE_WIDTH, 0.8 + 0.32 * len(rows)))
+    for k, (_, (low, high)) in enumerate(rows):
+        panel.plot([low, high], [k, k], color=FOUND, lw=3, solid_capstyle="butt")
+        panel.plot(100, k, "o", color=FOUND, ms=6)
+        _beside(panel, min(max(high, 100), WIDEST), k, f"{_percent(low - 100)} ... {_percent(high - 100)}")
+    panel.set_yticks(range(len(rows)), [label for label, _ in rows], fontsize=8)
+    panel.set_ylim(len(rows) - 0.5, -0.5)
+    low, high = max(min(0.0, *(e[0] for _, e in rows)), -WIDEST), min(max(100.0, *(e[1] for _, e in rows)), WIDEST)
+    panel.set_xlim(low - 0.03 * (high - low), high + 0.3 * (high - low))
+    panel.axvline(0.0, color="#666666", lw=1)
+    panel.set_xlabel("95 % interval in percent of the value found")
+    return figure
+
+
+def _percent(value: float) -> str:
+    """'+0.16 %'; nothing below a thousandth, where a number stands on its bound."""
+    return f"{value:+.2g} %" if abs(value) > 1e-3 else "0 %"
+
+
+def draw_profiles(diagnosis: Diagnosis) -> Figure | None:
+    """How the objective rises when one number is held elsewhere and the others are fitted again."""
+    profiles = [p for p in plain(diagnosis.profiles) if len(p["points"]) > 2][:PROFILES]
+    if not profiles:
+        return None
+    columns = min(3, len(profiles))
+    rows = -(-len(profiles) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(FIGURE_WIDTH, 0.3 + 2.1 * rows), squeeze=False)
+    for panel, p in zip(axes.flat, profiles, strict=False):
+        _profile(panel, p)
+    for panel in axes.flat[len(profiles) :]:
+        panel.set_visible(False)
+    for panel in axes[:, 0]:
+        panel.set_ylabel("rise of the objective")
+    return figure
+
+
+def _profile(panel: Axes, p: dict[str, Any]) -> None:
+    x, rise = np.array(p["points"], float).T
+    root = np.sqrt(np.maximum(rise, 0.0)) * np.sign(x - p["value"])
+    fine = np.linspace(x[0], x[-1], 101)
+    panel.plot(fine, np.interp(fine, x, root) ** 2, color=FOUND, lw=1.2)
+    panel.plot(x, rise, "o", ms=3.5, color=FOUND)
+    panel.axhline(CI**2, color="#666666", lw=1, ls=":")
+    panel.axvspan(*p["ci95"], color=FOUND, alpha=0.12, lw=0)
+    unit = "" if p["unit"] == "1" else f" [{p['unit']}]"
+    panel.set_xlabel(f"{p['parameter']}{unit}")
+    panel.set_title(textwrap.fill(f"{p['effect']} at {p['location']}", LABEL), fontsize=8)
+    panel.xaxis.get_major_locator().set_params(nbins=4)
+    panel.tick_params(labelsize=7.5)

@@ -1,0 +1,185 @@
+"""Figures of a diagnosis, as SVG; here what is left on the held-out data, over time or poses and by frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.signal import freqz, welch
+
+from ctrlgen.core.units import from_si
+from ctrlgen.diagnosis.report.narrative import short
+from ctrlgen.diagnosis.report.plot_maps import draw_unknown, draw_where
+from ctrlgen.diagnosis.report.plot_uncertainty import (
+    draw_confusability,
+    draw_intervals,
+    draw_profiles,
+    draw_rivals,
+)
+from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+from ctrlgen.recordings.recording import Record
+from ctrlgen.reporting.plots import COLOURS, STYLE, svg
+
+BEFORE, AFTER, NOISE = COLOURS[2], COLOURS[0], "#d9d9d9"
+WIDTH = 8.6
+POINTS = 700  # columns of a long curve; each keeps its smallest and its largest sample
+SEGMENT = 2048  # samples of the spectrum's windows
+BANDS = 20  # a decade
+
+
+def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
+    """Every figure that this diagnosis has something to show in: name -> SVG text."""
+    left = Residuals(diagnosis)
+    drawings: dict[str, Callable[[], Figure | None]] = {
+        "residuals": lambda: draw_residuals(left),
+        "spectrum": lambda: draw_spectrum(left),
+        "where": lambda: draw_where(diagnosis),
+        "unknown": lambda: draw_unknown(diagnosis),
+        "rivals": lambda: draw_rivals(diagnosis),
+        "confusability": lambda: draw_confusability(diagnosis),
+        "intervals": lambda: draw_intervals(diagnosis),
+        "profiles": lambda: draw_profiles(diagnosis),
+    }
+    with plt.rc_context(STYLE):
+        figures = {name: draw() for name, draw in drawings.items()}
+        return {name: svg(figure) for name, figure in figures.items() if figure is not None}
+
+
+class Residuals:
+    """What the nominal and the chosen fit leave on the held-out records, in the reader's units."""
+
+    def __init__(self, diagnosis: Diagnosis) -> None:
+        self.diagnosis, self.recording, fitter = diagnosis, diagnosis.recording, diagnosis.fitter
+        self.records: list[Record] = fitter.held
+        self.settled = self.recording.kind == "poses"
+        search = diagnosis.search
+        self.scales = [from_si(1.0, unit) - from_si(0.0, unit) for unit in self.recording.units]
+        self.before, self.after = (
+            [np.where(r.valid, r.observed - fitter.predicted(trial.fit, r), np.nan) * self.scales for r in self.records]
+            for trial in (search.nominal, search.chosen)
+        )
+        self.changed = bool(diagnosis.findings)
+
+    def spans(self) -> Iterator[tuple[int, np.ndarray]]:
+        """(record, its place on one axis): seconds, or poses, one record behind the other."""
+        first = 0.0
+        for k, record in enumerate(self.records):
+            n, step = len(record.time), 1.0 if self.settled else record.sample_time
+            yield k, first + step * np.arange(n)
+            first += step * n
+
+    def floor(self, i: int) -> float | None:
+        """Standard deviation of the noise of channel i, in its unit."""
+        return self.diagnosis.held_out[self.recording.channels[i]].noise_floor
+
+
+def draw_residuals(left: Residuals) -> Figure:
+    """Channel by channel: before with after, and after alone on its own scale with the noise; one panel where both are one."""
+    channels, wide = left.recording.channels, 1 + left.changed
+    size = (WIDTH, 0.9 + 1.55 * len(channels))
+    figure, axes = plt.subplots(len(channels), wide, figsize=size, sharex=True, squeeze=False)
+    for i, (channel, unit) in enumerate(zip(channels, left.recording.units, strict=True)):
+        if left.changed:
+            _curve(axes[i, 0], left, left.before, i, BEFORE, "before")
+        for panel in axes[i]:
+            _curve(panel, left, left.after, i, AFTER, "after")
+        axes[i, 0].set_ylabel(f"{short(channel)} [{unit}]")
+        floor = left.floor(i)
+        if floor is not None:
+            axes[i, -1].axhspan(-2 * floor, 2 * floor, color=NOISE, zorder=0)
+    known = all(left.floor(i) is not None for i in range(len(channels)))
+    title = "after, on its own scale" if left.changed else "what is left"
+    axes[0, -1].set_title(title + (" (grey: noise, ± 2 sd)" if known else ""), fontsize=9)
+    for panel in axes[-1]:
+        panel.set_xlabel("held-out pose" if left.settled else "time in the held-out records [s]")
+    if left.changed:
+        axes[0, 0].set_title("before and after", fontsize=9)
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize=8)
+    return figure
+
+
+def _curve(panel: Axes, left: Residuals, parts: list[np.ndarray], i: int, colour: str, label: str) -> None:
+    """One channel over all held-out records, with a line between two of them."""
+    style: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3} if left.settled else {"lw": 0.9}
+    for k, x in left.spans():
+        panel.plot(*thinned(x, parts[k][:, i]), color=colour, label=label if k == 0 else None, **style)
+        if k > 0:
+            panel.axvline(x[0], color="#999999", lw=0.7, ls=":")
+
+
+def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A long curve by the smallest and largest sample of each of `POINTS` columns, which looks the same."""
+    if len(x) <= 2 * POINTS:
+        return x, y
+    pieces = np.array_split(np.arange(len(x)), POINTS)
+    places = []
+    for piece in pieces:
+        seen = piece[np.isfinite(y[piece])]
+        ends = {int(seen[np.argmin(y[seen])]), int(seen[np.argmax(y[seen])])} if len(seen) else {int(piece[0])}
+        places += sorted(ends)
+    return x[places], y[places]
+
+
+def draw_spectrum(left: Residuals) -> Figure | None:
+    """Amplitude density of what is left, before and after, and of the noise; None for poses and short records."""
+    records = [k for k, part in enumerate(left.before) if min(len(_judged(y)) for y in part.T) >= 64]
+    if left.settled or not records:
+        return None
+    n = len(left.recording.channels)
+    columns = min(n, 2)
+    rows = -(-n // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.8 + 2.3 * rows), squeeze=False)
+    for i, channel in enumerate(left.recording.channels):
+        panel, unit = axes.flat[i], left.recording.units[i]
+        curves = ((left.before, BEFORE, "before"), (left.after, AFTER, "after" if left.changed else "what is left"))
+        for parts, colour, label in curves[not left.changed :]:
+            f, density = _density(left, parts, records, i)
+            panel.loglog(f, density, color=colour, lw=1.1, label=label)
+        noise = _noise_density(left, i, f)
+        if noise is not None:
+            panel.loglog(f, noise, color="#777777", lw=1.1, ls="--", label="noise")
+        panel.set_ylabel(f"{short(channel)} [{unit}/√Hz]")
+        panel.set_xlabel("frequency [Hz]")
+        lowest = density if noise is None else np.concatenate([density, noise])
+        panel.set_ylim(bottom=0.4 * np.min(lowest[lowest > 0], initial=np.inf))
+        panel.legend(fontsize=8)
+    for panel in axes.flat[n:]:
+        panel.set_visible(False)
+    return figure
+
+
+def _judged(values: np.ndarray) -> np.ndarray:
+    """From the first to the last sample that counts: without the lead-in."""
+    seen = np.flatnonzero(np.isfinite(values))
+    return values[seen[0] : seen[-1] + 1] if len(seen) else values[:0]
+
+
+def _density(left: Residuals, parts: list[np.ndarray], records: list[int], i: int) -> tuple[np.ndarray, np.ndarray]:
+    """Welch's amplitude density over the held-out records of the longest one's sample time; marked samples count as zero."""
+    longest = max(records, key=lambda k: len(left.records[k].time))
+    h = left.records[longest].sample_time
+    alike = [k for k in records if left.records[k].sample_time == h]
+    stretches = [_judged(parts[k][:, i]) for k in alike]
+    size = min(SEGMENT, *map(len, stretches))
+    total, weight = 0.0, 0
+    for values in map(np.nan_to_num, stretches):
+        f, power = welch(values, 1 / h, nperseg=size, detrend=False)
+        total, weight = total + len(values) * power, weight + len(values)
+    edges = np.geomspace(f[1], f[-1], max(2, int(BANDS * np.log10(f[-1] / f[1]))))
+    band = np.searchsorted(edges, f[1:], side="right")
+    count = np.bincount(band)
+    middle, mean = (np.bincount(band, v[1:])[count > 0] / count[count > 0] for v in (f, total / weight))
+    return middle, np.sqrt(mean)
+
+
+def _noise_density(left: Residuals, i: int, f: np.ndarray) -> np.ndarray | None:
+    noise = left.diagnosis.fitter.noise
+    if not noise.known[i]:
+        return None
+    h = max(left.records, key=lambda r: len(r.time)).sample_time
+    _, response = freqz([1.0], np.concatenate([[1.0], -noise.ar[i]]), worN=2 * np.pi * f * h)
+    return np.abs(response) * noise.sd[i] * left.scales[i] * np.sqrt(2 * h)

@@ -1,0 +1,155 @@
+"""device.next.toml: the device file as its author wrote it, with what was found written in.
+
+Numbers change in place and keep their comments; each says where its new value comes from and what it was. Effects are
+appended under a comment that tells their history. The file gives the model that the chosen fit predicts with.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+from tomlkit.items import AoT, Item, Table
+
+from ctrlgen._version import __version__
+from ctrlgen.core.files import read_text, write_text
+from ctrlgen.core.units import from_si, to_si
+from ctrlgen.diagnosis.estimation.robust_covariance import deviations
+from ctrlgen.diagnosis.estimation.structure import Unknown
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
+from ctrlgen.diagnosis.report.narrative import HARD_SPACE, channel_sentence, hard, sentence
+from ctrlgen.diagnosis.selection.diagnosis import UNEXPLAINED, Diagnosis
+
+DIGITS = 12  # nine would leave 5e-9 of a number, more than the prediction may differ by
+SD_DIGITS = 3
+WIDTH = 110
+MOVED = 1e-12  # of a number: less is not written
+
+
+def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
+    """Writes `target`, whole or not at all, from the device file `original`. Raises InputError when that is unreadable."""
+    write_text(target, next_text(diagnosis, read_text(original)))
+
+
+def next_text(diagnosis: Diagnosis, original: str) -> str:
+    """The text of the device file `original` with the findings in it."""
+    fit = diagnosis.search.chosen.fit
+    found = list(zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True))
+    document = tomlkit.parse(original)
+    changed = _change_numbers(document, diagnosis, found)
+    effects = _effects(diagnosis, found)
+    if effects and "effect" in document and not isinstance(document["effect"], AoT):
+        for table in effects:  # effect = [{ ... }] in one line cannot be continued by [[effect]]
+            document["effect"].append(_inline(table))
+        effects = []
+    text = document.as_string().rstrip("\n") + "\n"
+    if changed or effects or diagnosis.findings:
+        text += "\n" + _header(diagnosis, changed)
+    return text + "".join(_table(table) for table in effects)
+
+
+def _change_numbers(document: Any, diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]) -> list[str]:
+    """Puts the device's own numbers that moved into the document; their paths."""
+    known = {path: number for path, _, number in numbers(diagnosis.device)}
+    causes, changed = diagnosis.search.chosen.fit.structure.causes, []
+    for unknown, value, sd in found:
+        cause = None if unknown.cause is None else causes[unknown.cause]
+        own = cause is None or cause.effect == PARAMETER
+        if not own or abs(value - unknown.nominal) <= MOVED * abs(unknown.nominal):
+            continue
+        word = "refitted to" if cause is None else "diagnosed from"
+        old = known[unknown.path]
+        was = f"was {old.text}" + (f", {old.source}" if old.source else "")
+        fields = {"value": _written(value, unknown.unit), "sd": _written_sd(sd, unknown.unit)}
+        fields["source"] = f"{word} {diagnosis.recording.title}; {was}"
+        _replace(document, unknown.path, {k: v for k, v in fields.items() if v})
+        changed.append(unknown.path)
+    return changed
+
+
+def _replace(document: Any, path: str, fields: dict[str, str]) -> None:
+    """The quantity at a dotted path such as `hexapod.platform_angles[3]` with other fields."""
+    parts = [int(p) if p.isdigit() else p for p in re.findall(r"[^.\[\]]+", path)]
+    node = document
+    for part in parts[:-1]:
+        node = node[part]
+    if isinstance(node[parts[-1]], Table):
+        node[parts[-1]].update(fields)
+    else:
+        node[parts[-1]] = _inline(fields)
+
+
+def _inline(fields: dict[str, Any]) -> Item:
+    """{ key = "value", ... } as an item of a document."""
+    return tomlkit.parse(f"q = {_toml(fields)}")["q"]
+
+
+def _toml(value: str | dict[str, Any]) -> str:
+    """A text in quotes, or an inline table with the spaces that device files have."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_toml(member)}' for key, member in value.items())} }}"
+    return tomlkit.string(value).as_string()
+
+
+def _effects(diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]) -> list[dict[str, Any]]:
+    """One table an effect that was found; numbers as {value, sd} where the record holds them."""
+    fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in found}, []
+    for k, effect in enumerate(diagnosis.corrected.effect):
+        if k < len(diagnosis.device.effect):
+            continue
+        table: dict[str, Any] = {"kind": effect.kind, "at": effect.at} | ({"of": effect.of} if effect.of else {})
+        for name, number in effect.values.items():
+            table[name] = number.text
+            if (path := f"effect[{k}].{name}") in fitted:
+                unknown, value, sd = fitted[path]
+                shown, spread = _within(value, unknown), _written_sd(sd, unknown.unit)
+                table[name] = {"value": shown, "sd": spread} if spread else shown
+        tables.append(table)
+    return tables
+
+
+def _table(fields: dict[str, Any]) -> str:
+    """[[effect]] with one line a key."""
+    width = max(map(len, fields))
+    return "\n[[effect]]\n" + "".join(f"{key:{width}} = {_toml(value)}\n" for key, value in fields.items())
+
+
+def _written(si: float, unit: str, digits: int = DIGITS) -> str:
+    return f"{from_si(si, unit):.{digits}g} {'' if unit == '1' else unit}".strip()
+
+
+def _within(si: float, unknown: Unknown) -> str:
+    """A number of an effect as text that a reader of the file finds inside the law's bounds, in spite of rounding."""
+    for digits in (DIGITS, 17):
+        shown = f"{from_si(si, unknown.unit):.{digits}g}"
+        if unknown.low <= to_si(float(shown), unknown.unit) <= unknown.high:
+            break
+    return f"{shown} {'' if unknown.unit == '1' else unknown.unit}".strip()
+
+
+def _written_sd(sd: float, unit: str) -> str:
+    """A deviation in `unit`, '' where the record does not hold the number."""
+    if not np.isfinite(sd) or sd == 0:
+        return ""
+    scale = from_si(sd, unit) - from_si(0.0, unit)
+    name = {"degC": "delta_degC", "degF": "delta_degF", "1": ""}.get(unit, unit)
+    return f"{scale:.{SD_DIGITS}g} {name}".strip()
+
+
+def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
+    """Comment: what was found, from which recording, and held-out errors before and after."""
+    lines = [f"Diagnosed from {diagnosis.recording.title!r} by ctrlgen {__version__}, verdict {diagnosis.verdict}."]
+    lines.append(sentence(diagnosis))
+    lines += [channel_sentence(channel, error) for channel, error in diagnosis.held_out.items()]
+    if changed:
+        lines.append(f"Numbers changed above: {', '.join(changed)}.")
+    if diagnosis.verdict == UNEXPLAINED:
+        lines.append("This does NOT explain the recording: take the numbers as the best fit, not as physics.")
+    kept = (hard(" ".join(line.split())) for line in lines)
+    wrapped = (part for line in kept for part in textwrap.wrap(line, WIDTH, break_long_words=False))
+    return "".join(f"# {part}\n" for part in wrapped).replace(HARD_SPACE, " ")

@@ -1,0 +1,1 @@
+"""Which causes a recording supports: screening, candidate models, their comparison, the verdict."""

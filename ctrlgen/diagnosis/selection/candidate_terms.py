@@ -1,0 +1,214 @@
+"""The laws of all hypotheses, evaluated along one motion: their terms' slopes by the amplitude, with their own memories.
+
+A law at one place with one shape is one term, however many hypotheses hold it: "all" actuators share those of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+
+import casadi as ca
+import numpy as np
+from scipy.linalg import expm
+
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, Seen, nominal_links
+from ctrlgen.effects import Effect, Place
+from ctrlgen.model.assembly import channels
+
+Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
+REACHED = ("channel", "travel", "travel/s")
+
+SMALL = 1e-6
+SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
+
+
+@dataclass(frozen=True)
+class Column:
+    """One hypothesis with one choice of shape. `probes` where it enters, `terms` which term enters at each; `size` [SI]
+    of the amplitude's unit, `one_sided` the only sign it may have (0: both)."""
+
+    hypothesis: Hypothesis
+    shape: dict[str, float]
+    probes: tuple[int, ...]
+    terms: tuple[int, ...]
+    size: float
+    one_sided: int
+    range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
+
+
+def peaks(fitter: Fitter, fit: Fit) -> Peaks:
+    """How far the signals at every place go in the records to fit."""
+    found: Peaks = {}
+    links = nominal_links(fit.structure.device)
+    responses = fit.structure.responses(fitter.recording, fitter.cache)
+    reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
+    places = [(place, i) for place in reached for i in range(len(channels(links, place)))]
+    for record, start in zip(fitter.to_fit, fit.starts, strict=True):
+        response = responses[record.sample_time, record.linear]
+        m, n = response.model, len(record.time)
+        seen = [m.seen(place, i, None, {}) for place, i in places]
+        still = ca.SX.zeros(1)
+        given = [(s.value, s.displacement, still if s.velocity is None else s.velocity) for s in seen]
+        rows = m.closed(ca.vertcat(*(value for values in given for value in values)))
+        f = ca.Function("signals", [ca.vertcat(m.x, m.z), m.u, response.ambient, m.p], [rows])
+        S = response.motion(record, fit.theta, start if len(start) else None)[0]
+        values = f.map(n)(S.T, record.drive.T, response._ambients(record)[None, :], np.tile(fit.theta[:, None], (1, n)))
+        most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
+        for where, row in zip(places, most, strict=True):
+            old = found.get(where, {})
+            found[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Term:
+    """One law at one place: its `value`, by its amplitude `a` around `off` in steps of `size`, with its states' symbols,
+    `rates` and new values (`stepped`, None where a state is not)."""
+
+    value: ca.SX
+    a: ca.SX
+    off: float
+    size: float
+    states: list[ca.SX]
+    rates: list[ca.SX]
+    stepped: list[ca.SX | None]
+    clocks: list[bool]
+
+
+class Laws:
+    """The terms of `hypotheses` on the motions of `response`, and one column for every choice of shape."""
+
+    def __init__(
+        self, response: Response, structure: Structure, hypotheses: list[Hypothesis],
+        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], Seen],
+    ) -> None:  # fmt: skip
+        self.response = response
+        self.terms: list[_Term] = []
+        self._known: dict[tuple, int] = {}
+        self.columns = [c for h in hypotheses for c in self._of(h, structure, probes, seen)]
+
+    def _of(
+        self,
+        h: Hypothesis,
+        structure: Structure,
+        probes: dict[tuple[Place, int], int],
+        seen: Callable[[Place, int], Seen],
+    ) -> Iterator[Column]:
+        law, where = h.law, structure.place(h)
+        names = [w.channel for w in channels(nominal_links(structure.device), law.place)]
+        partner = names.index(h.of) if h.of else None
+        at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
+        if law.mutual:
+            at += [(partner, i) for i, _ in at]
+        amplitude = law.amplitude()
+        low, high = (where.si(b, amplitude) for b in amplitude.bounds)
+        off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
+        side = 1 if off <= low else -1 if off >= high else 0
+        meant = amplitude.expected or (low - off, high - off)
+        span = (meant[0] / size, meant[1] / size)
+        entered = tuple(probes[law.place, i] for i, _ in at)
+        here = seen(law.place, at[0][0])
+        for shape in h.shapes(where, here):
+            for finite in (0.0, *h.secants(where, here)):
+                terms = tuple(self._term(law(h.at, {}, h.of), i, other, shape, off, size, finite) for i, other in at)
+                yield Column(h, shape, entered, terms, size, side, span)
+
+    def _term(
+        self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float, finite: float
+    ) -> int:
+        """The slope at `off`, or from there to the amplitude `finite`."""
+        key = (law.kind, i, partner, tuple(shape.items()), off, size, finite)
+        if key not in self._known:
+            states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
+            a = ca.SX.sym("a")
+            p = SimpleNamespace(**shape, **{law.amplitude().name: a})
+            s = self.response.model.seen(law.place, i, partner, states, law.stage)
+            new = law.update(s, p)
+            s.__dict__.update(new)
+            change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
+            self._known[key] = len(self.terms)
+            at = finite or off
+            rates = [ca.substitute(ca.SX(change[state.name]), a, at) for state in law.states]
+            stepped = [ca.substitute(ca.SX(new[state.name]), a, at) if state.stepped else None for state in law.states]
+            clocks = [state.clock for state in law.states]
+            value = ca.SX(law.term(s, p))
+            if finite:
+                value = ca.substitute(value, a, finite) * (a - off) / (finite - off)
+            self.terms.append(_Term(value, a, off, size, list(states.values()), rates, stepped, clocks))
+        return self._known[key]
+
+    def start(self, time: float) -> np.ndarray:
+        """The laws' states before the first sample, at `time` [s]: zero, but for clocks."""
+        clocks = [clock for term in self.terms for clock in term.clocks]
+        return np.where(clocks, time if np.isfinite(self.response.sample_time) else 0.0, 0.0)
+
+    @cached_property
+    def driven(self) -> list[int]:
+        """The terms that jump with a drive which is held from sample to sample."""
+        m = self.response.model
+        if self.response.linear or not np.isfinite(self.response.sample_time):
+            return []
+        jumping = ca.vertcat(m.u, m.held, m.heat)
+        return [k for k, term in enumerate(self.terms) if ca.depends_on(ca.jacobian(term.value, term.a), jumping)]
+
+    def compiled(self, p: np.ndarray) -> ca.Function:
+        """(memory, S, u, ambient, S one sample on) -> (memory after the sample, every dterm/damplitude * size, that of the
+        `driven` terms at the end of the sample), with the numbers `p`.
+
+        A settled pose is read with the memories that it has settled to.
+        """
+        m = self.response.model
+        memory = ca.vertcat(ca.SX(0, 1), *(s for term in self.terms for s in term.states))
+        after = m.closed(ca.vertcat(ca.SX(0, 1), *(value for term in self.terms for value in self._after(term))))
+        found = end = ca.SX(0, 1)
+        S, S_next = ca.vertcat(m.x, m.z), ca.SX.sym("S_next", m.x.numel() + m.z.numel())
+        if self.terms:  # each term depends on its own amplitude alone: one derivative of all of them
+            a, offs = ca.vertcat(*(t.a for t in self.terms)), ca.DM([t.off for t in self.terms])
+            every = ca.vertcat(*(t.value for t in self.terms))
+            open_ = ca.substitute(ca.jtimes(every, a, ca.DM([t.size for t in self.terms])), a, offs)
+            found = m.closed(open_)
+            if self.driven:  # the drive stays as the sample began
+                (end,) = ca.substitute([open_[self.driven]], [memory, S], [after, S_next])
+                end = m.closed(end)
+        if not np.isfinite(self.response.sample_time):
+            found = ca.substitute(found, memory, after)
+        given = [memory, S, m.u, self.response.ambient, S_next]
+        general = ca.Function("general", [*given, m.p], [after, found, end])
+        return ca.Function("laws", given, [ca.densify(value) for value in general(*given, p)], {"cse": True})
+
+    def _after(self, term: _Term) -> list[ca.SX]:
+        """The states of one law after a sample: linear ones exactly, stepped ones by their update."""
+        if not term.states:
+            return []
+        h = self.response.sample_time
+        settled = not np.isfinite(h)
+        h = SETTLED_LAG if settled else h
+        memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)
+        A = ca.jacobian(rates, memory)
+        if not ca.symvar(A):
+            step = h * ca.DM(_phi_1(h * ca.DM(A).full())) @ rates
+        elif A.sparsity().is_diag():
+            own = h * ca.diag(A)
+            step = h * rates * ca.if_else(ca.fabs(own) > SMALL, ca.expm1(own) / own, 1 + own / 2)
+        else:
+            step = h * rates
+        return [
+            new if new is not None else state + (1.0 if settled else h) if clock else state + change
+            for state, new, clock, change in zip(
+                term.states, term.stepped, term.clocks, ca.vertsplit(step), strict=True
+            )
+        ]
+
+
+def _phi_1(M: np.ndarray) -> np.ndarray:
+    """M^-1 (e^M - 1), also where M is singular: the upper right block of exp [[M, 1], [0, 0]]."""
+    n = len(M)
+    if n == 1:
+        return np.expm1(M) / M if M[0, 0] else np.ones((1, 1))
+    return expm(np.block([[M, np.eye(n)], [np.zeros((n, 2 * n))]]))[:n, n:]

@@ -1,0 +1,79 @@
+"""Channels that read one number throughout: no part of any fit, and a finding where the described device moves them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import difference, show
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_links
+from ctrlgen.diagnosis.selection.diagnosis import Finding
+from ctrlgen.diagnosis.selection.direct_detection import named
+from ctrlgen.effects import Effect, Place, Where
+from ctrlgen.model.assembly import channels
+from ctrlgen.recordings.recording import Recording
+
+SURELY = 0.01  # of a channel's typical size: what the device would move it by, if it is called dead
+
+
+@dataclass(frozen=True, eq=False)
+class Alive:
+    """A recording without the channels that say nothing, what was found of these, and a sentence on each."""
+
+    recording: Recording
+    findings: tuple[Finding, ...] = ()
+    said: tuple[str, ...] = ()
+
+
+def alive(device: Device, recording: Recording) -> Alive:
+    """The channels that read more than one number. Raises InputError where there is none."""
+    moving = [r for r in recording.records if r.role != "rest"]
+    values = [np.concatenate([r.observed[r.valid[:, i], i] for r in moving]) for i in range(len(recording.channels))]
+    dead = {i: float(y[0]) for i, y in enumerate(values) if len(y) and np.ptp(y) == 0}
+    if not dead:
+        return Alive(recording)
+    if len(dead) == len(recording.channels):
+        faults = [
+            Fault(
+                f"columns.{recording.channels[i]!r}",
+                f"reads {show(level, recording.units[i])} in all records: dead, stuck or of the wrong column; there is "
+                "nothing to compare with the device",
+            )
+            for i, level in dead.items()
+        ]
+        raise InputError(recording.title, faults)
+    structure = Structure(device)
+    responses = structure.responses(recording, {})
+    foreseen = [responses[r.sample_time, r.linear].outputs(r, structure.start) for r in moving]
+    places = {f"reading.{w.channel}": w for w in channels(nominal_links(device), Place.SENSOR)}
+    findings, said = [], []
+    for i, level in dead.items():
+        name, unit = recording.channels[i], recording.units[i]
+        way = float(np.ptp(np.concatenate([y[:, i] for y in foreseen])))
+        moves = f"the device as described moves it by {way * difference(1.0, unit):.3g} {unit}"
+        said.append(f"{name}: reads {show(level, unit)} throughout, {moves}; it is left out of every fit.")
+        where = places.get(name)
+        if where is not None and way > SURELY * where.scale:
+            findings += [named(law, where, read) for law, read in _laws(where, values[i])]
+    return Alive(
+        _only(recording, [i for i in range(len(recording.channels)) if i not in dead]), tuple(findings), tuple(said)
+    )
+
+
+def _laws(where: Where, values: np.ndarray) -> Iterator[tuple[type[Effect], dict[str, float]]]:
+    """What reads one number throughout, by the laws of a sensor that read themselves off."""
+    for law in Effect.library.values():
+        if law.place is Place.SENSOR and law.fits(where) and (seen := law.read_off(values)) is not None:
+            yield law, seen[0]
+
+
+def _only(recording: Recording, kept: list[int]) -> Recording:
+    """The recording of these channels alone."""
+    fields = {name: tuple(getattr(recording, name)[i] for i in kept) for name in ("channels", "units", "noise")}
+    records = tuple(replace(r, observed=r.observed[:, kept], valid=r.valid[:, kept]) for r in recording.records)
+    return replace(recording, **fields, records=records)

@@ -1,0 +1,248 @@
+"""What a diagnosis says, and the verdict from what the search found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from ctrlgen.core.units import difference, from_si, to_si
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.estimation.fit import CI, Fit, Fitter
+from ctrlgen.diagnosis.estimation.prediction_uncertainty import uncertainty
+from ctrlgen.diagnosis.estimation.profile_likelihood import Profile
+from ctrlgen.diagnosis.estimation.residual_tests import Adequacy
+from ctrlgen.diagnosis.estimation.robust_covariance import deviations
+from ctrlgen.diagnosis.estimation.structure import Structure, changed
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, written
+from ctrlgen.diagnosis.selection.candidate_model import CONFIRMED, Search
+from ctrlgen.recordings.recording import Recording
+
+CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
+LITTLE = 0.05  # of the mismatch: a law is right to that where it does not say how rough it is
+IMPOSSIBLE = 1e-6  # p of the device's own numbers so far off by chance
+FAR_OFF = 2.0  # stated deviations: numbers that are named where they are so far off together
+CHANCE = 4.0  # standard deviations of the noise's own squares
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval, in `unit`."""
+
+    value: float
+    ci95: tuple[float, float]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One cause that was left out.
+
+    `held_out_gain`: what is lost without it, in shares of the nominal whitened squares on the held-out records.
+    """
+
+    effect: str
+    location: str
+    parameters: dict[str, Estimate]
+    alternatives: tuple[tuple[str, str], ...]
+    held_out_gain: float
+    source: str
+    cause: Hypothesis
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """Held-out error of one channel before and after, the noise, and what the uncertainty of the fitted numbers alone leaves
+    there (None where that is not known), in `unit`."""
+
+    rms_before: float
+    rms_after: float
+    noise_floor: float | None
+    unit: str
+    uncertainty: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The answer; `search` is how it was found."""
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    held_out: dict[str, ChannelError]
+    adequacy: Adequacy
+    where: dict[str, Any]
+    detectable: dict[str, Any]
+    next_experiment: dict[str, Any] | None
+    history: tuple[dict[str, Any], ...]
+    notes: tuple[str, ...]
+    device: Device
+    recording: Recording
+    search: Search
+    fitter: Fitter
+    profiles: tuple[Profile, ...] = ()
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def values(self) -> dict[str, Estimate]:
+        """Every fitted number by its path in `corrected`, uncertain ones of the device included, with 95 % intervals.
+
+        A device written in Python has no file: this is what to put into its code.
+        """
+        return values(self.search.chosen.fit, self.profiles)
+
+    @property
+    def unconfirmed(self) -> tuple[Hypothesis, ...]:
+        """Causes that no held-out record shows."""
+        return unconfirmed(self.search)
+
+    @cached_property
+    def corrected(self) -> Device:
+        """The device with all that was found in it, as device.next.toml describes it; what was read off stands last."""
+        fit = self.search.chosen.fit
+        own = {u.path: float(v) for u, v in zip(fit.structure.unknowns, fit.theta, strict=True) if u.cause is None}
+        starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
+        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).described, own)
+        beside = [f for f in self.findings if f.cause not in fit.structure.causes]
+        read = [
+            f.cause.law(
+                f.cause.at, {n: written(float(to_si(e.value, e.unit)), e.unit) for n, e in f.parameters.items()}
+            )
+            for f in beside
+        ]
+        return device.model_copy(update={"effect": (*device.effect, *read)})
+
+
+def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False) -> str:
+    """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
+
+    Partly: causes are found, but they leave a little more than noise, or no held-out record shows one of them, or nothing
+    tells the noise, so that nobody can say whether all is explained, or the numbers are too loose. Unexplained, too, where
+    it takes numbers that the device file excludes: a wrong unit, sign or gain of a column looks like that.
+    """
+    found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
+    if excluded(search.chosen.fit):
+        return UNEXPLAINED
+    if known and not after.passed and not (found and remaining(fitter, search) <= tolerated(search)):
+        return UNEXPLAINED
+    if not found:
+        return CONSISTENT
+    if any(search.rivals):
+        return AMBIGUOUS
+    sure = known and after.passed and not unconfirmed(search) and not loose(fitter, search)
+    return EXPLAINED if sure else PARTLY
+
+
+def excluded(fit: Fit) -> dict[str, float]:
+    """The device's uncertain numbers, by path, that stand more than `FAR_OFF` stated deviations off, in deviations; empty
+    where all of them together are as far off as chance puts them."""
+    off = {
+        u.path: float((value - u.nominal) / u.sd)
+        for u, value in zip(fit.structure.unknowns, fit.theta, strict=True)
+        if u.sd
+    }
+    if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > IMPOSSIBLE:
+        return {}
+    least = min(FAR_OFF, max(map(abs, off.values())))
+    return {path: z for path, z in off.items() if abs(z) >= least}
+
+
+def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
+    """The causes that no held-out record shows, and that nothing the device states of itself demands."""
+    chosen = search.chosen
+    return tuple(
+        cause
+        for cause, bare in zip(chosen.fit.structure.causes, search.bare, strict=True)
+        if bare.held - chosen.held < CONFIRMED
+        and bare.fit.penalty - chosen.fit.penalty < 0.5 * (bare.fit.objective - chosen.fit.objective)
+    )
+
+
+def loose(fitter: Fitter, search: Search) -> bool:
+    """Whether the held-out records are foreseen worse than before, beyond chance, though the causes may be right: by the
+    numbers as fitted, not as far as those are known."""
+    worse = fitter.held_squares(search.chosen.fit) - fitter.held_squares(search.nominal.fit)
+    return worse > CHANCE * np.sqrt(2 * _n_held(fitter))
+
+
+def tolerated(search: Search) -> float:
+    """The share of the mismatch that the chosen causes may leave: what the form of the roughest of their laws may."""
+    causes = search.chosen.fit.structure.causes
+    return max([LITTLE, *(c.law.rough for c in causes if c.effect != PARAMETER)])
+
+
+def remaining(fitter: Fitter, search: Search) -> float:
+    """What the chosen causes leave beyond the noise, as a share of what the device as described leaves, both root mean
+    square; the larger one of the records to fit and of those held out. By as much as `CHANCE` the noise itself may differ."""
+    n_held = _n_held(fitter)
+    after, before = search.chosen, search.nominal
+    shares = [0.0]
+    for left, all_, n in (
+        (after.fit.objective, before.fit.objective, after.fit.n),
+        (after.held, before.held, n_held),
+    ):
+        if left - n > CHANCE * np.sqrt(2 * n):
+            shares.append(float(np.sqrt((left - n) / max(all_ - n, left - n))))
+    return max(shares)
+
+
+def _n_held(fitter: Fitter) -> int:
+    """Usable samples of the held-out records."""
+    return sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+
+
+def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:
+    """Held-out root mean square of each channel, nominal and chosen."""
+    found = {}
+    floor, unsure = fitter.noise.floor, uncertainty(fitter, search.chosen.fit)
+    for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
+        scale = difference(1.0, unit)
+        rms = []
+        for trial in (search.nominal, search.chosen):
+            squares = [((r.observed - fitter.predicted(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held]
+            rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
+        noise = float(floor[i] * scale) if known[i] else None
+        beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
+        found[channel] = ChannelError(*rms, noise, unit, beside)
+    return found
+
+
+def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
+    """Every unknown of a fit, in its reader's unit. An amplitude is known no better than its law's form is right, and no
+    number better than its profile says."""
+    found, profiled = {}, {p.path: p for p in profiles}
+    for unknown, value, s in zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True):
+        cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
+        if unknown.amplitude and cause.effect != PARAMETER:
+            s = np.hypot(s, cause.law.rough * (value - unknown.nominal))
+        ends = (value, max(value - CI * s, unknown.low), min(value + CI * s, unknown.high))
+        value, low, high = (float(from_si(v, unknown.unit)) for v in ends)
+        if unknown.path in profiled:
+            below, above = profiled[unknown.path].ci95
+            low, high = min(low, below), max(high, above)
+        found[unknown.path] = Estimate(value, (low, high), unknown.unit)
+    return found
+
+
+def findings(search: Search, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
+    """The causes of the chosen structure with intervals and rivals, the most important first."""
+    fit, rows = search.chosen.fit, []
+    estimates = values(fit, profiles)
+    for k, cause in enumerate(fit.structure.causes):
+        number = cause.path.rpartition(".")[2]
+        parameters = {
+            number if cause.effect == PARAMETER else unknown.name: estimates[unknown.path]
+            for unknown in fit.structure.unknowns
+            if unknown.cause == k
+        }
+        for p in () if cause.effect == PARAMETER else cause.law.params:
+            if p.expected:
+                middle = sum(p.expected) / 2
+                parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
+        rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
+        source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source
+        gain = float((search.bare[k].held - search.chosen.held) / search.nominal.held)
+        rows.append(Finding(cause.effect, cause.location, parameters, rivals, gain, source, cause))
+    return tuple(sorted(rows, key=lambda f: -f.held_out_gain))

@@ -1,0 +1,54 @@
+"""What raw readings show without any model: a finding beside those of the search.
+
+It is named where it does more than a share of the noise to a reading; below, it is part of the noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ctrlgen.core.units import from_si
+from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_links
+from ctrlgen.diagnosis.selection.candidate_model import Search
+from ctrlgen.diagnosis.selection.diagnosis import Estimate, Finding
+from ctrlgen.effects import Effect, Place, Where
+from ctrlgen.model.assembly import channels
+
+NOTICED = 0.5  # of the noise, root mean square
+
+
+def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
+    """Findings of every sensor's law that reads itself off the recorded values, where the device and the search have none."""
+    recording, structure = fitter.recording, search.chosen.fit.structure
+    if recording.kind != "series":
+        return ()
+    known = {(e.kind, e.at) for e in structure.device.effect} | {(c.effect, c.at) for c in structure.causes}
+    found = []
+    for where in channels(nominal_links(structure.device), Place.SENSOR):
+        name = f"reading.{where.channel}"
+        if name not in recording.channels:
+            continue
+        i = recording.channels.index(name)
+        values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
+        for law in Effect.library.values():
+            seen = law.read_off(values) if law.place is Place.SENSOR and law.fits(where) else None
+            if (
+                seen is None
+                or seen[1] < NOTICED * fitter.noise.floor[i]
+                or {(law.kind, where.channel), (law.kind, "all")} & known
+            ):
+                continue
+            found.append(named(law, where, seen[0]))
+    return tuple(found)
+
+
+def named(law: type[Effect], where: Where, values: dict[str, float]) -> Finding:
+    """A sensor's law with parameters [SI] that were not fitted."""
+    parameters = {}
+    for p in law.params:
+        unit = where.unit_of(p)
+        value = float(from_si(values[p.name], unit))
+        parameters[p.name] = Estimate(value, (value, value), unit)
+    cause = Hypothesis(law.kind, f"{DOMAIN[Place.SENSOR]}:{where.channel}", where.channel)
+    return Finding(law.kind, cause.location, parameters, (), 0.0, law.source, cause)

@@ -1,0 +1,157 @@
+"""Step 8: what a structure is worth beside another: on the records to fit, on those held out, at the price of its numbers.
+
+T = objective on the records to fit + BIC's price of their numbers + -2 ln of how likely they make the held-out records,
+where nothing was fitted, + twice the rarity of their causes: among equals the plainer one is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ctrlgen.diagnosis.estimation.fit import CI, Fit, Fitter
+from ctrlgen.diagnosis.estimation.residual_tests import RATIO
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import CONFIRMED, Trial, cooled
+from ctrlgen.diagnosis.selection.line_resolvability import resolved
+from ctrlgen.diagnosis.selection.screen import Screened
+
+MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
+DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
+WORTHWHILE = 0.05  # of the held-out excess over the noise: what a further cause must take away
+MOSTLY = 0.9  # of the mismatch: where causes take it away, a series' others are sought one or two at a time
+SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
+FORM = 0.25  # the same for the held-out records, where either explains all of the records to fit
+VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
+
+
+class Weighing:
+    """Weighs trials against one another; `trial` fits a structure so far as it takes to know what a cause takes away."""
+
+    def __init__(self, fitter: Fitter, trial: Callable[..., Trial]) -> None:
+        self.fitter, self.trial = fitter, trial
+        self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
+        self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+
+    def judged(self, fit: Fit, cause: Hypothesis | None) -> Trial:
+        """A fit with what the held-out records and the price of its numbers say."""
+        structure, held = fit.structure, self.fitter.held_out(fit)
+        price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
+        price += 2 * structure.rarity
+        return Trial(fit, held, fit.objective + price + held, cause)
+
+    def ahead(self, a: Trial, b: Trial) -> float:
+        """By how much `a` is better than `b`, and that is beyond what says nothing; negative where it is not.
+
+        Where both leave more than noise, squares count in units of what the better one leaves a sample, on the records to
+        fit and on those held out (quasi-likelihood): what neither explains does not choose between them.
+        """
+        best = min(a, b, key=lambda t: t.total)
+        c_fit = max(best.fit.objective / max(self.n_fit, 1), 1.0)
+        c_held = max(best.held / max(self.n_held, 1), 1.0)
+        gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
+        met = a.fit.is_noise and b.fit.is_noise and self.fitter.noise.known.all()
+        slack = FORM if met else SLACK  # alike on the records to fit, and neither law is right
+        return gained - SLACK * self.n_fit * (1 - 1 / c_fit) - slack * self.n_held * (1 - 1 / c_held)
+
+    def plainest(self, better: list[Trial]) -> Trial:
+        """The best trial, or one of as few numbers that is no worse beyond the slack and is less rare."""
+        first = better[0]
+        for t in better:
+            first = t if self.ahead(t, first) > 0 else first
+        numbers = len(first.fit.structure.unknowns)
+        alike = [t for t in better if self.ahead(first, t) <= 0 and len(t.fit.structure.unknowns) <= numbers]
+        return min(alike, key=lambda t: (t.fit.structure.rarity, t.total), default=first)
+
+    @staticmethod
+    def hides(fit: Fit) -> bool:
+        """Whether the device's own numbers stand so far off that they may hide a cause, at a price."""
+        return fit.penalty > DEAR + 2 * len(fit.structure.unknowns)
+
+    def need(self, current: Trial, screened: Screened) -> float:
+        """The z^2 that a cause must show: of its own size in the readings, or of the price at which the device hides it."""
+        return (
+            screened.threshold**2 if self.hides(current.fit) else max(screened.threshold**2, MATERIAL**2 * self.n_fit)
+        )
+
+    def meant(self, trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
+        """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one, holds, and is no double."""
+        structure = trial.fit.structure
+        if not resolved(self.fitter.recording, trial.fit, accepted):
+            return False
+        for k, cause in enumerate(structure.causes):
+            if cause.effect != PARAMETER and cause not in accepted and not cause.law.holds(trial.fit.values(k)):
+                return False
+        for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
+            if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
+                continue
+            usual = structure.usual(unknown)
+            if usual and not usual[0] <= value <= usual[1]:
+                return False
+            span = 1e-6 * (unknown.high - unknown.low)
+            if value >= unknown.high - span or (value <= unknown.low + span and unknown.low != unknown.nominal):
+                return False
+        return True
+
+    def justified(self, before: Trial, after: Trial) -> bool:
+        """Whether what `after` has more is worth it and means something."""
+        return self.worth(before, after) and self.meant(after, before.fit.structure.causes)
+
+    def worth(self, before: Trial, after: Trial) -> bool:
+        """Whether `after` explains enough more than `before` for its numbers, fitted and held out.
+
+        What the held-out records confirm counts as much as what was fitted, up to the same amount: chance alone gives
+        z^2 of 10 in both no more often than one of 17 in the first and of 2 in the other.
+        """
+        gained, confirmed = before.fit.objective - after.fit.objective, before.held - after.held
+        added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
+        needed = 12.0 + added * np.log(max(self.n_fit, 2))
+        if before.fit.penalty - after.fit.penalty > 0.5 * gained:  # the device hid it at a price: it shows nowhere else
+            return gained > needed and confirmed > -4.0
+        if self.out_of_reach(before) and gained > MOSTLY * (before.fit.objective - self.n_fit) and confirmed > -4.0:
+            return gained > needed
+        if gained + min(confirmed, gained) <= needed + CONFIRMED or gained <= MATERIAL**2 * self.n_fit:
+            return False
+        return confirmed > max(CONFIRMED, WORTHWHILE * max(before.held - self.n_held, 0.0))
+
+    def out_of_reach(self, trial: Trial) -> bool:
+        """Whether the records to fit show, by the gate of adequacy, what the held-out ones do not."""
+        most = RATIO**2 - 1
+        return trial.fit.objective - self.n_fit > most * self.n_fit and trial.held - self.n_held < most * self.n_held
+
+    def doubtful(self, bare: Trial, current: Trial, k: int) -> bool:
+        """Whether cause k takes away no more than the form of another's law may leave of what that one takes away, of the
+        records to fit and of those held out (geometric mean); more, where k may be nothing (the 95 % interval of its
+        amplitude reaches off)."""
+        fit = current.fit
+        own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
+        sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+        vague = bool(own) and all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
+        lost = max(bare.held - current.held, 0.0) * max(bare.fit.objective - current.fit.objective, 0.0)
+        return self._may_be_form(lost, bare, VAGUE if vague else 1.0)  # beside k another may take a cause's place
+
+    def of_form(self, current: Trial) -> bool:
+        """Whether all that is left is no more than the form of a cause's law may leave: what would be found in it, would be
+        doubtful. Not where the device hides something at a price, or where only what is left tells the noise."""
+        if self.hides(current.fit) or not self.fitter.noise.known.all():
+            return False
+        left = max(current.held - self.n_held, 0.0) * max(current.fit.objective - self.n_fit, 0.0)
+        return self._may_be_form(left, current)
+
+    def _may_be_form(self, squares: float, current: Trial, times: float = 1.0) -> bool:
+        """Whether the product of these squares, fitted and held out, is within what the form of a law is off, so many
+        `times`, of what its cause takes away."""
+        most = self.trial(
+            Structure(current.fit.structure.device), steps=40
+        )  # without one alone a fit may leave the numbers
+        for j, cause in enumerate(current.fit.structure.causes):
+            rough = 0.0 if cause.effect == PARAMETER else cause.law.rough
+            if rough:
+                without = self.trial(cooled(current.fit).without(j))
+                held = min(without.held, most.held) - current.held
+                fitted = min(without.fit.objective, most.fit.objective) - current.fit.objective
+                if squares < (rough * times) ** 4 * max(held, 0.0) * max(fitted, 0.0):
+                    return True
+        return False

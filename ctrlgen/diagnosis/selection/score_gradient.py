@@ -1,0 +1,137 @@
+"""The slopes of the readings by the amplitude of every hypothesis, at once.
+
+No hypothesis is simulated: its term is evaluated along the fitted motion and injected where it acts,
+S+ = F(S, u) + F_delta delta, y = H(S, u) + H_delta delta, linearised along the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
+from ctrlgen.diagnosis.selection.candidate_terms import Column, Laws
+from ctrlgen.diagnosis.selection.ltv_propagation import Spread
+from ctrlgen.effects import Place
+from ctrlgen.numerics.batched_evaluation import evaluate
+from ctrlgen.recordings.recording import Record
+
+BLOCK = 500  # samples worked on at a time: what belongs to them stays in the cache
+LOST = 1e100
+
+
+@dataclass(eq=False)
+class Sums:
+    """Inner products over all samples of the m hypotheses' slopes S: with the k free directions U (k, m), with the residual
+    (m,), and with one another (m, m)."""
+
+    US: np.ndarray
+    Sr: np.ndarray
+    SS: np.ndarray
+
+    @classmethod
+    def none(cls, k: int, m: int) -> Sums:
+        """Of no sample."""
+        return cls(np.zeros((k, m)), np.zeros(m), np.zeros((m, m)))
+
+    def plus(self, other: Sums) -> Sums:
+        """Of the samples of both."""
+        return Sums(self.US + other.US, self.Sr + other.Sr, self.SS + other.SS)
+
+
+class Slopes:
+    """The slopes of the readings by every hypothesis' amplitude on one record."""
+
+    def __init__(
+        self,
+        fitter: Fitter,
+        fit: Fit,
+        record: Record,
+        hypotheses: list[Hypothesis],
+        seen: Callable[[Place, int], Seen],
+    ) -> None:
+        self.fitter, self.record = fitter, record
+        probed, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
+        known = [u.path for u in fit.structure.unknowns]
+        numbers = [h for h in hypotheses if h.effect == PARAMETER]
+        number_paths = [h.path for h in numbers if h.path not in known]
+        free = [*known, *number_paths, *probes.values()]
+        key = ("screen", fit.structure.causes, tuple(free), record.sample_time, record.linear)
+        if key not in fitter.cache:
+            fitter.cache[key] = Response(probed, free, fitter.recording.channels, record.sample_time, record.linear)
+        self.response: Response = fitter.cache[key]
+        self.p = self.response.model.p_nominal.copy()
+        self.p[: len(known)] = fit.theta
+        self.p[len(known) + len(number_paths) :] = 0.0
+        entered = {where: free.index(path) for where, path in probes.items()}
+        others = [h for h in hypotheses if h.effect != PARAMETER]
+        self.laws = Laws(self.response, fit.structure, others, entered, seen)
+        places = [free.index(h.path) for h in numbers]
+        self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
+        self.columns = list(self.laws.columns)
+        for k, (h, i) in enumerate(zip(numbers, places, strict=True)):
+            term, size = len(self.laws.terms) + k, float(self.sizes[k])
+            self.columns.append(Column(h, {"value": self.p[i]}, (i,), (term,), size, 0, (-500.0, 500.0)))
+        self.linear = self.response.linearised(self.p, range(len(free)))
+        self.spread = Spread(self.linear.patterns, self.columns)
+
+    def sums(self, white: np.ndarray, U: np.ndarray, start: np.ndarray | None) -> Sums:
+        """This record's inner products with its whitened residual `white` (n, n_y) and free directions U (n, n_y, k)."""
+        noise, seen = self.fitter.noise, self.spread.seen
+        usable = noise.usable(self.record.valid)
+        SS = [np.zeros((len(s), len(s))) for s in seen]
+        tails = [np.zeros((len(ar), len(s))) for ar, s in zip(noise.ar, seen, strict=True)]
+        total = Sums.none(U.shape[2], len(self.columns))
+        lost = np.zeros(len(self.laws.terms) + len(self.sizes), bool)
+        for a, b, readings in self._blocks(start, lost):
+            for i, Y in enumerate(readings):
+                if len(noise.ar[i]):
+                    Y = np.vstack([tails[i], Y])
+                    tails[i] = Y[len(Y) - len(tails[i]) :]
+                S = noise.filtered(Y, i)
+                S[~usable[a:b, i]] = 0.0
+                if not np.isfinite(S.sum()):
+                    S = np.nan_to_num(S)
+                SS[i] += S.T @ S
+                total.US[:, seen[i]] += U[a:b, i].T @ S
+                total.Sr[seen[i]] += white[a:b, i] @ S
+        for own, columns in zip(SS, seen, strict=True):
+            total.SS[np.ix_(columns, columns)] += own
+        gone = [j for j, column in enumerate(self.columns) if lost[list(column.terms)].any()]
+        total.US[:, gone], total.Sr[gone], total.SS[gone], total.SS[:, gone] = 0.0, 0.0, 0.0, 0.0
+        return total
+
+    def _blocks(self, start: np.ndarray | None, lost: np.ndarray) -> Iterator[tuple[int, int, Iterator[np.ndarray]]]:
+        """Blocks of samples [a, b) with what each channel reads of its columns; marks terms as `lost` on the way.
+
+        Every block is evaluated with the sample after it, whose terms act together with its last ones; those of a held drive
+        act together with what they become before it changes.
+        """
+        r, record, n = self.response, self.record, len(self.record.time)
+        series = np.isfinite(r.sample_time)
+        after, _ = r.motion(record, self.p, start)
+        before = np.vstack([r._start(record, self.p, start), after[:-1]])
+        inputs = (before, *r._inputs(record))
+        seen = (before if series else after, record.drive, inputs[3], after)
+        size = min(BLOCK, n)
+        laws = self.laws.compiled(self.p).mapaccum(size + 1)
+        memory = self.laws.start(record.time[0])
+        for a in range(0, n, size):
+            here = np.minimum(np.arange(a, a + size + 1), n - 1)  # the last block is filled up
+            k = min(size, n - a)
+            memories, found, ends = evaluate(laws, memory, *(x[here] for x in seen))
+            memory = memories[size - 1]
+            if a + k == n:
+                found[k:] = found[k - 1]
+            found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])
+            lost |= ~np.all(np.abs(found) < LOST, axis=0)
+            found[:, lost] = 0.0  # memories that have left the numbers say nothing
+            f, following = found[:k], found[1 : k + 1].copy() if series else found[:k]
+            following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])
+            linear = self.linear.along(*(x[here[:size]] for x in inputs))
+            yield a, a + k, self.spread.readings([block[:k] for block in linear], f, following)

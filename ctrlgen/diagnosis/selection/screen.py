@@ -1,0 +1,213 @@
+"""Step 6: every hypothesis at once, by the score test.
+
+With r the whitened residual of the fitted structure, J its whitened slopes (prior rows included) and s the slope of
+the readings by one amplitude at `off`, for fixed shape,
+
+    s_perp = s - U U's,   z = s_perp'r/|s_perp|,   amplitude = s_perp'r/|s_perp|^2,   J = U (...) with U'U = 1.
+
+Under "nothing left out" the z of all hypotheses are jointly normal with the correlation cos(s_perp, s_perp'); the
+largest |z| is judged against simulations of that. |cos| near one says what this record cannot tell apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
+from ctrlgen.diagnosis.selection.candidate_terms import Column, Peaks, peaks
+from ctrlgen.diagnosis.selection.score_gradient import Slopes, Sums
+from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
+from ctrlgen.diagnosis.selection.subset_search import Suspect, Together
+from ctrlgen.effects import Place
+from ctrlgen.model.assembly import channels
+
+ALIKE = 1e-6  # of the largest: free directions with smaller slopes are taken as one with the others
+OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
+LINES = 3  # of the spectrum of what is left, tried as frequencies
+PARTS = 12  # of the records' time: an event is tried in the middle of each
+ZEROS = 8  # padding of that spectrum
+OTHERS = 8  # shapes of a law beside the best, in which it may be begun again
+NULLS = 2000  # simulated records without mismatch
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Suspects, the most conspicuous first; `cosine` between their projected slopes; `threshold` the |z| that a record
+    without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
+    `together` sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide
+    each other; `hidden` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
+    whose own effect looks most like theirs, -1 where they do not reach the readings at all."""
+
+    suspects: tuple[Suspect, ...]
+    cosine: np.ndarray
+    threshold: float
+    amplitude_sd: dict[tuple[str, str], float]
+    together: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
+    hidden: dict[Hypothesis, int] = field(default_factory=dict)
+
+    def alike(self, a: Suspect, b: Suspect) -> float:
+        """|cos| between two suspects."""
+        return float(abs(self.cosine[a.column, b.column]))
+
+
+class Screen:
+    """The hypotheses of one fitter, ready to be compared with any fit."""
+
+    def __init__(self, fitter: Fitter, hypotheses: list[Hypothesis], seed: int = 0) -> None:
+        self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
+        self.peaks: Peaks | None = None
+
+    def run(self, fit: Fit) -> Screened:
+        """All hypotheses that the fit does not contain yet."""
+        beside = (h.beside(fit.structure.causes) for h in self.hypotheses)
+        open_ = [h for h in beside if h is not None]
+        sums: Sums | None = None
+        columns: list[Column] = []
+        U, back = _directions(fit.J)
+        first, seen = 0, self._seen(fit)
+        for record, start in zip(self.fitter.to_fit, fit.starts or [None] * len(self.fitter.to_fit), strict=True):
+            slopes = Slopes(self.fitter, fit, record, open_, seen)
+            columns = slopes.columns
+            n = record.valid.size
+            white = fit.residual[first : first + n].reshape(record.valid.shape)
+            free = U[first : first + n].reshape(*record.valid.shape, -1)
+            first += n
+            here = slopes.sums(white, free, start)
+            sums = here if sums is None else sums.plus(here)
+        if not columns or sums is None:
+            return Screened((), np.zeros((0, 0)), np.inf, {})
+        size = np.linalg.norm(fit.J[:first], axis=0)
+        return self._judge(
+            columns, sums, U.T @ fit.residual, np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
+        )
+
+    def _seen(self, fit: Fit) -> Callable[[Place, int], Seen]:
+        """What the records show at each place, after what `fit` explains."""
+        if self.peaks is None:
+            self.peaks = peaks(self.fitter, fit)
+        most, along = self.peaks, self._along_path(fit)
+        moments, part = self._moments()
+        common = {"lines": self._lines(fit), "moments": moments}
+
+        def at(place: Place, i: int) -> Seen:
+            return Seen(most.get((place, i), {}) | {"s": part}, common | along.get((place, i), {}))
+
+        return at
+
+    def _moments(self) -> tuple[tuple[float, ...], float]:
+        """The middles of equal parts of the time that the records to fit take, and the length of a part, on their clock."""
+        series, records = self.fitter.recording.kind == "series", self.fitter.to_fit
+        ends = [(r.time[0], r.time[-1]) if series else (0.0, float(len(r.time))) for r in records] or [(0.0, 1.0)]
+        begin, end = min(a for a, _ in ends), max(b for _, b in ends)
+        part = (end - begin) / PARTS
+        return tuple(begin + (k + 0.5) * part for k in range(PARTS)), part
+
+    def _lines(self, fit: Fit) -> tuple[float, ...]:
+        """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
+        records = self.fitter.to_fit
+        if self.fitter.recording.kind == "poses" or not records:
+            return ()
+        k = int(np.argmax([r.valid.size for r in records]))
+        begin = sum(r.valid.size for r in records[:k])
+        left = fit.residual[begin : begin + records[k].valid.size].reshape(records[k].valid.shape)
+        window = np.hanning(len(left))[:, None]
+        power = np.sum(np.abs(np.fft.rfft(left * window, n=ZEROS * len(left), axis=0)) ** 2, axis=1)
+        peaks, _ = find_peaks(power, distance=4 * ZEROS)
+        best = peaks[np.argsort(-power[peaks])[:LINES]]
+        return tuple(float(f) for f in np.sort(best) / (ZEROS * len(left) * records[k].sample_time))
+
+    def _along_path(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
+        """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does, and the
+        places at which it jumps most."""
+        records = self.fitter.to_fit
+        if self.fitter.recording.kind == "poses" or not records:
+            return {}
+        record = max(records, key=lambda r: r.valid.size)
+        foreseen, behind = (self.fitter.predicted(each, record) for each in (fit, _read_truly(fit)))
+        left = record.observed - foreseen
+        names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
+        read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
+        return {
+            (Place.SENSOR, names.index(name)): {
+                "pitches": both(pitches(y[good, i], left[good, i]) for y in (record.observed, foreseen, behind)),
+                "places": jumps(record.observed[good, i], left[good, i]),
+            }
+            for i, name in read
+            if name in names and np.any(good := record.valid[:, i] & np.isfinite(left[:, i]))
+        }
+
+    def _judge(self, columns: list[Column], sums: Sums, gradient: np.ndarray, likeness: np.ndarray) -> Screened:
+        """`gradient` U'r (k,), zero at an optimum inside all bounds; `likeness` |J's|/|J| (free numbers, columns)."""
+        norm = np.diag(sums.SS)
+        own = norm - np.sum(sums.US**2, axis=0)
+        score = sums.Sr - gradient @ sums.US
+        left = np.where(norm > 0, own / np.where(norm > 0, norm, 1.0), 0.0)
+        seen = np.flatnonzero((left > OWN_LEFT) & (norm > 0) & np.isfinite(norm))
+        gram = sums.SS - sums.US.T @ sums.US
+        d = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        cosine = np.clip(gram / np.outer(d, d), -1, 1)
+        z = np.zeros(len(columns))
+        z[seen] = score[seen] / np.sqrt(own[seen])
+        for j in seen:
+            if columns[j].one_sided and z[j] * columns[j].one_sided < 0:
+                z[j] = 0.0
+        ranked: dict[Hypothesis, list[int]] = {}
+        for j in sorted(seen, key=lambda j: -abs(z[j])):
+            ranked.setdefault(columns[j].hypothesis, []).append(int(j))
+        order = [js[0] for js in ranked.values()]
+        suspect = {j: self._suspect(columns[j], z[j], score[j] / own[j], left[j], j) for j in map(int, seen)}
+        suspects = tuple(
+            replace(suspect[j], others=tuple(suspect[i].start for i in others[:OTHERS]))
+            for j, *others in ranked.values()
+        )
+        sds = {
+            (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
+            for j in order
+        }
+        together = Together(columns, seen, score, own, left, cosine, self._suspect)
+        resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
+        hidden = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
+        hidden = {h: k for h, k in hidden.items() if h not in ranked}
+        threshold = self._threshold(cosine[np.ix_(seen, seen)])
+        return Screened(suspects, cosine, threshold, sds, together.search(), hidden)
+
+    def _suspect(self, column: Column, z: float, amplitude: float, left: float, j: int) -> Suspect:
+        h = column.hypothesis
+        if h.effect == PARAMETER:
+            start = {"value": column.shape["value"] + amplitude * column.size}
+        else:
+            start = {**column.shape, h.law.amplitude().name: amplitude * column.size}
+        return Suspect(h, start, float(z), float(left), j)
+
+    def _threshold(self, cosine: np.ndarray) -> float:
+        """The 99th percentile of the largest |z| when nothing was left out."""
+        if not len(cosine):
+            return np.inf
+        values, vectors = np.linalg.eigh(cosine)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        draws = np.random.default_rng(self.seed).standard_normal((NULLS, len(cosine)))
+        return float(np.quantile(np.abs(draws @ root.T).max(axis=1), 0.99))
+
+
+def _read_truly(fit: Fit) -> Fit:
+    """The fit with every cause at a sensor off: fringes count what is there, not what they have made of it."""
+    theta = fit.theta.copy()
+    for k, u in enumerate(fit.structure.unknowns):
+        cause = None if u.cause is None else fit.structure.causes[u.cause]
+        if u.amplitude and cause.effect != PARAMETER and cause.law.place is Place.SENSOR:
+            theta[k] = u.nominal
+    return replace(fit, theta=theta)
+
+
+def _directions(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """U (N, k), orthonormal, that spans the slopes J (N, n) of the free numbers, and `back` (n, k) with J = U back'."""
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0] = 1.0
+    U, s, V = np.linalg.svd(J / scale, full_matrices=False)
+    kept = s > ALIKE * s.max(initial=0.0)
+    return U[:, kept], scale[:, None] * (V.T * s)[:, kept]

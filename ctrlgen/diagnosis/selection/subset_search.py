@@ -1,0 +1,102 @@
+"""Sets of hypotheses that explain jointly what none explains alone: causes can hide each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+
+TOO_ALIKE = 0.04  # of a slope left beside the others of a set, below which amplitudes mean nothing
+BEAM = 200  # sets kept at each size
+LARGEST_SET = 4
+RIDGE = 1e-9  # keeps sets of two slopes that are all but one solvable
+LOOSE = 0.35  # how far beyond its bounds a linear estimate of an amplitude may lie, relative
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """One hypothesis with the shape that fits best: its `z`, the amplitude that would explain it, its share of slope
+    left after projection, and its column in the correlation matrix. `others`: the same for the next best shapes."""
+
+    hypothesis: Hypothesis
+    start: dict[str, float]
+    z: float
+    left: float
+    column: int
+    others: tuple[dict[str, float], ...] = ()
+
+
+class Together:
+    """Sets of hypotheses by the chi^2 that they explain jointly, from scores and cosines alone.
+
+    Adding hypothesis j to a set K raises it by (z_j - c_jK C_KK^-1 z_K)^2/(1 - c_jK C_KK^-1 c_Kj).
+    """
+
+    def __init__(self, columns, seen, score, own, left, cosine, suspect) -> None:
+        self.columns = [columns[j] for j in seen]
+        self.index = seen
+        self.root = np.sqrt(own[seen])
+        self.z = score[seen] / self.root
+        self.left, self.C, self.suspect = left[seen], cosine[np.ix_(seen, seen)], suspect
+        self.group = (
+            np.unique([hash(c.hypothesis) for c in self.columns], return_inverse=True)[1]
+            if len(seen)
+            else np.zeros(0, int)
+        )
+
+    def search(self) -> tuple[tuple[float, tuple[Suspect, ...]], ...]:
+        """Sets of every size from two, those whose amplitudes make sense, the best first."""
+        beam: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
+        found = []
+        for size in range(1, LARGEST_SET + 1):
+            beam = self._grown(beam)
+            if size > 1:
+                sets = [(gain, self._amplitudes(members), members) for gain, members in beam]
+                found += [(gain, self._suspects(members, b)) for gain, b, members in sets if self._sensible(members, b)]
+        return tuple(sorted(found, key=lambda f: -f[0]))
+
+    def _grown(self, beam: list[tuple[float, tuple[int, ...]]]) -> list[tuple[float, tuple[int, ...]]]:
+        gains, places = [], []
+        for member, (gain, members) in enumerate(beam):
+            K = list(members)
+            if K:
+                W = np.linalg.solve(self.C[np.ix_(K, K)] + RIDGE * np.eye(len(K)), self.C[K])
+                rest = 1 - np.einsum("kj,kj->j", self.C[K], W)
+                score = self.z - W.T @ self.z[K]
+            else:
+                rest, score = np.ones(len(self.z)), self.z
+            more = np.where(rest > TOO_ALIKE, score**2 / np.maximum(rest, TOO_ALIKE), 0.0)
+            more[np.isin(self.group, self.group[K])] = 0.0
+            best = np.argsort(-more)[:BEAM]
+            best = best[more[best] > 0]
+            gains.append(gain + more[best])
+            places += [(member, int(j)) for j in best]
+        grown: dict[frozenset, tuple[float, tuple[int, ...]]] = {}
+        joined = np.concatenate([np.zeros(0), *gains])
+        for i in np.argsort(-joined, kind="stable"):  # the best with each group first
+            member, j = places[i]
+            members = (*beam[member][1], j)
+            grown.setdefault(frozenset(self.group[list(members)]), (float(joined[i]), members))
+            if len(grown) == BEAM:
+                break
+        return list(grown.values())
+
+    def _amplitudes(self, members: tuple[int, ...]) -> np.ndarray:
+        K = list(members)
+        return np.linalg.solve(self.C[np.ix_(K, K)] + RIDGE * np.eye(len(K)), self.z[K]) / self.root[K]
+
+    def _sensible(self, members: tuple[int, ...], b: np.ndarray) -> bool:
+        """Whether amplitudes are about inside their bounds, and in the range that the effect expects."""
+        for k, value in zip(members, b, strict=True):
+            low, high = self.columns[k].range
+            if not low - LOOSE * (high - low) * (low < 0) <= value <= high + LOOSE * (high - low):
+                return False
+        return True
+
+    def _suspects(self, members: tuple[int, ...], b: np.ndarray) -> tuple[Suspect, ...]:
+        return tuple(
+            self.suspect(self.columns[k], self.z[k], value, self.left[k], int(self.index[k]))
+            for k, value in zip(members, b, strict=True)
+        )

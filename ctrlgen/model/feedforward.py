@@ -1,0 +1,293 @@
+"""The online controller: wanted signal -> drives, with every limit kept, in a fixed number of operations.
+
+This is the reference of the generated C: the C template does the same steps in the same order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntFlag
+from functools import cached_property
+from itertools import product
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.model.inverse import Inverse, invert
+from ctrlgen.model.model import Limit, Model, build_model
+from ctrlgen.numerics.interval_arithmetic import bounds
+
+SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for
+MEMORY_SHRINKS = 8  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
+TRIALS = 3  # of the way to a target that the drives cannot reach in one sample
+INSET = (
+    1 - 2**-8
+)  # of the way to where straight drives would meet their limit: curved ones meet it a little earlier or later
+SWEEPS = 3  # over the displacements, toward the nearest pose: 0.5 % farther at most on the shipped devices, clipping 50 to 85 %
+NEGLIGIBLE = 1e-6  # of a limit: directions in which nothing comes near it
+
+
+class Status(IntFlag):
+    """What the controller had to do. 0: everything as commanded."""
+
+    DISPLACEMENT = 1  # the target needs a displacement outside its range; the nearest target inside was taken
+    COMPOSITE = 2  # a limit on stress or rotation: the displacement was shrunk toward home
+    STATE = 4  # the actuator state (temperature) was held at its limit
+    DRIVE = 8  # the drive was held at its limit: the target comes later than commanded
+    INPUT = 16  # not a number or absurdly large: drives at zero, target ignored
+
+
+@dataclass(frozen=True)
+class Controller:
+    """One device, one followed signal, one sample time (None: equilibria only)."""
+
+    model: Model
+    follow: str
+    sample_time: float | None
+    slack: float = SLACK
+
+    @cached_property
+    def static(self) -> Inverse:
+        """Kernels for equilibria."""
+        return invert(self.nominal, self.follow, None)
+
+    @cached_property
+    def moving(self) -> Inverse | None:
+        """Kernels for the next sample; None where there is no sample time."""
+        return None if self.sample_time is None else invert(self.nominal, self.follow, self.sample_time)
+
+    @cached_property
+    def nominal(self) -> Model:
+        """The model with every parameter at its nominal number, which is what a controller can use."""
+        return build_model(self.model.device) if self.model.p.numel() else self.model
+
+    def _worst_in_range(self, limit: Limit) -> float:
+        """The largest share of a convex limit over the displacement range, nothing remembered: that of its worst corner."""
+        m = self.nominal
+        corners = np.array(list(product(*zip(*m.z_bounds, strict=True)))).T
+        shares = ca.Function("shares", [m.x, m.z], [limit.expr / limit.upper])
+        return float(
+            np.max(shares.map(corners.shape[1])(np.tile(m.rest[:, None], (1, corners.shape[1])), corners).full())
+        )
+
+    @cached_property
+    def guarded_limits(self) -> tuple[Limit, ...]:
+        """Composite limits that the range of the displacement alone does not keep."""
+        limits = [limit for limit in self.nominal.composite_limits() if limit.upper is not None]
+        x = self.nominal.x
+        return tuple(limit for limit in limits if ca.depends_on(limit.expr, x) or self._worst_in_range(limit) > 1)
+
+    @cached_property
+    def composite_ratio(self) -> ca.Function:
+        """(x, z, wanted) -> the largest of the guarded limits' expr/upper at the wanted displacement; above 1 one is broken."""
+        m = self.nominal
+        wanted = ca.SX.sym("wanted", m.z.numel())
+        x_then = ca.vertcat(m.x[: m.n_states], (self.moving or self.static).memory(m.x, m.z, wanted))
+        squares = [
+            ca.substitute(limit.expr, ca.vertcat(m.x, m.z), ca.vertcat(x_then, wanted)) ** 2 * (1 / limit.upper**2)
+            for limit in self.guarded_limits if limit.upper
+        ]  # fmt: skip
+        worst = ca.sqrt(ca.mmax(ca.vertcat(*squares))) if squares else ca.SX(0)  # one root at the end
+        return ca.Function(
+            "composite_ratio", [m.x, m.z, wanted], [worst], ["x", "z", "wanted"], ["ratio"], {"cse": True}
+        )
+
+    @property
+    def shrinks(self) -> int:
+        """How often a displacement is shrunk toward home: once, if all of a limit shrinks with it."""
+        m = self.nominal
+        bent = ca.depends_on(ca.jacobian(m.signals["displacement"].expr, m.z), m.z)
+        return MEMORY_SHRINKS if bent or m.x.numel() > m.n_states else 1
+
+    @cached_property
+    def nearest(self) -> ca.Function:
+        """beyond -> the displacement in its range whose followed signal is nearest to that of a displacement beyond it.
+
+        Minimises |W (z - beyond)|^2 over the box, W the slope of the followed signal at home in its typical sizes, by
+        `SWEEPS` of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) from the clipped
+        displacement; to first order in the displacement, and exact where one displacement moves one channel.
+        """
+        m, signal = self.nominal, self.nominal.signals[self.follow]
+        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(signal.expr, m.z)])(m.rest, 0 * m.z_scale).full()
+        W = slope / np.array(signal.scale)[:, None]
+        H = W.T @ W
+        P = ca.sparsify(ca.DM(H / np.diag(H)[:, None]))
+        low, high = m.z_bounds
+        beyond = ca.SX.sym("beyond", m.z.numel())
+        z = ca.fmin(ca.fmax(beyond, low), high)
+        slopes = ca.mtimes(P, z - beyond)
+        for _ in range(SWEEPS if not P.sparsity().is_diag() else 0):
+            for i in range(m.z.numel()):
+                moved = ca.fmin(ca.fmax(z[i] - slopes[i], low[i]), high[i])
+                slopes += P[:, i] * (moved - z[i])
+                z[i] = moved
+        return ca.Function("nearest", [beyond], [z], ["beyond"], ["z"], {"cse": True})
+
+    @cached_property
+    def gauge(self) -> ca.Function | None:
+        """wanted -> a cheap bound of the guarded limits' share; None where there is none.
+
+        The followed signal's own directions v_k (to first order at home) are a basis, z = sum_k lambda_k v_k, and for a
+        convex f with f(s z) = |s| f(z), as stresses of a linear structure are, f(z) <= sum_k |lambda_k| f(v_k).
+        """
+        m = self.nominal
+        if not self.guarded_limits or m.x.numel() > m.n_states:
+            return None
+        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(m.signals[self.follow].expr, m.z)])(m.rest, 0 * m.z_scale)
+        W = slope.full()
+        if W.shape[0] != W.shape[1] or np.linalg.matrix_rank(W) < len(W):
+            W = np.eye(m.z.numel())
+        reach = np.abs(W) @ m.z_bounds[1]  # of lambda_k over the range
+        V = np.linalg.inv(W) * reach  # columns v_k, scaled to where lambda_k = reach_k
+        shares = np.max([self._shares(side * V) for side in (-1.0, 1.0)], axis=0)
+        if not all(np.allclose(self._shares(s * V), abs(s) * shares, rtol=1e-6, atol=1e-6) for s in (-0.5, 0.1)):
+            return None
+        few = shares > NEGLIGIBLE
+        wanted = ca.SX.sym("wanted", m.z.numel())
+        bound = ca.sum1(ca.fabs(ca.mtimes(ca.DM(shares[few, None] / reach[few, None] * W[few]), wanted)))
+        return ca.Function(
+            "gauge", [wanted], [bound + shares[~few].sum() + NEGLIGIBLE], ["wanted"], ["bound"], {"cse": True}
+        )
+
+    def _shares(self, displacements: np.ndarray) -> np.ndarray:
+        """The guarded limits' share at each column of `displacements`, nothing remembered."""
+        m, count = self.nominal, displacements.shape[1]
+        cold = np.tile(m.rest[:, None], (1, count))
+        return self.composite_ratio.map(count)(cold, 0 * displacements, displacements).full().ravel()
+
+    @cached_property
+    def state_can_be_limited(self) -> bool:
+        """Whether a displacement in its range can want an actuator state beyond its limits, by interval arithmetic."""
+        m, n = self.nominal, self.nominal.n_states
+        ranges = {"wanted": m.z_bounds, "z": m.z_bounds, "x": m.x_bounds}
+        for k in (self.static, self.moving or self.static) if n else ():
+            low, high = bounds(k.state, ranges)
+            slack = self.slacks[1]
+            if np.any(low < m.x_bounds[0][:n] - slack) or np.any(high > m.x_bounds[1][:n] + slack):
+                return True
+        return False
+
+    @cached_property
+    def input_limits(self) -> np.ndarray:
+        """Largest |target| per channel that is taken for a command at all: 1e5 typical sizes, far outside any range."""
+        return 1e5 * np.array(self.model.signals[self.follow].scale)
+
+    @cached_property
+    def safe_drive(self) -> np.ndarray:
+        """The drive without a usable target: zero, or what is nearest to it in range. A heater off cools passively."""
+        return np.clip(0.0, *self.nominal.u_bounds)
+
+    @cached_property
+    def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What displacement, actuator state and drive may miss a limit by unreported; the drive's is theirs, carried through."""
+        m, n = self.nominal, self.nominal.n_states
+        z_slack, state_slack = self.slack * m.z_scale, self.slack * m.x_scale[:n]
+        x, z = self.rest()
+        kernel = (self.moving or self.static).drive
+        drives = [_row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
+        return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
+
+    def rest(self) -> tuple[np.ndarray, np.ndarray]:
+        """State of a cold device: (x, z)."""
+        return self.model.rest.copy(), np.zeros(len(self.model.axes))
+
+    def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> Step:
+        """Drives that bring the followed signal to `target` at the next sample, from `state` (x, z).
+
+        With `settle` the equilibrium at `target` instead, and its state. A target that the drives
+        cannot reach in time is approached on the straight line of displacements, which the convex limits allow.
+        """
+        m = self.nominal
+        k = self.static if settle or self.moving is None else self.moving
+        (z_low, z_high), (x_low, x_high), (u_low, u_high) = m.z_bounds, m.x_bounds, m.u_bounds
+        z_slack, s_slack, u_slack = self.slacks
+        n = m.n_states
+        x, z = state
+
+        def acting(wanted: np.ndarray) -> tuple[np.ndarray, bool]:
+            return _clamp(_row(k.state(x, z, wanted)), x_low[:n], x_high[:n], s_slack)
+
+        def drive(wanted: np.ndarray, held: np.ndarray) -> np.ndarray:
+            return _row(k.drive(x, z, wanted, held))
+
+        wanted, status = _row(k.displacement(x, z, target)), Status(0)
+        if not np.all((wanted >= z_low) & (wanted <= z_high)):  # not for NaN either
+            if not np.all(np.abs(target) <= self.input_limits):
+                x_next = _row(k.advance(x, z, self.safe_drive))
+                return Step(
+                    Status.INPUT, z, x[:n], self.safe_drive, (x_next, _row(k.settle(x_next, z, self.safe_drive)))
+                )
+            beyond = wanted
+            wanted, hit = _clamp(beyond, z_low, z_high, z_slack)
+            if hit:
+                wanted = _row(self.nearest(beyond))
+                status |= Status.DISPLACEMENT
+        held, hit = acting(wanted)
+        if hit:
+            status |= Status.STATE
+            wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, self.safe_drive))
+        if self.guarded_limits and (self.gauge is None or not float(self.gauge(wanted)) <= 1):
+            first = ratio = float(self.composite_ratio(x, z, wanted))
+            for _ in range(self.shrinks):
+                wanted = wanted / ratio if ratio > 1 else wanted  # also where the ratio is NaN
+                ratio = float(self.composite_ratio(x, z, wanted)) if self.shrinks > 1 else 1.0
+            if first > 1:
+                held, _ = acting(wanted)
+            status |= Status.COMPOSITE if first > 1 + self.slack else Status(0)
+        u, beyond = _clamp(drive(wanted, held), u_low, u_high, u_slack)
+        if beyond:
+            status |= Status.DRIVE
+            origin = np.zeros_like(z) if settle or self.moving is None else z
+            way = wanted - origin
+            wanted = origin + self._share_of(lambda s: drive(origin + s * way, acting(origin + s * way)[0])) * way
+            held, _ = acting(wanted)
+            u, beyond = _clamp(drive(wanted, held), u_low, u_high, u_slack)
+        if not beyond and len(x) == n:  # nothing but the actuators remembers: they are where the drive was computed for
+            return Step(status, wanted, held, u, (held, wanted))
+        x_next = _row(k.advance(x, wanted if settle or self.moving is None else z, u))
+        z_next = _row(k.settle(x_next, wanted, u)) if beyond else wanted
+        return Step(status, z_next, held, u, (x_next, z_next))
+
+    def _share_of(self, drive: Callable[[float], np.ndarray]) -> float:
+        """The largest share of a way found whose drives are admissible, by `TRIALS` secants of the drive that is first at its
+        limit; 0 where the way begins beyond one."""
+        (low, high), slack = self.nominal.u_bounds, self.slacks[2]
+        share, end, here, there = 0.0, 1.0, drive(0.0), drive(1.0)
+        if _clamp(here, low, high, slack)[1]:
+            return share
+        for _ in range(TRIALS):
+            part = 1.0
+            for i in np.flatnonzero((there > high + slack) | (there < low - slack)):
+                limit = high[i] if there[i] > high[i] else low[i]
+                part = min(part, (limit - here[i]) / (there[i] - here[i]))
+            trial = share + INSET * max(part, 0.0) * (end - share)
+            drives = drive(trial)
+            if _clamp(drives, low, high, slack)[1]:
+                end, there = trial, drives
+            else:
+                share, here = trial, drives
+        return share
+
+
+@dataclass(frozen=True)
+class Step:
+    """One answer of the controller, SI: what it did, and the state it expects at the next sample."""
+
+    status: Status
+    displacement: np.ndarray
+    actuator_state: np.ndarray
+    drive: np.ndarray
+    state: tuple[np.ndarray, np.ndarray]
+
+
+def _row(value: ca.DM) -> np.ndarray:
+    return value.full().ravel()
+
+
+def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:
+    """`wanted` limited to low ... high, NaN to low, and whether that moved it by more than the slack (NaN always)."""
+    raised = np.where(wanted > low, wanted, low)
+    limited = np.where(raised < high, raised, high)
+    with np.errstate(invalid="ignore"):  # inf - inf, of a state that overflowed
+        return limited, not bool(np.all(np.abs(limited - wanted) <= slack))

@@ -1,0 +1,197 @@
+"""The model backwards, symbolically: wanted signal -> displacement -> state -> drive.
+
+Nothing here knows a device. The equations of `ctrlgen.model.model` at the end of a sample,
+
+    followed(x+, z+, u) = target,  g(x+, z+, u) = 0,  x+ = step(x, z, u)  (static: rates = 0),
+
+are sorted into blocks by block triangular form (I. S. Duff, J. K. Reid, ACM TOMS 4 (1978) 137), and
+each block is solved in the cheapest exact way: linear in closed form, one quadratic equation by
+its root, anything else by a fixed number of Newton steps. The operation count is therefore fixed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.model.model import Model
+
+CORNERS = frozenset((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_IF_ELSE_ZERO))
+NOISE = 1e-12  # of the largest entry of an equilibrated inverse: what rounding leaves of a zero
+NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves rounding only
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Kernels, SX functions in SI, that a controller calls in this order.
+
+    `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted (none for
+    actuators without memory); `drive` (x, z, z_wanted, s_wanted) -> u; `memory` (x, z, z_wanted) -> the effects'
+    memories then; `advance` (x, z, u) -> x at the next sample; `settle` (x, z, u) -> the displacement that balances
+    the actuators' forces, by Newton from z. x, z are those of the present sample. A static inverse reads
+    neither, except that its `advance` takes the new z.
+    """
+
+    displacement: ca.Function
+    state: ca.Function
+    drive: ca.Function
+    memory: ca.Function
+    advance: ca.Function
+    settle: ca.Function
+
+
+def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
+    """The inverse of `model` for the signal `follow`; static where `sample_time` is None.
+
+    Free parameters stand at their nominal values.
+    """
+    x, z, u, n, n_s = model.x, model.z, model.u, len(model.axes), model.n_states
+    x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
+    heat, target = model.heat, ca.SX.sym("target", model.signals[follow].expr.numel())
+    now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, ca.DM(model.p_nominal))
+    known = _Values.of(
+        (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (target, np.zeros(target.numel()), np.zeros(target.numel())),
+        (x_1, model.rest, model.x_scale), (z_1, 0 * model.z_scale, model.z_scale), (u_1, 0 * model.u_scale, model.u_scale),
+        (heat, np.zeros(heat.numel()), np.ones(heat.numel())),
+    )  # fmt: skip
+    followed, balance, rates, produced = (
+        ca.substitute(e, now, end)
+        for e in (model.signals[follow].expr, model.balance, model.rates_of_heat, model.heat_of_drive)
+    )
+    if sample_time is None:
+        motion = rates[:]
+        for i in (*model.stepped, *model.clocks):  # nothing rests there: an equilibrium starts its record anew
+            motion[i] = x_1[i]
+        reached = ca.substitute(_solve(known, motion, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
+        here = ca.vertcat(reached, z, u_1, ca.DM(model.p_nominal))
+        for i, value in model.stepped.items():
+            reached[i] = ca.substitute(value, now, here)
+    else:
+        reached = ca.substitute(model.step(sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
+        reached = ca.substitute(reached, u, u_1)
+        motion = x_1 - reached
+        produced = ca.substitute(model.heat_of_drive, ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
+    heating = heat - produced
+    wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion, heating), ca.vertcat(z_1, x_1, u_1, heat))[
+        :n
+    ]
+    # The later kernels take the earlier results as given, because the controller has limited them meanwhile.
+    later = _solve(known, ca.vertcat(balance, motion, heating), ca.vertcat(x_1, u_1, heat))
+    wanted_state, memory = later[:n_s], later[n_s : x.numel()]
+    drive_of_state = ca.substitute(ca.vertcat(motion[:n_s], heating), x_1[n_s:], memory)
+    wanted_u = _solve(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
+    advance = ca.substitute(reached, heat, ca.substitute(produced, x_1, reached) if sample_time is None else produced)
+    return Inverse(
+        _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
+        _kernel("state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
+        _kernel("drive", [x, z, z_1, x_1[:n_s]], ["x", "z", "wanted", "state"], wanted_u),
+        _kernel("memory", [x, z, z_1], ["x", "z", "wanted"], memory),
+        _kernel("advance", [x, z, u_1], ["x", "z", "drive"], advance),
+        _kernel(
+            "settle",
+            [x, z, u],
+            ["x", "z", "drive"],
+            _newton(ca.substitute(model.balance, model.p, ca.DM(model.p_nominal)), z, z),
+        ),
+    )
+
+
+def _kernel(name: str, arguments: list[ca.SX], names: list[str], result: ca.SX) -> ca.Function:
+    return ca.Function(name, arguments, [result], names, ["result"], {"cse": True})
+
+
+@dataclass(frozen=True)
+class _Values:
+    """Symbols with the value to expand about (`base`) and a typical distance from it (`scale`)."""
+
+    symbols: ca.SX
+    base: np.ndarray
+    scale: np.ndarray
+
+    @classmethod
+    def of(cls, *rows: tuple[ca.SX, np.ndarray, np.ndarray]) -> _Values:
+        """From (symbol, base, scale) for each vector of unknowns or knowns."""
+        symbols, bases, scales = zip(*rows, strict=True)
+        return cls(ca.vertcat(*symbols), np.concatenate(bases), np.concatenate(scales))
+
+    def at(self, expression: ca.SX, fraction: float) -> np.ndarray:
+        """`expression` at base + fraction * scale."""
+        return ca.Function("f", [self.symbols], [expression])(self.base + fraction * self.scale).full()
+
+    def base_of(self, unknowns: ca.SX) -> ca.DM:
+        return ca.Function("f", [self.symbols], [unknowns])(self.base)
+
+    def inside(self, unknowns: ca.SX) -> ca.DM:
+        return ca.Function("f", [self.symbols], [unknowns])(self.base + self.scale)
+
+
+def _solve(known: _Values, equations: ca.SX, unknowns: ca.SX) -> ca.SX:
+    """`unknowns` (n,) as expressions in the other symbols, such that equations (n,) = 0, block by block."""
+    count, rows, columns, row_starts, column_starts, *_ = ca.jacobian(equations, unknowns).sparsity().btf()
+    solution = [ca.SX(0)] * unknowns.numel()
+    done = ca.SX(0, 1)
+    values = ca.SX(0, 1)
+    for block in range(count):
+        own = columns[column_starts[block] : column_starts[block + 1]]
+        which = rows[row_starts[block] : row_starts[block + 1]]
+        v = unknowns[own]
+        root = _solve_block(known, ca.substitute(equations[which], done, values), v)
+        for k, i in enumerate(own):
+            solution[i] = root[k]
+        done, values = ca.vertcat(done, v), ca.vertcat(values, root)
+    return ca.vertcat(*solution)
+
+
+def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
+    """One block, r(v) = 0: linear, quadratic in one unknown, or `NEWTON_STEPS` Newton steps."""
+    base = known.base_of(v)
+    slope = ca.jacobian(r, v)
+    if not ca.symvar(slope):  # numbers only: invert them here, once
+        return base - ca.mtimes(_inverse(ca.evalf(slope).full()), ca.substitute(r, v, base))
+    if not ca.depends_on(slope, v):
+        return base - ca.solve(slope, ca.substitute(r, v, base))
+    curvature = ca.jacobian(slope, v)
+    if v.numel() == 1 and not ca.depends_on(curvature, v) and not _has_corners(slope):
+        return base + _rising_root(known, r, v, base, slope, curvature)
+    return _newton(r, v, ca.SX(known.inside(v)))
+
+
+def _inverse(slope: np.ndarray) -> ca.DM:
+    """The inverse of a matrix of numbers, scaled to rows and columns of order one; entries that are rounding are zero."""
+    rows = 1 / np.abs(slope).max(axis=1)
+    columns = 1 / np.abs(rows[:, None] * slope).max(axis=0)
+    scaled = np.linalg.inv(rows[:, None] * slope * columns)
+    scaled[np.abs(scaled) < NOISE * np.abs(scaled).max()] = 0.0
+    return ca.sparsify(ca.DM(columns[:, None] * scaled * rows))
+
+
+def _has_corners(slope: ca.SX) -> bool:
+    """Whether a slope jumps, as that of a play or a dead zone: its curvature says nothing then."""
+    f = ca.Function("slope", ca.symvar(slope), [slope])
+    return any(f.instruction_id(k) in CORNERS for k in range(f.n_instructions()))
+
+
+def _newton(r: ca.SX, v: ca.SX, start: ca.SX) -> ca.SX:
+    """`NEWTON_STEPS` steps on r(v) = 0 from `start`."""
+    slope, root = ca.jacobian(r, v), start
+    diagonal = slope.sparsity().is_diag()
+    for _ in range(NEWTON_STEPS):
+        J, residual = (ca.substitute(e, v, root) for e in (slope, r))
+        root = root - (residual / ca.diag(J) if diagonal else ca.solve(J, residual))
+    return root
+
+
+def _rising_root(known: _Values, r: ca.SX, v: ca.SX, base: ca.DM, slope: ca.SX, curvature: ca.SX) -> ca.SX:
+    """The root of a quadratic on the side of `base` on which operation takes place, free of cancellation.
+
+    With r(base + w) = C + B w + A w^2 and the sign chosen so that r rises: w = -2 C / (B + sqrt(B^2 - 4 A C)).
+    Where B is zero, w = sqrt(-C/A) with the sign of -C/A, so that a wish on the far side stays visible.
+    """
+    sign = float(np.sign(known.at(slope, 1.0)[0, 0]))
+    A, B, C = sign * curvature / 2, sign * ca.substitute(slope, v, base), sign * ca.substitute(r, v, base)
+    if ca.simplify(B).is_zero():
+        ratio = -C / A
+        return ca.sign(ratio) * ca.sqrt(ca.fabs(ratio))
+    return -2 * C / (B + ca.sqrt(ca.fmax(B**2 - 4 * A * C, 0)))

@@ -1,0 +1,91 @@
+"""Model and drives -> signals over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.errors import SolverError
+from ctrlgen.model.discretisation import next_sample
+from ctrlgen.model.model import Model
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Signals of a model at sample times, SI. `time` (n,) [s]; `signals` role -> (n, channels); `x` (n, n_x)."""
+
+    time: np.ndarray
+    signals: dict[str, np.ndarray]
+    x: np.ndarray
+    z: np.ndarray
+
+
+def trace(model: Model, time: np.ndarray, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> Trace:
+    """Every signal at given states (n, n_x), displacements and drives (n, n_axes), all SI."""
+    values = model.evaluate.map(len(time))(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(time))))
+    return Trace(time, {role: v.full().T for role, v in zip(model.signals, values, strict=True)}, x, z)
+
+
+def balance_solver(model: Model) -> ca.Function:
+    """Newton's method for the displacement: (z_guess, x, u, p) -> z with balance(x, z, u, p) = 0."""
+    scaled = ca.substitute(model.balance, model.z, model.z * model.z_scale) / model.force_scale
+    problem = {"x": model.z, "p": ca.vertcat(model.x, model.u, model.p), "g": scaled}
+    newton = ca.rootfinder(
+        f"{model.name}_balance", "newton", problem, {"abstol": 1e-14, "abstolStep": 1e-14, "max_iter": 50}
+    )
+    z, x, u, p = (ca.MX.sym(n, s.numel()) for n, s in (("z", model.z), ("x", model.x), ("u", model.u), ("p", model.p)))
+    root = newton(z / model.z_scale, ca.vertcat(x, u, p)) * model.z_scale
+    return ca.Function("balance", [z, x, u, p], [root])
+
+
+def simulate(
+    model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | None = None, z_0: np.ndarray | None = None
+) -> Trace:
+    """The model driven by `u` (n, n_axes), each row held for one `sample_time` [s]; from rest unless `x_0` is given; at the displacement
+    that balances the first drive unless `z_0` is given, which matters for actuators without memory.
+
+    Sample k of the result is the state at k sample_time, before row k of `u` acts; there are n + 1
+    samples, the last with the last drive. Raises SolverError where no displacement balances the force.
+    """
+    if model.inertial:
+        return _simulate_inertial(model, u, sample_time, x_0, z_0)
+    steps = len(u)
+    x, z, u_k = (ca.MX.sym(n, s.numel()) for n, s in (("x", model.x), ("z", model.z), ("u", model.u)))
+    p = ca.DM(model.p_nominal)
+    balance = balance_solver(model)
+    step = ca.Function("step", [model.x, model.z, model.u, model.p], [model.step(sample_time)])
+    x_next = step(x, z, u_k, p)
+    z_next = balance(z, x_next, u_k, p)
+    one = ca.Function("one", [ca.vertcat(x, z), u_k], [ca.vertcat(x_next, z_next)])
+    start_x = model.rest if x_0 is None else x_0
+    try:
+        start_z = balance(model.z_scale, start_x, u[0], p) if z_0 is None else ca.DM(z_0)
+        states = one.mapaccum(steps)(ca.vertcat(start_x, start_z), u.T).full()
+    except RuntimeError as error:
+        raise SolverError(
+            "no stage displacement balances the actuator force; check the drive and the stiffness"
+        ) from error
+    if not np.all(np.isfinite(states)):
+        raise SolverError("the simulated state is not a number; check the drive against the device's limits")
+    states = np.hstack([ca.vertcat(start_x, start_z).full(), states]).T
+    drives = np.vstack([u, u[-1:]])
+    n = model.x.numel()
+    return trace(model, sample_time * np.arange(steps + 1), states[:, :n], states[:, n:], drives)
+
+
+def _simulate_inertial(
+    model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | None, z_0: np.ndarray | None
+) -> Trace:
+    """The same for a stage with inertia, from standstill at home."""
+    n = model.x.numel()
+    start = np.concatenate([model.rest if x_0 is None else x_0, 0 * model.z_scale if z_0 is None else z_0])
+    after = next_sample(model, sample_time)
+    state = ca.vertcat(model.x, model.z)
+    one = ca.Function("one", [state, model.u, model.p], [ca.vertcat(after.x, after.z)])
+    states = one.mapaccum(len(u))(start, u.T, np.tile(model.p_nominal[:, None], (1, len(u)))).full()
+    if not np.all(np.isfinite(states)):
+        raise SolverError("the simulated motion is not a number; check the drive, and damping of the device")
+    states = np.hstack([start[:, None], states]).T
+    return trace(model, sample_time * np.arange(len(u) + 1), states[:, :n], states[:, n:], np.vstack([u, u[-1:]]))

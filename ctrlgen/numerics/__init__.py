@@ -1,0 +1,1 @@
+"""Mathematical tools that know no physics: interval arithmetic, least squares, quantisation steps, batched evaluation."""

@@ -1,0 +1,359 @@
+"""Displacement sensor, amplifier, ADC and interferometer of S2 Appendix A: simulate a recording, calibrate from one.
+
+reading [V] = displacement/sensitivity + offset rate (temperature - calibration temperature) + noise, then quantised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import exp, pi, sqrt
+
+import numpy as np
+
+from ctrlgen.core.units import parse
+
+PEAK_TO_PEAK = 6.0  # standard deviations in a peak-to-peak figure; S2 does not say for how long it was watched
+BLOCKS = 10  # stretches of a recording; sensor noise must not be correlated much longer than one
+
+
+@dataclass(frozen=True)
+class Adc:
+    """`low`, `high` [V], `bits`, `rate` [Hz]. S2 A.3.1: dSPACE DS1104, +-10 V, 16 bit, sampled at 5 kHz."""
+
+    low: float = -10.0
+    high: float = 10.0
+    bits: int = 16
+    rate: float = 5e3
+
+    @property
+    def step(self) -> float:
+        """Least significant bit [V]."""
+        return (self.high - self.low) / 2**self.bits
+
+    def read(self, volts: np.ndarray) -> np.ndarray:
+        """Rounded to the step and clipped to the range [V]."""
+        return np.clip(np.round(volts / self.step) * self.step, self.low, self.high - self.step)
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A calibrated displacement sensor with its amplifier, SI; voltages are those at the ADC.
+
+    `sensitivity` Delta d/Delta V [m/V], negative where the voltage falls, with the amplifier's `gain` in it;
+    `bandwidth` [Hz] of the analogue filter;
+    `noise`, `filtered_noise` [V] peak to peak without and with the digital low-pass of `filter_cutoff` [Hz];
+    `offset_rate` Delta V/Delta T [V/K] against `calibrated_at` [K]; `low`, `high` [V] the linear range.
+    """
+
+    name: str
+    sensitivity: float
+    gain: float
+    bandwidth: float
+    noise: float
+    filtered_noise: float
+    filter_cutoff: float
+    offset_rate: float
+    calibrated_at: float
+    low: float
+    high: float
+    adc: Adc = Adc()
+
+    @property
+    def bare_sensitivity(self) -> float:
+        """Delta d/Delta V of the sensor without its amplifier [m/V]."""
+        return self.sensitivity * self.gain
+
+    def resolution_adc(self) -> float:
+        """S2 eq. (A.2): sensitivity times the ADC's voltage range over 2^bits [m]."""
+        return abs(self.sensitivity) * self.adc.step
+
+    def resolution_noise(self, filtered: bool) -> float:
+        """S2 A.5.1.2: peak-to-peak noise times sensitivity [m]."""
+        return abs(self.sensitivity) * (self.filtered_noise if filtered else self.noise)
+
+    def offset(self, temperature: float) -> float:
+        """Thermal offset of the reading [V] at `temperature` [K]."""
+        return self.offset_rate * (temperature - self.calibrated_at)
+
+    def usable_range(self, temperature: float | None = None) -> float:
+        """S2 eq. (A.4): [high - offset] sensitivity, counted from the shifted zero [m]; all of it when not warmer.
+
+        S2 lets 22 to 22.5 degC pass as no change, which costs up to 0.8 % of the range. A colder room shifts the
+        zero below `low`; the ADC still reads it and the range is whole.
+        """
+        lost = 0.0 if temperature is None else max(0.0, self.offset(temperature))
+        return max(0.0, self.high - self.low - lost) * abs(self.sensitivity)
+
+    def noise_parts(self) -> tuple[float, float]:
+        """Standard deviations [V] of the part the digital filter keeps whole and of the broadband part.
+
+        The two printed figures fix both: u^2 = s^2 + w^2, f^2 = s^2 k_s + w^2 k_w, with k what the digital filter
+        keeps of each part's variance. Noise that is all broadband would shrink nearly tenfold from 1 kHz to 10 Hz;
+        the eddy-current sensors' shrinks threefold, so most of what is left is slow.
+        """
+        keep_slow, keep_broad = (self._kept(cutoff) for cutoff in (self._slow_cutoff, self.bandwidth))
+        u, f = self.noise / PEAK_TO_PEAK, self.filtered_noise / PEAK_TO_PEAK
+        slow = (f**2 - u**2 * keep_broad) / (keep_slow - keep_broad)
+        if not 0 <= slow <= u**2:
+            least, most = (PEAK_TO_PEAK * u * sqrt(keep) for keep in (keep_broad, keep_slow))
+            raise ValueError(
+                f"{self.name}: filtered noise {self.filtered_noise:.3g} V must lie between {least:.3g} V and {most:.3g} V, "
+                f"what a {self.filter_cutoff:g} Hz filter leaves of {self.noise:.3g} V"
+            )
+        return sqrt(slow), sqrt(u**2 - slow)
+
+    @property
+    def _slow_cutoff(self) -> float:
+        return self.filter_cutoff / 10  # well inside the filter's band; S2 gives no spectrum
+
+    def _kept(self, cutoff: float) -> float:
+        """Share of the variance of first-order noise of bandwidth `cutoff` that the digital filter lets through."""
+        impulse = np.zeros(round(20 * self.adc.rate / self._slow_cutoff))
+        impulse[0] = 1.0
+        response = _first_order(impulse, cutoff, self.adc.rate)
+        return float(np.sum(low_pass(response, self.filter_cutoff, self.adc.rate, settled=False) ** 2))
+
+    def read(
+        self,
+        displacement: np.ndarray,
+        rng: np.random.Generator,
+        temperature: float | None = None,
+        filtered: bool = False,
+    ) -> np.ndarray:
+        """What the ADC records [V] of a displacement [m] sampled at its rate, from the near end of the linear range.
+
+        Raises ValueError where displacement or offset carry the signal out of the ADC.
+        """
+        start = self.low if self.sensitivity > 0 else self.high
+        true = start + self.gain * displacement / self.bare_sensitivity
+        true = true + (0.0 if temperature is None else self.offset(temperature))
+        slow, broad = self.noise_parts()
+        margin = PEAK_TO_PEAK / 2 * sqrt(slow**2 + broad**2)
+        if true.max() + margin > self.adc.high or true.min() - margin < self.adc.low:
+            raise ValueError(
+                f"{self.name}: {true.min():.3g} to {true.max():.3g} V leaves the ADC's {self.adc.low:g} to {self.adc.high:g} V; "
+                f"move the sensor or stay within {1e6 * self.usable_range(temperature):.4g} um"
+            )
+        noise = slow * _low_pass_noise(true.size, self._slow_cutoff, self.adc.rate, rng)
+        noise += broad * _low_pass_noise(true.size, self.bandwidth, self.adc.rate, rng)
+        recorded = self.adc.read(true + noise)
+        return low_pass(recorded, self.filter_cutoff, self.adc.rate) if filtered else recorded
+
+
+@dataclass(frozen=True)
+class Interferometer:
+    """Michelson interferometer on a photodiode: mean and amplitude [V], rms `noise` [V]. S2 A.3.4: HeNe laser."""
+
+    wavelength: float = 632.8e-9
+    mean: float = 5.0
+    amplitude: float = 4.0
+    noise: float = 0.02
+    phase: float = 0.0
+
+    def read(self, displacement: np.ndarray, rng: np.random.Generator, adc: Adc) -> np.ndarray:
+        """Photodiode voltage; one bright fringe per half wavelength, because the beam travels the way twice."""
+        angle = 4 * pi * displacement / self.wavelength + self.phase
+        return adc.read(self.mean + self.amplitude * np.cos(angle) + self.noise * rng.standard_normal(angle.size))
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Sensor and photodiode sampled together [V] at `rate` [Hz] while the target moved one way."""
+
+    sensor: np.ndarray
+    photodiode: np.ndarray
+    rate: float
+
+
+@dataclass(frozen=True)
+class Fringes:
+    """Sample numbers of the photodiode's extrema in order, and how many are bright and dark."""
+
+    at: np.ndarray
+    bright: int
+    dark: int
+
+    def distance(self, wavelength: float) -> float:
+        """S2 eq. (A.1): (m + n - 1) lambda/4, from the first to the last extremum [m]."""
+        return (self.bright + self.dark - 1) * wavelength / 4
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Sensitivity of one recording [m/V], its standard uncertainty, and the rms of the fit's residual [V]."""
+
+    sensitivity: float
+    sd: float
+    residual: float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Statistics of repeated recordings as in S2 Table A.1. Sensitivities in m/V."""
+
+    slopes: tuple[Slope, ...]
+
+    @property
+    def mean(self) -> float:
+        """Mean sensitivity."""
+        return float(np.mean([s.sensitivity for s in self.slopes]))
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of one recording's sensitivity, with N - 1. S2 sums to n and divides by N - 1; n = N."""
+        return float(np.std([s.sensitivity for s in self.slopes], ddof=1))
+
+    @property
+    def sd_of_mean(self) -> float:
+        """Standard uncertainty of `mean`, sd/sqrt(N). S2 does not print it."""
+        return self.sd / sqrt(len(self.slopes))
+
+    @property
+    def max_deviation(self) -> float:
+        """S2 eq. (A.3) as a share, not percent."""
+        return max_deviation(self.mean, self.sd)
+
+
+def max_deviation(mean: float, sd: float) -> float:
+    """S2 eq. (A.3): 2 sigma/mean. Two standard deviations of single recordings: one in twenty lies beyond."""
+    return 2 * sd / mean
+
+
+def move(distance: float, speed: float, rate: float) -> np.ndarray:
+    """Displacement of the motorised stage at constant speed, sampled [m]."""
+    return np.arange(0, round(distance / speed * rate) + 1) * speed / rate
+
+
+def record(
+    sensor: Sensor,
+    interferometer: Interferometer,
+    distance: float,
+    speed: float,
+    rng: np.random.Generator,
+    temperature: float | None = None,
+) -> Recording:
+    """One calibration run: the target moves `distance` [m] at `speed` [m/s] away from the sensor."""
+    d = move(distance, speed, sensor.adc.rate)
+    phase = replace(interferometer, phase=rng.uniform(0, 2 * pi))
+    return Recording(sensor.read(d, rng, temperature), phase.read(d, rng, sensor.adc), sensor.adc.rate)
+
+
+def find_fringes(photodiode: np.ndarray) -> Fringes:
+    """Extrema of the fringe signal, each midway between two crossings of the mid level.
+
+    A crossing counts once the signal has gone on by a quarter of its amplitude, so that noise makes no fringe.
+    Raises ValueError where fewer than three extrema are found. The direction of motion cannot be told from it.
+    """
+    low, high = np.percentile(photodiode, [2, 98])
+    middle, margin = (low + high) / 2, (high - low) / 8
+    state = np.where(photodiode > middle + margin, 1, np.where(photodiode < middle - margin, -1, 0))
+    decided = np.flatnonzero(state)
+    flips = np.flatnonzero(np.diff(state[decided])) if decided.size else np.array([], dtype=int)
+    crossings = []
+    for last, first in zip(decided[flips], decided[flips + 1], strict=True):
+        between = np.arange(last, first + 1)
+        # A straight line through the steep part: noise averages, and the crossing falls between samples.
+        slope, level = np.polyfit(between - last, photodiode[between] - middle, 1)
+        crossings.append(last + np.clip(-level / slope, 0, first - last))
+    if len(crossings) < 4:
+        raise ValueError(f"{len(crossings)} half fringes are too few; move the mirror by at least two wavelengths")
+    at = (np.array(crossings[1:]) + np.array(crossings[:-1])) / 2
+    signs = state[decided[flips + 1]][:-1]
+    return Fringes(at, int(np.sum(signs > 0)), int(np.sum(signs < 0)))
+
+
+def calibrate(recording: Recording, wavelength: float) -> Slope:
+    """Sensitivity from one recording: sensor voltage at each extremum against the distance counted in fringes.
+
+    Voltage is fitted on distance, since the voltage carries the noise. The uncertainty lets residuals be correlated
+    within 1/BLOCKS of the recording (cluster-robust), because sensor noise is slow. A recording must last a hundred
+    correlation times of that noise: one of three seconds understates the uncertainty by half.
+    """
+    fringes = find_fringes(recording.photodiode)
+    d = np.arange(fringes.at.size) * wavelength / 4
+    edges = (fringes.at[1:] + fringes.at[:-1]) / 2
+    # The mean over the samples around an extremum stands for the voltage there: motion is straight between fringes.
+    sums = np.concatenate([[0.0], np.cumsum(recording.sensor)])
+    first, last = np.ceil(edges[:-1]).astype(int), np.ceil(edges[1:]).astype(int)
+    volts = (sums[last] - sums[first]) / (last - first)
+    centre = (first + last - 1) / 2
+    d = np.interp(centre, fringes.at, d)
+    x = d - d.mean()
+    slope = float(x @ volts / (x @ x))
+    residual = volts - volts.mean() - slope * x
+    parts = np.array_split(x * residual, BLOCKS)
+    spread = sqrt(sum(float(part.sum()) ** 2 for part in parts) * BLOCKS / (BLOCKS - 2)) / float(x @ x)
+    sensitivity = 1 / slope
+    return Slope(sensitivity, spread * sensitivity**2, float(np.sqrt(residual @ residual / (residual.size - 2))))
+
+
+def calibrate_all(recordings: Sequence[Recording], wavelength: float) -> Calibration:
+    """Statistics over repeated recordings; at least two."""
+    if len(recordings) < 2:
+        raise ValueError("a standard deviation needs at least two recordings")
+    return Calibration(tuple(calibrate(recording, wavelength) for recording in recordings))
+
+
+def low_pass(signal: np.ndarray, cutoff: float, rate: float, settled: bool = True) -> np.ndarray:
+    """Second-order Butterworth low-pass. S2 names the cutoff only; first order would leave more than it prints."""
+    from scipy.signal import (
+        butter,
+        lfilter,
+        lfilter_zi,
+    )  # most of a second to import, which no device file should wait for
+
+    b, a = butter(2, cutoff, fs=rate)
+    start = lfilter_zi(b, a) * (signal[0] if settled else 0.0)
+    return np.asarray(lfilter(b, a, signal, zi=start)[0])
+
+
+def _first_order(white: np.ndarray, cutoff: float, rate: float, before: float = 0.0) -> np.ndarray:
+    """White noise of unit variance coloured to first-order bandwidth `cutoff`, unit variance again."""
+    from scipy.signal import lfilter
+
+    pole = exp(-2 * pi * cutoff / rate)
+    return np.asarray(lfilter([sqrt(1 - pole**2)], [1, -pole], white, zi=[pole * before])[0])
+
+
+def _low_pass_noise(count: int, cutoff: float, rate: float, rng: np.random.Generator) -> np.ndarray:
+    """Noise of unit variance and first-order bandwidth `cutoff`, stationary from the first sample."""
+    return _first_order(rng.standard_normal(count), cutoff, rate, before=rng.standard_normal())
+
+
+def _eddy(name: str, sensitivity: str, noise: str, filtered: str, offset_rate: str) -> Sensor:
+    return Sensor(
+        name,
+        parse(sensitivity, "m/V"),
+        gain=10.0,  # A.1: 100 um is 1 V at the sensor and 10 V at the ADC; S2 sets it by potentiometer
+        bandwidth=parse("1 kHz", "Hz"),
+        noise=parse(noise, "V"),
+        filtered_noise=parse(filtered, "V"),
+        filter_cutoff=parse("10 Hz", "Hz"),
+        offset_rate=parse(offset_rate, "V/delta_degC"),
+        calibrated_at=parse("22 degC", "degC"),
+        low=0.0,
+        high=10.0,
+    )
+
+
+SENSORS = {
+    "3316": _eddy("eddy-current 3316", "10.264 um/V", "5 mV", "1.8 mV", "89 mV/delta_degC"),
+    "3317": _eddy("eddy-current 3317", "10.099 um/V", "3.5 mV", "1.0 mV", "82 mV/delta_degC"),
+    "3338": _eddy("eddy-current 3338", "10.184 um/V", "5 mV", "1.5 mV", "159 mV/delta_degC"),
+    # Its filtered noise (0.3 mV, 3.5 nm) is below its own least significant bit (0.305 mV, 3.59 nm): only the digital
+    # filter's mean over many samples, dithered by the noise, can resolve that.
+    "fibre": Sensor(
+        "fibre-optic D20, near side",
+        parse("11.770 um/V", "m/V"),
+        gain=1.0,
+        bandwidth=parse("200 kHz", "Hz"),
+        noise=parse("4 mV", "V"),
+        filtered_noise=parse("0.3 mV", "V"),
+        filter_cutoff=parse("10 Hz", "Hz"),
+        offset_rate=0.0,  # A.6.2: set right by tuning the peak to 5 V
+        calibrated_at=parse("22 degC", "degC"),
+        low=1.5,
+        high=2.5,
+    ),
+}

@@ -1,0 +1,1 @@
+"""Measurement files -> recordings in SI: read, checked, marked, never filled in."""

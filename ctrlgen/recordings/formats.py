@@ -1,0 +1,258 @@
+"""Measurement files in: one small reader a format, each giving named columns of numbers.
+
+CSV, MATLAB (.mat up to 7, and 7.3), HDF5, TDMS, MDF4 and JSON. A column of a matrix is named `matrix[k]`, a field
+of a MATLAB or JSON structure `structure.field`, a dataset of HDF5 and a channel of TDMS by its path `group/name`.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import scipy
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import read_text
+
+MISSING = {"", "nan", "na", "n/a", "null", "none", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan"}
+MOST_FAULTS = 5  # bad cells of one column that are listed; the others are counted
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one file by name: numbers (n,), or cells of text (CSV) that become numbers when asked for.
+
+    `units` holds what the file itself says, where it does; `lines` the line of each row in a text file.
+    """
+
+    path: Path
+    columns: dict[str, Any]
+    units: dict[str, str] = field(default_factory=dict)
+    lines: tuple[int, ...] = ()
+
+    def find(self, wanted: str | int) -> str:
+        """The full name of a column: by name, by number from 0, without its `[unit]`, or without its group.
+
+        Raises InputError naming the columns there are.
+        """
+        names = list(self.columns)
+        if isinstance(wanted, int):
+            if 0 <= wanted < len(names):
+                return names[wanted]
+            raise self._fault(f"has columns 0 to {len(names) - 1}, not {wanted}")
+        for shorten in (str, lambda name: name.partition("[")[0].strip(), lambda name: re.split(r"[/.]", name)[-1]):
+            found = [name for name in names if shorten(name) == wanted]
+            if len(found) == 1:
+                return found[0]
+            if found:
+                raise self._fault(f"has {len(found)} columns {wanted!r}: write one of {', '.join(found)}")
+        near = difflib.get_close_matches(wanted, names, n=1)
+        there = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
+        raise self._fault(
+            f"has no column {wanted!r}; " + (f"did you mean {near[0]!r}?" if near else f"there are: {there or 'none'}")
+        )
+
+    def numbers(self, name: str) -> np.ndarray:
+        """Column `name` as float64 (n,); NaN where a cell is empty or says so. Raises InputError for other text."""
+        column = self.columns[name]
+        if isinstance(column, np.ndarray):
+            return column
+        values, faults = np.full(len(column), np.nan), []
+        comma = not any("." in cell for cell in column) and any("," in cell for cell in column)
+        for k, cell in enumerate(column):
+            if cell.lower() in MISSING:
+                continue
+            try:
+                values[k] = float(cell.replace(",", ".") if comma else cell)
+            except ValueError:
+                faults.append(f"line {self.lines[k]} {cell!r}")
+        if faults:
+            more = f" and {len(faults) - MOST_FAULTS} more" if len(faults) > MOST_FAULTS else ""
+            listed = ", ".join(faults[:MOST_FAULTS]) + more
+            raise self._fault(
+                f"column {name!r} holds what is no number ({listed}); write numbers, leave missing ones empty"
+            )
+        return values
+
+    def _fault(self, what: str) -> InputError:
+        return InputError(self.path, [Fault(self.path.name, what)])
+
+
+def read_table(path: Path) -> Table:
+    """The columns of a measurement file. Raises InputError: no such file, unknown or damaged format, missing package."""
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        known = ", ".join(READERS)
+        raise InputError(
+            path, [Fault(path.name, f"{path.suffix or 'no ending'!r} is no format I read; known: {known}")]
+        )
+    if not path.is_file():
+        raise InputError(path, [Fault(path.name, f"does not exist in {path.parent}; check the name")])
+    try:
+        return reader(path)
+    except InputError:
+        raise
+    except Exception as error:  # the five libraries raise dozens of types for a damaged file
+        what = f"cannot be read as {path.suffix}: {type(error).__name__}: {error}; export it again"
+        raise InputError(path, [Fault(path.name, what)]) from None
+
+
+def read_csv(path: Path) -> Table:
+    """Text separated by comma, semicolon or tab; a header unless row 1 is numbers; lines with # are left out."""
+    text = read_text(path).removeprefix("\ufeff")
+    first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    separator = next((mark for mark in "\t;," if mark in first), ",")
+    reader = csv.reader(io.StringIO(text), delimiter=separator)
+    rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    rows = [(line, row) for line, row in rows if any(row) and not row[0].startswith("#")]
+    if not rows:
+        raise InputError(path, [Fault(path.name, "has no rows; write a header and one row a sample")])
+    width = len(rows[0][1])
+    ragged = [f"line {line} has {len(row)}" for line, row in rows if len(row) != width]
+    if ragged:
+        listed = ", ".join(ragged[:MOST_FAULTS]) + (", ..." if len(ragged) > MOST_FAULTS else "")
+        raise InputError(path, [Fault(path.name, f"line {rows[0][0]} has {width} cells, but {listed}; repair these")])
+    header = not all(_is_number(cell) for cell in rows[0][1])
+    names = rows[0][1] if header else [str(k) for k in range(width)]
+    twice = sorted({name for name in names if names.count(name) > 1 and name})
+    if twice:
+        raise InputError(path, [Fault(path.name, f"column {twice[0]!r} stands twice in the header; rename one")])
+    body = rows[header:]
+    cells = list(zip(*(row for _, row in body), strict=True)) or [()] * width
+    units = {name: match[1].strip() for name in names if (match := re.search(r"\[([^]]+)\]$", name))}
+    return Table(path, dict(zip(names, cells, strict=True)), units, tuple(line for line, _ in body))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return cell.lower() in MISSING
+    return True
+
+
+def read_mat(path: Path) -> Table:
+    """Variables of a .mat file, structures flattened; 7.3, which is HDF5 with rows and columns exchanged, by h5py."""
+    try:
+        content = scipy.io.loadmat(path, simplify_cells=True)
+    except NotImplementedError:
+        return _read_h5(path, ".", turned=True)
+    return Table(path, dict(_flat({k: v for k, v in content.items() if not k.startswith("__")}, "")))
+
+
+def read_hdf5(path: Path) -> Table:
+    """Datasets by their path; the attribute `unit` or `units` says the unit."""
+    return _read_h5(path, "/", turned=False)
+
+
+def _read_h5(path: Path, joint: str, turned: bool) -> Table:
+    h5py = _package("h5py", path)
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+
+    def visit(name: str, node: Any) -> None:
+        if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.dtype.kind not in "fiub":
+            return
+        value = node[()]
+        name = name.replace("/", joint)
+        for column, numbers in _flat(value.T if turned else value, name):
+            columns[column] = numbers
+            unit = node.attrs.get("unit", node.attrs.get("units"))
+            if unit is not None:
+                units[column] = unit.decode() if isinstance(unit, bytes) else str(unit)
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    return Table(path, columns, units)
+
+
+def read_tdms(path: Path) -> Table:
+    """Channels of LabVIEW's TDMS as `group/channel`; the property `unit_string` says the unit."""
+    nptdms = _package("nptdms", path)
+    columns, units = {}, {}
+    with nptdms.TdmsFile.open(path) as file:
+        for group in file.groups():
+            for channel in group.channels():
+                for name, numbers in _flat(np.asarray(channel[:]), f"{group.name}/{channel.name}"):
+                    columns[name] = numbers
+                    if channel.properties.get("unit_string"):
+                        units[name] = str(channel.properties["unit_string"])
+    return Table(path, columns, units)
+
+
+def read_mdf4(path: Path) -> Table:
+    """Channels of ASAM MDF; `time` is the master channel, and all channels must have the same one."""
+    asammdf = _package("asammdf", path)
+    columns, units, clocks = {}, {}, []
+    with asammdf.MDF(path) as file:
+        for signal in file.iter_channels(skip_master=True):
+            if signal.name in columns:
+                raise InputError(
+                    path, [Fault(path.name, f"channel {signal.name!r} stands in several groups; keep one")]
+                )
+            columns.update(_flat(np.asarray(signal.samples), signal.name))
+            units[signal.name] = signal.unit
+            clocks.append(np.array(signal.timestamps))
+    if any(not np.array_equal(clock, clocks[0]) for clock in clocks):
+        what = "holds channels sampled at different times; resample them to one raster (MDF.resample) and save"
+        raise InputError(path, [Fault(path.name, what)])
+    if clocks:
+        columns = {"time": clocks[0], **{name: column for name, column in columns.items() if name != "time"}}
+    return Table(path, columns, {name: unit for name, unit in units.items() if unit})
+
+
+def read_json(path: Path) -> Table:
+    """An object of lists, a list of row objects, or a matrix (list of rows) under a name; null is a missing number."""
+    content = json.loads(read_text(path))
+    if isinstance(content, list):
+        if content and all(isinstance(row, dict) for row in content):
+            names = list(dict.fromkeys(name for row in content for name in row))
+            content = {name: [row.get(name) for row in content] for name in names}
+        else:
+            content = {"data": content}
+    return Table(path, dict(_flat(content, "")))
+
+
+def _flat(value: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Every numeric vector in nested structures with its name; scalars, texts and ragged lists are no columns."""
+    if isinstance(value, dict):
+        for key, member in value.items():
+            yield from _flat(member, f"{name}.{key}" if name else str(key))
+        return
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return
+    if array.ndim == 2 and 1 in array.shape:
+        array = array.ravel()
+    if array.ndim == 1:
+        yield name, array
+    elif array.ndim == 2:
+        for k in range(array.shape[1]):
+            yield f"{name}[{k}]", array[:, k]
+
+
+def _package(name: str, path: Path) -> ModuleType:
+    """An optional package. Raises InputError with the command that installs it."""
+    try:
+        return import_module(name)
+    except ImportError:
+        installed = {"nptdms": "npTDMS"}.get(name, name)
+        what = f"needs the package {installed}; install it with: pip install {installed} (or pip install 'ctrlgen[recordings]')"
+        raise InputError(path, [Fault(path.name, what)]) from None
+
+
+READERS: dict[str, Callable[[Path], Table]] = {
+    ".csv": read_csv, ".mat": read_mat, ".h5": read_hdf5, ".hdf5": read_hdf5, ".tdms": read_tdms, ".mf4": read_mdf4,
+    ".json": read_json,
+}  # fmt: skip

@@ -1,0 +1,188 @@
+"""Errors between two sets of poses: norms, per channel, parasitic motion, repeats, drift. Source: S0 section 5.
+
+Poses are rows (theta_x, theta_y, theta_z, delta_x, delta_y, delta_z) [rad, m]; an error is measured minus expected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError
+
+CHANNELS = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
+BOX = (5.0, 95.0)  # percentiles: the boxes of S0 Figs. 7 and 8 hold 90 % of the data
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Statistics over poses: a number for a norm, or one number a channel; SI. `sd` divides by n - 1."""
+
+    maximum: np.ndarray
+    minimum: np.ndarray
+    mean: np.ndarray
+    sd: np.ndarray
+
+
+@dataclass(frozen=True)
+class PoseErrors:
+    """`errors` (n, 6), and the statistics of S0 section 5.2.
+
+    `rotation` and `translation` are norms over the three axes, (n,): S0 Fig. 6. `signed` is of the errors themselves,
+    `absolute` of their absolute values, whose standard deviation is the one S0 Table 3 prints.
+    """
+
+    errors: np.ndarray
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """|theta error| of every pose [rad], (n,)."""
+        return np.linalg.norm(self.errors[:, :3], axis=1)
+
+    @property
+    def translation(self) -> np.ndarray:
+        """|delta error| of every pose [m], (n,)."""
+        return np.linalg.norm(self.errors[:, 3:], axis=1)
+
+    @property
+    def signed(self) -> Summary:
+        """Of the errors, channel by channel."""
+        return summarise(self.errors)
+
+    @property
+    def absolute(self) -> Summary:
+        """Of the absolute errors, channel by channel."""
+        return summarise(np.abs(self.errors))
+
+
+@dataclass(frozen=True)
+class Parasitic:
+    """The poses commanded in one channel alone, in order of command: S0 Figs. 9 and 10.
+
+    `command` (n,) and `measured` (n,) of the channel itself, `own` its error, `others` (n, 5) the errors of the five
+    other `channels`, which are not commanded to move.
+    """
+
+    channel: str
+    poses: np.ndarray
+    command: np.ndarray
+    measured: np.ndarray
+    own: np.ndarray
+    others: np.ndarray
+    channels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Scatter of poses commanded more than once: `groups` of pose numbers from 0, `sd` (6,) within them, pooled.
+
+    `sd` is None where no command was repeated: the recording then says nothing about repeatability.
+    """
+
+    groups: tuple[tuple[int, ...], ...]
+    sd: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Errors fitted by level + slope * (order - mean order): `slope` (6,) per pose, `level` (6,), and their `sd`s."""
+
+    slope: np.ndarray
+    slope_sd: np.ndarray
+    level: np.ndarray
+    level_sd: np.ndarray
+
+
+@dataclass(frozen=True)
+class Opposites:
+    """Poses commanded at +T and at -T: `pairs` of pose numbers from 0, `even` (pairs, 6) half the sum of the two.
+
+    The even part is what no Jacobian can give: offset of home, even nonlinearity, drift between the two.
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+    even: np.ndarray
+
+
+def summarise(values: np.ndarray) -> Summary:
+    """Statistics over the rows (poses) of `values`."""
+    return Summary(values.max(0), values.min(0), values.mean(0), values.std(0, ddof=1))
+
+
+def pose_errors(measured: np.ndarray, expected: np.ndarray) -> PoseErrors:
+    """Measured minus expected. Source: S0 section 5.1, steps 5 and 6. Raises InputError where the sets do not fit."""
+    measured, expected = _two(measured, expected)
+    return PoseErrors(measured - expected)
+
+
+def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
+    """The poses that command one channel alone, per channel; channels never commanded alone are left out."""
+    measured, commanded = _two(measured, commanded)
+    errors = measured - commanded
+    alone = np.count_nonzero(commanded, axis=1) == 1
+    found = []
+    for i, channel in enumerate(CHANNELS):
+        poses = np.flatnonzero(alone & (commanded[:, i] != 0))
+        if not poses.size:
+            continue
+        poses = poses[np.argsort(commanded[poses, i], kind="stable")]
+        rest = [k for k in range(6) if k != i]
+        found.append(
+            Parasitic(
+                channel, poses, commanded[poses, i], measured[poses, i], errors[poses, i],
+                errors[np.ix_(poses, rest)], tuple(CHANNELS[k] for k in rest),
+            )
+        )  # fmt: skip
+    return found
+
+
+def repeatability(commanded: np.ndarray, measured: np.ndarray) -> Repeatability:
+    """Scatter within groups of equal commands, home included where it was recorded more than once."""
+    measured, commanded = _two(measured, commanded)
+    _, member = np.unique(commanded, axis=0, return_inverse=True)
+    member = member.ravel()
+    groups = [np.flatnonzero(member == g) for g in dict.fromkeys(member)]
+    groups = [group for group in groups if len(group) > 1]
+    if not groups:
+        return Repeatability((), None)
+    squares = sum(((measured[group] - measured[group].mean(0)) ** 2).sum(0) for group in groups)
+    freedom = sum(len(group) - 1 for group in groups)
+    return Repeatability(tuple(tuple(map(int, group)) for group in groups), np.sqrt(squares / freedom))
+
+
+def drift(errors: np.ndarray) -> Drift:
+    """Least-squares line through the errors in order of measurement; `errors` (n, 6), n >= 3.
+
+    Errors that depend on the command (a wrong Jacobian) pass for drift where the order of the commands does: fit
+    the residuals of a calibration. Standard deviations hold for errors independent from pose to pose.
+    """
+    n = len(errors)
+    if n < 3:
+        raise InputError("drift", [Fault("errors", f"{n} poses cannot tell a slope from noise; give at least 3")])
+    order = np.arange(n) - (n - 1) / 2
+    level, slope = errors.mean(0), order @ errors / (order @ order)
+    residual = errors - level - np.outer(order, slope)
+    noise = np.sqrt((residual**2).sum(0) / (n - 2))
+    return Drift(slope, noise / np.sqrt(order @ order), level, noise / np.sqrt(n))
+
+
+def opposites(commanded: np.ndarray, measured: np.ndarray) -> Opposites:
+    """Every two poses whose commands are each other's negative, home excepted."""
+    measured, commanded = _two(measured, commanded)
+    where = {tuple(row): k for k, row in enumerate(commanded + 0.0)}
+    pairs = []
+    for k, row in enumerate(commanded):
+        other = where.get(tuple(0.0 - row))
+        if row.any() and other is not None and other > k:
+            pairs.append((k, other))
+    even = np.array([(measured[a] + measured[b]) / 2 for a, b in pairs]).reshape(-1, 6)
+    return Opposites(tuple(pairs), even)
+
+
+def _two(measured: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    measured, expected = np.asarray(measured, dtype=float), np.asarray(expected, dtype=float)
+    if measured.ndim != 2 or measured.shape != expected.shape or measured.shape[1] != 6 or not len(measured):
+        what = f"shapes {measured.shape} and {expected.shape}; two sets of (n, 6) poses in the same order are needed"
+        raise InputError("poses", [Fault("measured, expected", what)])
+    return measured, expected

@@ -1,0 +1,244 @@
+"""recording.toml as written, and what is wrong with it before any data are read."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ctrlgen.core.errors import Fault
+from ctrlgen.core.units import parse, quantity, same_dimension
+from ctrlgen.devices.base import Section
+from ctrlgen.model.model import Model
+
+FILE = "recording.toml"
+ENDLESS = 1 << 62
+
+
+class Column(Section):
+    """A column of a measurement file: its name or number from 0, its unit, the stated standard deviation of its noise.
+
+    `file` where it stands in another file than the record's, row by row the same samples. Its numbers times `scale`
+    are in `unit`: newtons per volt of an amplifier that was read in volt, -1 for a wire the other way round. They belong
+    `later` than their row's time: a command of which the effect comes a cycle after it was recorded.
+    """
+
+    column: str | Annotated[int, Field(strict=True, ge=0)]
+    unit: str
+    noise: str | None = None
+    file: str | None = None
+    scale: float = 1.0
+    later: quantity("s") | None = None
+
+
+class Derivative(Section):
+    """A signal that was not recorded: the `order`-th derivative in time of another one, by central differences."""
+
+    of: str
+    order: Literal[1, 2]
+
+
+class Conditions(Section):
+    """What surrounds the device: the ambient temperature, constant or recorded."""
+
+    ambient: str | Column | None = None
+
+
+class RecordTable(Section):
+    """One [[record]] as written.
+
+    `lead_in` of its `rows`, the first, only bring the device's memories up to date and are not judged; after `period`
+    the run repeats itself, as far as its noise lets it.
+    """
+
+    file: str
+    role: Literal["fit", "hold_out", "rest"]
+    time: Column | None = None
+    sample_rate: quantity("Hz", positive=True) | None = None
+    dwell: quantity("s", positive=True) | None = None
+    start: quantity("s") | None = None
+    between_samples: Literal["held", "linear"] = "held"
+    rows: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
+    lead_in: Annotated[int, Field(ge=0)] = 0
+    period: quantity("s", positive=True) | None = None
+    conditions: Conditions = Conditions()
+    columns: dict[str, Column] = {}
+
+    @property
+    def judged(self) -> tuple[int, int]:
+        """The rows that count, half open; without an end where the file has it."""
+        a, b = self.rows or (0, ENDLESS)
+        return a + self.lead_in, b
+
+
+class RecordingFile(Section):
+    """recording.toml as written; `columns` are every record's, which may override single ones.
+
+    Of a series, `low_pass` is a cut-off that all columns and `derivatives` get alike, without phase, and `keep_every`
+    the rows that are kept after it.
+    """
+
+    title: str
+    device: str
+    source: str = ""
+    kind: Literal["series", "poses"]
+    low_pass: quantity("Hz", positive=True) | None = None
+    keep_every: Annotated[int, Field(ge=1)] = 1
+    columns: dict[str, Column] = {}
+    derivatives: dict[str, Derivative] = {}
+    record: Annotated[tuple[RecordTable, ...], Field(min_length=1)]
+
+    def columns_of(self, record: RecordTable) -> dict[str, Column]:
+        """The columns of one record by signal: its own, and the file's where it has none of its own."""
+        return {**self.columns, **record.columns}
+
+
+def deviation(text: str, unit: str) -> float:
+    """A standard deviation in SI: of a temperature, the difference. Raises ValueError."""
+    temperature = same_dimension(unit, "K")
+    value = parse(text.replace(" degC", " delta_degC") if temperature else text, "delta_degC" if temperature else unit)
+    if value < 0:
+        raise ValueError(f"{text!r} is negative")
+    return value
+
+
+def check(written: RecordingFile, model: Model) -> list[Fault]:
+    """Every fault of the file against the model: device, timing, signals, units, rows."""
+    return _Check(written, model).faults
+
+
+def fits(name: str, column: Column, model: Model) -> bool:
+    """Whether a column's name is a signal of the model and its unit of that signal's dimension."""
+    try:
+        return name in signal_units(model) and same_dimension(column.unit, signal_units(model)[name])
+    except ValueError:
+        return False
+
+
+def signal_units(model: Model) -> dict[str, str]:
+    """Every channel of the model as a recording names it, with the reader's unit: 'drive.1X': 'W'."""
+    return {
+        f"{role}.{channel}": unit
+        for role, signal in model.signals.items()
+        for channel, unit in zip(signal.channels, signal.units, strict=True)
+    }
+
+
+class _Check:
+    """Collects the faults of one file."""
+
+    def __init__(self, written: RecordingFile, model: Model) -> None:
+        self.written, self.model = written, model
+        self.faults: list[Fault] = []
+        if written.device != model.device.name:
+            what = f"{written.device!r} is not {model.device.name!r}, the device given; give the one it was made on"
+            self._fault("device", what)
+        for k, record in enumerate(written.record):
+            self._check_time(f"record[{k}]", record)
+            self._check_channels(f"record[{k}]", written.columns_of(record))
+            self._check_rows(k, record)
+        self._check_filter()
+
+    def _fault(self, where: str, what: str) -> None:
+        fault = Fault(where, what)
+        if fault not in self.faults:
+            self.faults.append(fault)
+
+    def _check_time(self, where: str, record: RecordTable) -> None:
+        """How the record is timed must fit the kind of recording."""
+        if self.written.kind == "series":
+            if (record.time is None) == (record.sample_rate is None):
+                what = 'give either time = { column = "...", unit = "s" } or sample_rate = "1 kHz"'
+                self._fault(f"{where}.time", what)
+            if record.dwell is not None:
+                self._fault(f"{where}.dwell", 'belongs to poses; leave it out, or write kind = "poses"')
+        elif record.time is not None or record.sample_rate is not None:
+            self._fault(
+                f"{where}.time", 'poses have no clock; leave it out and give dwell = "2 s" if they did not settle'
+            )
+        if record.time is not None:
+            self._check_unit(f"{where}.time", record.time, "s")
+        ambient = record.conditions.ambient
+        if isinstance(ambient, Column):
+            self._check_unit(f"{where}.conditions.ambient", ambient, "K")
+        elif ambient is not None:
+            try:
+                parse(ambient, "degC")
+            except ValueError as error:
+                self._fault(f"{where}.conditions.ambient", str(error))
+
+    def _check_channels(self, where: str, columns: dict[str, Column]) -> None:
+        """Every drive there, something observed, each name a signal of the model, each unit of its dimension."""
+        units = signal_units(self.model)
+        for name, column in columns.items():
+            own = "columns" if column is self.written.columns.get(name) else f"{where}.columns"
+            if name not in units:
+                near = difflib.get_close_matches(name, units, n=1)
+                hint = f"did you mean {near[0]!r}?" if near else f"its signals are {', '.join(self.model.signals)}"
+                self._fault(f"{own}.{name!r}", f"is no signal of {self.model.device.name}; {hint}")
+            else:
+                self._check_unit(f"{own}.{name!r}", column, units[name])
+        for name, unit in units.items():
+            if name.startswith("drive.") and name not in columns and name not in self.written.derivatives:
+                what = f'is missing, and the device cannot be simulated without; add "{name}" = {{ column = "...", unit = "{unit}" }}'
+                self._fault(f"{where}.columns", f"{name} {what}")
+        if all(name.startswith("drive.") for name in columns):
+            known = next((name for name in units if name.startswith("reading.")), "reading")
+            self._fault(f"{where}.columns", f'nothing is observed; add "{known}" = {{ column = "...", unit = "..." }}')
+
+    def _check_unit(self, where: str, column: Column, unit: str) -> None:
+        try:
+            if not same_dimension(column.unit, unit):
+                self._fault(
+                    where, f"unit = {column.unit!r} is the wrong dimension; {unit} or a multiple of it is needed"
+                )
+                return
+        except ValueError as error:
+            self._fault(where, f"{error}; write for example {unit!r}")
+            return
+        try:
+            if column.noise is not None:
+                deviation(column.noise, column.unit)
+        except ValueError as error:
+            self._fault(where, f"noise: {error}")
+
+    def _observed(self, record: RecordTable) -> set[str]:
+        return {name for name in self.written.columns_of(record) if not name.startswith("drive.")}
+
+    def _check_rows(self, k: int, record: RecordTable) -> None:
+        """Rows are a stretch, and none is both fitted and held out."""
+        if record.rows and record.judged[0] >= record.judged[1]:
+            what = f"{list(record.rows)} is empty" + (f" after a lead-in of {record.lead_in}" if record.lead_in else "")
+            self._fault(f"record[{k}].rows", f"{what}; write [first, one past the last]")
+        for i, other in enumerate(self.written.record[:k]):
+            a, b = record.judged, other.judged
+            if (
+                record.file == other.file
+                and max(a[0], b[0]) < min(a[1], b[1])
+                and "rest" not in (record.role, other.role)
+                and self._observed(record) & self._observed(other)
+            ):
+                what = f"share rows of {record.file} with record[{i}]; no sample may be fitted twice, or fitted and held out"
+                self._fault(f"record[{k}].rows", what)
+
+    def _check_filter(self) -> None:
+        """Derivatives are of recorded columns, in time, and need a clock; so does a cut-off."""
+        w, units = self.written, signal_units(self.model)
+        timed = {"derivatives": w.derivatives, "low_pass": w.low_pass, "keep_every": w.keep_every > 1}
+        if w.kind == "poses":
+            for key in (key for key, given in timed.items() if given):
+                self._fault(key, 'belongs to a series; leave it out, or write kind = "series"')
+        for name, derivative in w.derivatives.items():
+            where = f"derivatives.{name!r}"
+            if name not in units or not all(derivative.of in w.columns_of(r) for r in w.record):
+                what = f"a signal of {self.model.device.name}, `of` a column of every record, is needed"
+                self._fault(where, f"{what}; got {name} of {derivative.of}")
+            elif derivative.of in units and not same_dimension(
+                f"({units[derivative.of]})/s^{derivative.order}", units[name]
+            ):
+                self._fault(
+                    where, f"derivative {derivative.order} of {derivative.of} is not of the dimension of {name}"
+                )
+            if any(name in w.columns_of(r) for r in w.record):
+                self._fault(where, "is a column as well; give one of the two")

@@ -1,0 +1,147 @@
+"""Solution and comparison -> summary.json, trajectory.csv, figures and one self-contained report.html."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ctrlgen._version import __version__
+from ctrlgen.core.files import write_text
+from ctrlgen.core.units import from_si
+from ctrlgen.firmware.folder import CFolder
+from ctrlgen.reporting.html import render
+from ctrlgen.trajectory.metrics import Expected, in_unit
+from ctrlgen.trajectory.solution import Margin, Solution
+from ctrlgen.verification.comparison import Comparison
+
+CSV_SIGNALS = ("pose", "displacement", "force", "state", "power")
+
+
+def write_trajectory(solution: Solution, path: Path) -> None:
+    """trajectory.csv: time, pose, displacement, force, temperature, power, each column with its unit.
+
+    Row k holds the state at time k and the power that acts from there to the next row. A device driven
+    in volts has its voltage columns last.
+    """
+    signals = solution.model.signals
+    roles = [role for role in CSV_SIGNALS if role in signals]
+    if signals["drive"].columns not in [signals[role].columns for role in roles]:
+        roles.append("drive")
+    static = solution.scenario.sample_time is None
+    header = ["sample" if static else "time [s]"]
+    columns = [(np.arange(len(solution.command)) if static else solution.trace.time)[:, None]]
+    for role in roles:
+        signal = solution.model.signals[role]
+        header += signal.columns
+        values = solution.trace.signals[role]
+        columns.append(np.column_stack([from_si(values[:, i], unit) for i, unit in enumerate(signal.units)]))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    for row in np.hstack(columns):
+        writer.writerow([f"{value:.12g}" for value in row])
+    write_text(path, text.getvalue())
+
+
+def summary(
+    solution: Solution, comparison: Comparison | None, expected: tuple[Expected, ...], c: CFolder | None
+) -> dict[str, Any]:
+    """What summary.json holds: plain numbers in the stated units; nothing that changes from run to run."""
+    scenario = solution.scenario
+    error = solution.trace.signals[scenario.file.follow] - solution.command
+    signal = solution.model.signals[scenario.file.follow]
+    return {
+        "scenario": scenario.name,
+        "title": scenario.file.title,
+        "device": solution.model.name,
+        "ctrlgen": __version__,
+        "sha256": scenario.digest,
+        "passed": passed(comparison, expected),
+        "samples": len(solution.command),
+        "sample_rate_Hz": 1 / scenario.sample_time if scenario.sample_time else None,
+        "closed": scenario.closed,
+        "ipopt_iterations": solution.iterations,
+        "limits_added": list(solution.rows_added),
+        "tracking_error": {
+            f"{channel} [{unit}]": float(from_si(np.abs(error[:, i]).max(), unit))
+            for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
+        },
+        "margins": [_margin(m, solution) for m in solution.margins],
+        "tightest": solution.tightest.limit.name,
+        "expected": [
+            {
+                "value": e.value, "unit": e.unit, "measured": in_unit(e.measured, e.unit), "low": in_unit(e.low, e.unit),
+                "high": in_unit(e.high, e.unit), "passed": e.passed, "source": e.source,
+            }
+            for e in expected
+        ],
+        "c": None if c is None else {
+            "operations_per_sample": c.operations, "operations_worst": c.worst_operations,
+            "player": {real.value: [vars(candidate) for candidate in held.candidates] for real, held in c.compression.items()},
+        },
+        "compilers": comparison.compilers if comparison else {},
+        "compilers_not_run": list(comparison.missing) if comparison else [],
+        "comparison": [{**vars(row), "passed": row.passed} for row in comparison.rows] if comparison else [],
+    }  # fmt: skip
+
+
+def passed(comparison: Comparison | None, expected: tuple[Expected, ...]) -> bool:
+    """Whether everything that was checked is in tolerance."""
+    return (comparison is None or comparison.passed) and all(e.passed for e in expected)
+
+
+def _margin(m: Margin, solution: Solution) -> dict[str, Any]:
+    unit = m.limit.unit
+    distance = m.distance if unit == "degC" else float(from_si(m.distance, unit))
+    return {
+        "limit": m.limit.name, "label": m.limit.label, "unit": unit, "channel": m.channel, "sample": m.sample,
+        "time_s": float(solution.trace.time[m.sample]) if solution.scenario.sample_time else None, 
+        "value": float(from_si(m.value, unit)), "bound": float(from_si(m.bound, unit)),
+        "margin": distance, "margin_unit": "K" if unit == "degC" else unit, "share_left": m.share,
+    }  # fmt: skip
+
+
+def worst_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """One row per comparison and signal: its worst build, for tables short enough to read."""
+    groups: dict[tuple[str, str, str, str], list[Any]] = defaultdict(list)
+    for row in comparison.rows:
+        groups[(row.build.split()[1], row.what, row.signal, row.unit)].append(row)
+    table = []
+    for (real, what, signal, unit), rows in groups.items():
+        worst = max(rows, key=lambda r: (not r.passed, r.worst))
+        table.append({
+            "real": real, "what": what, "signal": signal, "unit": unit, "worst": worst.worst, "rms": worst.rms, "limit": worst.limit,
+            "passed": worst.passed, "first": worst.first, "build": worst.build, "samples": worst.samples,
+        })  # fmt: skip
+    return table
+
+
+def write_report(
+    out: Path,
+    solution: Solution,
+    comparison: Comparison | None,
+    expected: tuple[Expected, ...],
+    c: CFolder | None,
+    figures: dict[str, str],
+) -> None:
+    """Everything a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html.
+
+    `figures`: name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives.
+    """
+    result = summary(solution, comparison, expected, c)
+    write_text(out / "summary.json", json.dumps(result, indent=1) + "\n")
+    write_trajectory(solution, out / "trajectory.csv")
+    for name, text in figures.items():
+        write_text(out / "figures" / f"{name}.svg", text)
+    page = render(
+        "report.html.j2", s=result, figures=figures, rows=worst_rows(comparison) if comparison else [], source=solution.model.device.source,
+        device_title=solution.model.device.title,
+        sourced=[(path, q.text, q.source or "") for path, q in solution.model.device.quantities()],
+    )  # fmt: skip
+    write_text(out / "report.html", page)

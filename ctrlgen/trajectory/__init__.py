@@ -1,0 +1,1 @@
+"""What should be followed, whether it can be, and the drives that follow it."""

@@ -1,0 +1,178 @@
+"""Scenario -> drives: one nonlinear programme over the whole trajectory, solved by IPOPT.
+
+    minimise    1/2 sum_k |s_k|^2
+    subject to  followed(x_k, z_k, u_k-1) = command_k + s_k      pose (or displacement), s_k the shortfall
+                g(x_k, z_k, u_k-1) = 0                           force balance of the stage
+                x_k+1 = step(x_k, z_k, u_k)                      actuator dynamics (static: rates = 0)
+                every limit of the device
+
+in variables divided by their typical size; derivatives are exact and sparse. Closed paths are
+periodic; open ones start in equilibrium at their first sample. With s = 0 the
+trajectory is followed; otherwise the solution is the nearest one and `solve` says so.
+Reference: A. Waechter, L. T. Biegler, Math. Program. 106 (2006) 25 (IPOPT).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.model.model import Limit, Model
+from ctrlgen.model.simulation import Trace, trace
+from ctrlgen.trajectory.scenario import Scenario
+
+WEIGHT = 1e8  # of the shortfall against the barrier, which otherwise pushes it off an active bound by sqrt(mu)
+
+
+@dataclass(frozen=True)
+class Result:
+    """IPOPT's answer in SI, one row a sample; `shortfall` in typical sizes of the followed signal."""
+
+    x: np.ndarray
+    z: np.ndarray
+    u: np.ndarray
+    shortfall: np.ndarray
+    trace: Trace
+    iterations: int
+
+
+class Programme:
+    """The nonlinear programme of one scenario; `run` solves it with a choice of composite limits."""
+
+    def __init__(self, model: Model, scenario: Scenario, command: np.ndarray) -> None:
+        self.model, self.scenario = model, scenario
+        self.signal = model.signals[scenario.file.follow]
+        if model.clocks and scenario.closed:
+            what = "a closed path is not repeated by a device that changes with time; make the path open, or drop the effect"
+            raise InputError(scenario.name, [Fault("path", what)])
+        self.wanted = len(command)  # an open path is held for one more sample, so that its last drive is determined
+        held = scenario.sample_time is not None and not scenario.closed
+        self.command = np.vstack([command, command[-1:]]) if held else command
+        self.n = len(self.command)
+        self.sizes = (model.x.numel(), model.z.numel(), model.u.numel(), self.signal.expr.numel())
+
+    def _rows(self, limits: Sequence[Limit]) -> tuple[ca.Function, np.ndarray, np.ndarray]:
+        """One sample's constraints (x, z, u_before, u, s, x_next, command) and their bounds."""
+        m, h = self.model, self.scenario.sample_time
+        x, z, v, u, s, x_1 = (
+            ca.SX.sym(name, size)
+            for name, size in zip(
+                "xzvusX", [*self.sizes[:2], self.sizes[2], *self.sizes[2:], self.sizes[0]], strict=True
+            )
+        )
+        wanted = ca.SX.sym("c", self.sizes[3])
+        physical = (x * m.x_scale + m.rest, z * m.z_scale)
+
+        def at(expression: ca.SX, drive: ca.SX) -> ca.SX:
+            values = ca.vertcat(*physical, drive * m.u_scale, ca.DM(m.p_nominal))
+            return ca.substitute(expression, ca.vertcat(m.x, m.z, m.u, m.p), values)
+
+        motion = at(m.settling, u) / m.x_scale if h is None else x_1 - (at(m.step(h), u) - m.rest) / m.x_scale
+        equal = [at(self.signal.expr, v) / self.signal.scale - wanted - s, at(m.balance, v) / m.force_scale, motion]
+        low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
+        for limit in limits:
+            unit = limit.upper or m.force_scale
+            rows.append(at(limit.expr, v) / unit)
+            low.append(np.full(limit.expr.numel(), -np.inf if limit.lower is None else limit.lower / unit))
+            high.append(np.full(limit.expr.numel(), np.inf if limit.upper is None else limit.upper / unit))
+        function = ca.Function("sample", [x, z, v, u, s, x_1, wanted], [ca.vertcat(*rows)], {"cse": True})
+        return function, np.concatenate(low), np.concatenate(high)
+
+    @property
+    def _settled(self) -> ca.Function:
+        """(x, z, u, p) -> what is zero where a path starts: settled, memories by samples after one from zero, clocks at zero."""
+        m = self.model
+        rows, stepped = m.settling[:], list(m.stepped)
+        for i, value in m.stepped.items():
+            rows[i] = m.x[i] - ca.substitute(value, m.x[stepped], ca.SX.zeros(len(stepped)))
+        return ca.Function("settled", [m.x, m.z, m.u, m.p], [rows])
+
+    def run(self, limits: Sequence[Limit]) -> Result:
+        """IPOPT's solution with the rows of `limits` added. Raises SolverError, KeyboardInterrupt."""
+        m, n, static, closed = self.model, self.n, self.scenario.sample_time is None, self.scenario.closed
+        rows, row_low, row_high = self._rows(limits)
+        variables = ca.MX.sym("w", sum(self.sizes), n)
+        X, Z, U, S = ca.vertsplit(variables, list(np.cumsum([0, *self.sizes])))
+        extra, extra_low, extra_high, extra_rows = [], [], [], []
+        if static:
+            U_before, X_next = U, X
+        elif closed:
+            U_before, X_next = ca.horzcat(U[:, -1], U[:, :-1]), ca.horzcat(X[:, 1:], X[:, 0])
+        else:  # settled before the first sample by u_start; nothing follows the last
+            u_start, x_end = ca.MX.sym("u0", self.sizes[2]), ca.MX.sym("x1", self.sizes[0])
+            U_before, X_next = ca.horzcat(u_start, U[:, :-1]), ca.horzcat(X[:, 1:], x_end)
+            extra = [u_start, x_end]
+            settled = self._settled(
+                X[:, 0] * m.x_scale + m.rest, Z[:, 0] * m.z_scale, u_start * m.u_scale, ca.DM(m.p_nominal)
+            )
+            extra_rows = [settled / m.x_scale, x_end[: m.n_states] - X[: m.n_states, -1]]
+            (xl, xh), (ul, uh) = self._bounds("x"), self._bounds("u")
+            extra_low, extra_high = [ul, xl], [uh, xh]
+        command = self.command / self.signal.scale
+        G = rows.map(n)(X, Z, U_before, U, S, X_next, command.T)
+        w, g = ca.vertcat(ca.vec(variables), *extra), ca.vertcat(ca.vec(G), *extra_rows)
+        low, high = zip(*(self._bounds(s) for s in "xzus"), strict=True)
+        guess = np.concatenate(
+            [np.ones(self.sizes[0]), np.ones(self.sizes[1]), np.full(self.sizes[2], 0.2), np.zeros(self.sizes[3])]
+        )
+        start = [np.tile(guess, n)] + [np.full(e.numel(), 0.2) for e in extra]
+        zeros = np.zeros(sum(e.numel() for e in extra_rows))
+        options = {
+            "print_time": False,
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "tol": 1e-10,
+                "mu_strategy": "adaptive",
+                "max_iter": 120,
+                "nlp_scaling_method": "none",
+            },
+        }
+        solver = ca.nlpsol("trajectory", "ipopt", {"x": w, "f": 0.5 * WEIGHT * ca.sumsqr(S), "g": g}, options)
+        answer = solver(
+            x0=np.concatenate(start),
+            lbx=np.concatenate([np.tile(np.concatenate(low), n), *extra_low]),
+            ubx=np.concatenate([np.tile(np.concatenate(high), n), *extra_high]),
+            lbg=np.concatenate([np.tile(row_low, n), zeros]),
+            ubg=np.concatenate([np.tile(row_high, n), zeros]),
+        )
+        stats = solver.stats()
+        if stats["return_status"] in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
+            raise KeyboardInterrupt  # CasADi raises nothing else of its own inside IPOPT than a signal's
+        if not stats["success"]:
+            raise SolverError(
+                f"IPOPT stopped with {stats['return_status']} after {stats['iter_count']} iterations; "
+                "the physics may have no solution near the command: check the device's limits and the sample rate"
+            )
+        values = answer["x"].full().ravel()
+        table = values[: n * sum(self.sizes)].reshape(n, -1)
+        x, z, u, s = np.split(table, np.cumsum(self.sizes[:3]), axis=1)
+        x, z, u = x * m.x_scale + m.rest, z * m.z_scale, u * m.u_scale
+        before = (
+            u
+            if static
+            else np.vstack(
+                [u[-1:] if closed else values[None, table.size : table.size + self.sizes[2]] * m.u_scale, u[:-1]]
+            )
+        )
+        keep = slice(0, self.wanted)
+        x, z, u, s, before = x[keep], z[keep], u[keep], s[keep], before[keep]
+        result = trace(m, np.arange(len(x)) * (self.scenario.sample_time or 0.0), x, z, u)
+        if not static:
+            reached = trace(m, result.time, x, z, before)
+            result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
+        return Result(x, z, u, s, result, stats["iter_count"])
+
+    def _bounds(self, symbol: str) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled bounds of x, z, u or the shortfall s of one sample."""
+        m = self.model
+        if symbol == "s":
+            return np.full(self.sizes[3], -np.inf), np.full(self.sizes[3], np.inf)
+        (low, high), scale, origin = {
+            "x": (m.x_bounds, m.x_scale, m.rest), "z": (m.z_bounds, m.z_scale, 0.0), "u": (m.u_bounds, m.u_scale, 0.0),
+        }[symbol]  # fmt: skip
+        return (low - origin) / scale, (high - origin) / scale

@@ -1,0 +1,162 @@
+"""A scenario: a device, what it should follow, how fast, and what must come out."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import read_text, read_toml, validate
+from ctrlgen.core.units import quantity
+from ctrlgen.devices import Device, load_device
+from ctrlgen.devices.base import Section
+from ctrlgen.model.model import Model
+from ctrlgen.trajectory.paths import Frame, PathKind, Poses
+
+FILE = "scenario.toml"
+
+
+class Expectation(Section):
+    """One value that must come out: `value` names it (see `ctrlgen.trajectory.metrics.measure`), `range` in its unit."""
+
+    value: str
+    range: tuple[str, str]
+    source: str = ""
+
+
+class ScenarioFile(Section):
+    """scenario.toml as written."""
+
+    title: str
+    device: str
+    follow: Literal["pose", "displacement"] = "pose"
+    sample_rate: quantity("Hz", positive=True) | None = None
+    duration: quantity("s", positive=True) | None = None
+    points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
+    path: PathKind
+    outcome: Literal["solved", "unreachable"] = "solved"
+    expect: tuple[Expectation, ...] = ()
+
+    @model_validator(mode="after")
+    def _timing(self) -> ScenarioFile:
+        if self.sample_rate is None:
+            if self.duration is not None:
+                raise ValueError(
+                    "duration without sample_rate; add sample_rate, or leave both out for a static scenario"
+                )
+            if self.points is None and not isinstance(self.path, Poses):
+                raise ValueError(
+                    'a static scenario needs points = N; for motion in time give sample_rate = "1 kHz" and duration'
+                )
+        elif isinstance(self.path, Poses):
+            if self.duration is not None or self.points is not None:
+                raise ValueError("a list of poses fixes the number of samples; leave out duration and points")
+        elif self.duration is None or self.points is not None:
+            raise ValueError('with sample_rate give duration = "1 s" (and no points)')
+        return self
+
+
+@dataclass(frozen=True)
+class Input:
+    """One text that a scenario was made from: `path` where it was read, absolute or beside the scenario."""
+
+    path: Path
+    text: str
+
+    @property
+    def sha256(self) -> str:
+        """Of the text as UTF-8."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario ready to solve. `file` is what was written; `name` the folder's name as a C identifier.
+
+    `inputs`: the "scenario" itself, its "device" and, where a path is read from a file, its "poses".
+    """
+
+    name: str
+    path: Path
+    file: ScenarioFile
+    device: Device
+    inputs: dict[str, Input]
+
+    @property
+    def digest(self) -> dict[str, str]:
+        """The sha256 of each input."""
+        return {name: read.sha256 for name, read in self.inputs.items()}
+
+    @property
+    def sample_time(self) -> float | None:
+        """Seconds between samples; None for a static scenario, whose samples are separate equilibria."""
+        return None if self.file.sample_rate is None else 1 / self.file.sample_rate.si
+
+    @property
+    def closed(self) -> bool:
+        """Whether the first sample follows the last one."""
+        return self.sample_time is not None and type(self.file.path).closed
+
+    def command(self, model: Model) -> np.ndarray:
+        """The commanded samples (n, channels) of the followed signal, SI. Raises InputError."""
+        signal = model.signals[self.file.follow]
+        frame = Frame(signal.channels, signal.units)
+        path = self.file.path
+        if isinstance(path, Poses):
+            path = path.model_copy(update={"folder": self.path.parent})
+        n = self.file.points or 0
+        if self.file.sample_rate and self.file.duration:
+            n = round(self.file.sample_rate.si * self.file.duration.si)
+            if not 2 <= n <= 1_000_000:
+                raise InputError(self.path, [Fault("duration", f"gives {n} samples; 2 to 1000000 are possible")])
+        try:
+            samples = path.samples(frame, n)
+        except InputError as error:
+            if error.source != "path":
+                raise
+            raise InputError(self.path, [Fault(f"path.{f.where}", f.what) for f in error.faults]) from None
+        if self.sample_time and len(samples) < 2:
+            raise InputError(
+                self.path, [Fault("path", "motion in time needs 2 samples or more; for one pose leave out sample_rate")]
+            )
+        return samples
+
+
+def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:
+    """The scenario in a folder (its scenario.toml) or in a TOML file, with its device. Raises InputError.
+
+    A `device` made in Python is used instead of a file; the scenario's `device` is then its name.
+    """
+    path = Path(path)
+    file_path = path / FILE if path.is_dir() else path
+    table = read_toml(file_path)
+    if "kind" in table and "device" not in table:
+        what = 'describes a device; name a scenario, or write one that has device = "..." with this file\'s path'
+        raise InputError(file_path, [Fault("file", what)])
+    file = validate(ScenarioFile, table, file_path)
+    if device is None:
+        device_path = file_path.parent / file.device
+        device, described = load_device(device_path), Input(device_path, read_text(device_path))
+    elif file.device != device.name:
+        raise InputError(file_path, [Fault("device", f"{file.device!r} is not {device.name!r}, the device given")])
+    else:
+        numbers = "\n".join(f"{path} = {number.text}" for path, number in device.quantities())
+        described = Input(file_path.parent / f"{_identifier(device.name)}.txt", numbers)
+    inputs = {"scenario": Input(file_path, read_text(file_path)), "device": described}
+    if isinstance(file.path, Poses) and file.path.file:
+        poses = file_path.parent / file.path.file
+        inputs["poses"] = Input(poses, read_text(poses))
+    name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
+    return Scenario(_identifier(name), file_path, file, device, inputs)
+
+
+def _identifier(name: str) -> str:
+    """`name` as a C identifier, which becomes the prefix of the generated functions: 'my circle-1' -> 'my_circle_1'."""
+    cleaned = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    return cleaned if cleaned[:1].isalpha() else f"s_{cleaned}"

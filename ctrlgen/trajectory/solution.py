@@ -1,0 +1,106 @@
+"""A solved scenario: drives over time, and the margin to every limit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.core.errors import SolverError
+from ctrlgen.model.model import Limit, Model
+from ctrlgen.model.simulation import Trace
+from ctrlgen.trajectory.infeasibility import REACHED, unreachable
+from ctrlgen.trajectory.optimisation import Programme, Result
+from ctrlgen.trajectory.scenario import Scenario
+
+KEPT = 1e-7  # of a limit: what IPOPT's relaxed bounds (1e-8) may leave
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Distance of a limited quantity to its nearer bound: `value` where it is closest, all SI.
+
+    `share` is the distance over the admissible range (over the bound itself where only one is given; None
+    for a one-sided bound at zero).
+    """
+
+    limit: Limit
+    channel: str
+    sample: int
+    value: float
+    bound: float
+    distance: float
+    share: float | None
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved scenario, SI. `trace` holds the samples; `drive` (n, axes) acts from sample k to k + 1."""
+
+    scenario: Scenario
+    model: Model
+    command: np.ndarray
+    trace: Trace
+    drive: np.ndarray
+    margins: tuple[Margin, ...]
+    iterations: int
+    rows_added: tuple[str, ...]
+
+    @property
+    def tightest(self) -> Margin:
+        """The limit that leaves least of its range."""
+        return min((m for m in self.margins if m.share is not None), key=lambda m: m.share or 0.0)
+
+
+def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
+    """The drives of `scenario`. Raises Unreachable when it cannot be followed, SolverError when IPOPT fails.
+
+    Composite limits (stress, rotation) are first left out; those that the solution breaks are added and
+    the problem is solved again. A relaxed optimum that keeps all limits is the optimum.
+    """
+    command = scenario.command(model)
+    programme = Programme(model, scenario, command)
+    rows: list[Limit] = []
+    relaxed: Result | None = None
+    while True:
+        progress(f"IPOPT, {len(command)} samples" + (f", with {', '.join(r.label for r in rows)}" if rows else ""))
+        try:
+            result = programme.run(rows)
+        except SolverError:
+            if relaxed is None:
+                raise
+            raise unreachable(scenario, model, command, relaxed, None, rows) from None
+        if np.linalg.norm(result.shortfall, axis=1).max() > REACHED:
+            raise unreachable(scenario, model, command, relaxed or result, result, rows)
+        margins = _margins(model, result)
+        broken = [
+            m.limit for m in margins if m.distance < -KEPT * max(abs(m.bound), abs(m.value)) and m.limit not in rows
+        ]
+        if not broken:
+            added = tuple(limit.name for limit in rows)
+            return Solution(scenario, model, command, result.trace, result.u, tuple(margins), result.iterations, added)
+        relaxed = relaxed or result
+        rows += broken
+
+
+def _margins(model: Model, result: Result) -> list[Margin]:
+    """The smallest distance to each side of each limit, one Margin per limit."""
+    n = len(result.u)
+    values = model.evaluate_limits.map(n)(result.x.T, result.z.T, result.u.T, np.tile(model.p_nominal[:, None], (1, n)))
+    margins = []
+    for limit, value in zip(model.limits, values, strict=True):
+        table = value.full().T
+        sides = []
+        for bound, sign in ((limit.lower, 1.0), (limit.upper, -1.0)):
+            if bound is None:
+                continue
+            distance = sign * (table - bound)
+            k, i = np.unravel_index(int(np.argmin(distance)), distance.shape)
+            span = (limit.upper - limit.lower) if limit.lower is not None and limit.upper is not None else abs(bound)
+            share = float(distance[k, i]) / span if span else None
+            sides.append(
+                Margin(limit, limit.channels[i], int(k), float(table[k, i]), bound, float(distance[k, i]), share)
+            )
+        margins.append(min(sides, key=lambda side: side.distance))
+    return margins
