@@ -141,7 +141,7 @@ def test_unreachable_says_which_actuator_by_how_much_and_what_is_nearest(tmp_pat
 
 SWALLOWED = """
 import os, signal, sys
-import ctrlgen.cli
+import ctrlgen.app.cli
 from ctrlgen.__main__ import main
 
 class Dying:
@@ -153,7 +153,7 @@ def execute(check):
     Dying()
     check()
 
-ctrlgen.cli.execute = execute
+ctrlgen.app.cli.execute = execute
 main()
 """
 

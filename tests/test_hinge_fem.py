@@ -21,7 +21,7 @@ NU = 0.33
 
 
 def test_the_finite_element_hinge_imports_nothing_of_ours():
-    tree = ast.parse((ROOT / "ctrlgen/reference_models/hinge_fem.py").read_text())
+    tree = ast.parse((ROOT / "ctrlgen/physics/reference_models/hinge_fem.py").read_text())
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     assert not any(module.startswith("ctrlgen") for module in modules)
