@@ -14,7 +14,7 @@ from functools import cache
 from typing import Annotated, Any
 
 import pint
-from pydantic import BeforeValidator, PlainSerializer
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf)\s*(.*?)\s*$", re.IGNORECASE)
 
@@ -125,14 +125,16 @@ def parse(text: object, unit: str) -> float:
     return to_si(value, written)
 
 
+def _bounds_text(unit: str, low: float | None, high: float | None, low_open: bool) -> str:
+    """Such as '> 0 um and <= 100 um'; empty where nothing is bounded."""
+    side = ">" if low_open else ">="
+    parts = [] if low is None else [f"{side} {from_si(low, unit):g} {unit}"]
+    return " and ".join(parts + ([] if high is None else [f"<= {from_si(high, unit):g} {unit}"]))
+
+
 def _reader(
     unit: str, low: float | None, high: float | None, low_open: bool, whole: bool = False
 ) -> Callable[[Any], Quantity]:
-    def bounds_text() -> str:
-        side = ">" if low_open else ">="
-        parts = [] if low is None else [f"{side} {from_si(low, unit):g} {unit}"]
-        return " and ".join(parts + ([] if high is None else [f"<= {from_si(high, unit):g} {unit}"]))
-
     def read(given: Any) -> Quantity:
         if isinstance(given, Quantity):
             return given
@@ -144,7 +146,9 @@ def _reader(
             raise ValueError(f'no value; write {{ value = "1 {unit}", source = "..." }}')
         si = parse(table["value"], unit)
         if (low is not None and (si < low or (low_open and si == low))) or (high is not None and si > high):
-            raise ValueError(f"{table['value']!r} is impossible here; it must be {bounds_text()}")
+            raise ValueError(
+                f"{table['value']!r} is impossible here; it must be {_bounds_text(unit, low, high, low_open)}"
+            )
         if whole and si != round(si):
             raise ValueError(f"{table['value']!r} is not a whole number, and this is a count")
         sd = None
@@ -188,8 +192,13 @@ def quantity(
 
     `positive` means strictly above zero, `whole` a count.
     """
-    read = _reader(unit, 0.0 if positive else low, high, positive, whole)
-    return Annotated[Quantity, BeforeValidator(read), PlainSerializer(lambda q: q.text)]
+    lowest = 0.0 if positive else low
+    read = _reader(unit, lowest, high, positive, whole)
+    schema = {"type": ["string", "number", "object"], "title": "quantity", "x-unit": unit}
+    bounds = _bounds_text(unit, lowest, high, positive)
+    schema |= {"x-bounds": bounds} if bounds else {}
+    schema |= {"x-whole": True} if whole else {}
+    return Annotated[Quantity, BeforeValidator(read), PlainSerializer(lambda q: q.text), WithJsonSchema(schema)]
 
 
 def show(si: float, unit: str, digits: int = 4) -> str:

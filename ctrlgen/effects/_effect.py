@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from ctrlgen.core.units import Quantity, power_of, read_quantity, same_dimension, show, to_si, written_unit
@@ -284,6 +284,20 @@ class Effect:
                 raise PydanticCustomError("effect", "{message}", {"message": str(error)}) from error
 
         return core_schema.no_info_plain_validator_function(validate)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """An [[effect]] table; the keys beside `kind`, `at` and `of` are the parameters of that kind of effect."""
+        kinds = {"type": "string", "enum": sorted(Effect.library)}
+        text = {"type": "string"}
+        return {
+            "type": "object",
+            "title": "effect",
+            "properties": {"kind": kinds, "at": text, "of": text},
+            "required": ["kind", "at"],
+        }
 
 
 def _outside(param: Param, given: Quantity, bounds: list[float], unit: str) -> list[str]:
