@@ -16,7 +16,7 @@ from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from benchmarks.timed_c import Program, build, generated
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import generate
-from ctrlgen.model.feedforward import Status
+from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.trajectory.solution import solve
 
 PASSES = 200  # over all targets of a set, in each round; the median counts
@@ -104,6 +104,6 @@ def _check_ours(
         samples.check_limits(f"{name}, {where}", answers)
         if real is Real.DOUBLE:
             samples.check_same(f"{name}, {where}", answers, samples.reference(targets))
-        guarded = np.mean(answers.status & int(Status.COMPOSITE) > 0)
+        guarded = np.mean(answers.status & int(ControllerStatus.COMPOSITE) > 0)
         if guarded < GUARDED:
             raise Disagreement(f"{name}, {where}: only {100 * guarded:.0f} % of the targets break a composite limit")

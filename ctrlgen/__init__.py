@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ctrlgen.diagnosis.pipeline import diagnose
     from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
     from ctrlgen.firmware.folder import generate
-    from ctrlgen.model.feedforward import Controller, Status
+    from ctrlgen.model.feedforward import Controller, ControllerStatus
     from ctrlgen.model.model import Model, build_model
     from ctrlgen.model.simulation import Trace, simulate
     from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
@@ -34,7 +34,7 @@ _EXPORTS = {
     "diagnosis.pipeline": ("diagnose",),
     "diagnosis.selection.diagnosis": ("Diagnosis",),
     "firmware.folder": ("generate",),
-    "model.feedforward": ("Controller", "Status"),
+    "model.feedforward": ("Controller", "ControllerStatus"),
     "model.model": ("Model", "build_model"),
     "model.simulation": ("Trace", "simulate"),
     "model.virtual_sensors": ("SensorReadings", "simulate_sensors"),
@@ -56,6 +56,7 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "Comparison",
     "Controller",
+    "ControllerStatus",
     "CtrlgenError",
     "Diagnosis",
     "InputError",
@@ -64,7 +65,6 @@ __all__ = [
     "SensorReadings",
     "Solution",
     "SolverError",
-    "Status",
     "ToolError",
     "Trace",
     "Unreachable",

@@ -9,7 +9,7 @@ import pytest
 from conftest import DEVICE
 from scipy.optimize import lsq_linear
 
-from ctrlgen import Controller, Status, build_model, simulate
+from ctrlgen import Controller, ControllerStatus, build_model, simulate
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.model.inverse import _solve, _Values
@@ -89,17 +89,22 @@ def test_no_target_makes_it_leave_a_limit(model, controller, rng):
     scale = np.array(model.signals["pose"].scale)
     targets = list(rng.normal(size=(150, 6)) * scale * 10 ** rng.uniform(0, 3, (150, 1)))
     targets[10], targets[20], targets[30] = np.full(6, np.nan), np.full(6, np.inf), np.full(6, -1e300)
-    state, drives, seen = controller.rest(), [], Status(0)
+    state, drives, seen = controller.rest(), [], ControllerStatus(0)
     for k, target in enumerate(targets):
         step = controller.step(state, target)
         state, seen = step.state, seen | step.status
         drives.append(step.drive)
         assert limits_kept(model, np.append(step.actuator_state, []), step.displacement, step.drive)
-        assert bool(step.status & Status.INPUT) == (k in (10, 20, 30))
+        assert bool(step.status & ControllerStatus.INPUT) == (k in (10, 20, 30))
     trace = simulate(model, np.array(drives), H)
     for k in range(len(trace.time)):
         assert limits_kept(model, trace.x[k], trace.z[k], drives[min(k, len(drives) - 1)])
-    assert seen & Status.DISPLACEMENT and seen & Status.COMPOSITE and seen & Status.DRIVE and seen & Status.INPUT
+    assert (
+        seen & ControllerStatus.DISPLACEMENT
+        and seen & ControllerStatus.COMPOSITE
+        and seen & ControllerStatus.DRIVE
+        and seen & ControllerStatus.INPUT
+    )
 
 
 def test_the_temperature_limit_is_kept_where_the_stroke_would_allow_more():
@@ -108,7 +113,7 @@ def test_the_temperature_limit_is_kept_where_the_stroke_would_allow_more():
     model = build_model(validate(Device.library["mems_hexapod"], table, "cooler"))
     controller = Controller(model, "displacement", H)
     step = controller.step(controller.rest(), np.full(6, 30e-6), settle=True)
-    assert step.status == Status.STATE
+    assert step.status == ControllerStatus.STATE
     assert step.actuator_state == pytest.approx(np.full(6, 393.15), abs=1e-9)
     settled = simulate(model, np.tile(step.drive, (300, 1)), H)
     assert settled.signals["state"].max() <= 393.15 + 1e-9
@@ -117,7 +122,7 @@ def test_the_temperature_limit_is_kept_where_the_stroke_would_allow_more():
 def test_not_a_number_switches_the_heaters_off_and_the_state_cools(controller):
     warm = controller.step(controller.rest(), np.array([0, 0, 0, 0, 0, 2e-5]), settle=True)
     step = controller.step(warm.state, np.full(6, np.nan))
-    assert step.status == Status.INPUT and np.all(step.drive == 0)
+    assert step.status == ControllerStatus.INPUT and np.all(step.drive == 0)
     assert np.all(step.state[0] < warm.state[0])
 
 
@@ -138,7 +143,7 @@ def test_a_target_beyond_the_drives_is_approached_as_far_as_they_reach(model, co
     settled = controller.step(controller.rest(), np.array([0, 0, 0, 0, 0, 1e-5]), settle=True).state
     for target in ([0, 0, 0, 0, 0, 3e-5], [0, 0, 0, 0, 0, 1e-6], [0, 0, 0, 5e-6, 0, 3e-5]):
         step = controller.step(settled, np.array(target))
-        assert step.status & Status.DRIVE
+        assert step.status & ControllerStatus.DRIVE
         low, high = model.u_bounds
         assert min(np.min(high - step.drive), np.min(step.drive - low)) < 1e-3 * (high - low)[0]
         goal = controller.moving.displacement(*settled, target).full().ravel().clip(*model.z_bounds)
@@ -171,7 +176,7 @@ def test_beyond_the_range_the_nearest_target_inside_is_taken(model, controller, 
         clipped.append(np.linalg.norm(W @ (np.clip(beyond, low, high) - beyond)) / off)
     assert max(ratios) < 1.005 and np.median(clipped) > 1.1
     step = controller.step(controller.rest(), np.array([0, 0, 0, 1e-5, 0, -2e-6]), settle=True)
-    assert step.status == Status.DISPLACEMENT
+    assert step.status == ControllerStatus.DISPLACEMENT
     inside = rng.uniform(0, 3e-5, 6)
     assert np.array_equal(controller.nearest(inside).full().ravel(), inside)
 
@@ -190,7 +195,7 @@ def test_a_saturated_sample_is_made_up_for_as_soon_as_the_limits_allow(model, co
         state = step.state
         drives.append(step.drive)
         statuses.append(step.status)
-    assert statuses[0] & Status.DRIVE and statuses[-1] == 0
+    assert statuses[0] & ControllerStatus.DRIVE and statuses[-1] == 0
     reached = simulate(model, np.array(drives), H, x_0).signals["pose"][-1]
     assert np.abs(reached - goal)[3:].max() < 0.01 * NM
 

@@ -27,7 +27,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
 from ctrlgen.effects import Place
-from ctrlgen.numerics.quantisation_step import lattice
+from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
 
 FINE = 10
@@ -119,16 +119,16 @@ def test_readings_on_a_lattice_are_read_off_as_quantised():
 
 def test_printed_digits_below_the_noise_are_no_finding():
     fitter = fitter_of(after=lambda y: np.round(y, 10))
-    assert lattice(fitter.to_fit[0].observed[:, 0]) == pytest.approx(1e-10)
+    assert quantisation_step(fitter.to_fit[0].observed[:, 0]) == pytest.approx(1e-10)
     assert read_off(fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))) == ()
 
 
 def test_a_lattice_needs_every_reading_on_it():
     rng = np.random.default_rng(0)
     on = 0.3 + 0.07 * rng.integers(-500, 500, 400)
-    assert lattice(on) == pytest.approx(0.07)
-    assert lattice(on + 0.02 * rng.standard_normal(400)) < 1e-3
-    assert lattice(np.full(400, 2.0)) == 0.0
+    assert quantisation_step(on) == pytest.approx(0.07)
+    assert quantisation_step(on + 0.02 * rng.standard_normal(400)) < 1e-3
+    assert quantisation_step(np.full(400, 2.0)) == 0.0
 
 
 def test_a_push_on_a_mass_is_no_spike():

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from conftest import SCENARIOS, effect_device
 
-from ctrlgen import Controller, InputError, Status, build_model, load_scenario, simulate
+from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.fmu import write_fmus
@@ -279,7 +279,7 @@ def test_what_is_not_a_number_is_answered_safely(units, circle, tmp_path):
         assert controller.status == 0 and np.all(controller.get("drive") > 0)
         controller.set("target", np.full(6, np.nan))
         controller.step()
-        assert controller.status == Status.INPUT and np.all(controller.get("drive") == 0)
+        assert controller.status == ControllerStatus.INPUT and np.all(controller.get("drive") == 0)
         controller.set("target", circle.command[1])
         controller.step(40)
         assert controller.status == 0 and np.all(controller.get("drive") > 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrlgen.recordings.outliers import spikes, stuck
+from ctrlgen.recordings.outliers import outliers, stuck_samples
 
 
 @pytest.mark.parametrize("at", [1, 2, 3, 100, -4, -3, -2])
@@ -14,7 +14,7 @@ def test_a_spike_beside_the_end_of_a_record_is_one_too(at, rng):
     t = np.arange(n)
     y = np.sin(0.02 * t) + 1e-3 * rng.standard_normal(n)
     y[at] += 0.1
-    assert np.array_equal(np.flatnonzero(spikes(y, np.cos(0.02 * t)[:, None])), [at % n])
+    assert np.array_equal(np.flatnonzero(outliers(y, np.cos(0.02 * t)[:, None])), [at % n])
 
 
 @pytest.mark.parametrize("apart", [2, 3, 4, 5])
@@ -23,14 +23,14 @@ def test_two_spikes_close_together_are_two(apart, sizes, rng):
     t = np.arange(1000)
     y = np.sin(0.02 * t) + 1e-3 * rng.standard_normal(1000)
     y[[600, 600 + apart]] += sizes
-    assert np.array_equal(np.flatnonzero(spikes(y, np.cos(0.02 * t)[:, None])), [600, 600 + apart])
+    assert np.array_equal(np.flatnonzero(outliers(y, np.cos(0.02 * t)[:, None])), [600, 600 + apart])
 
 
 @pytest.mark.parametrize("pole", [0.3, 0.9, 0.97 * np.exp(0.9j), 0.97 * np.exp(2.2j)])
 def test_a_record_may_begin_in_motion(pole, rng):
     n = 400
     y = np.real(pole ** np.arange(n)) + 1e-4 * rng.standard_normal(n)
-    assert not spikes(y, np.zeros((n, 1))).any()
+    assert not outliers(y, np.zeros((n, 1))).any()
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
@@ -46,7 +46,7 @@ def test_motion_of_the_device_is_no_spike(shape, noise, rng):
     for k in range(n):
         state = pole * state + (1 - pole) * u[k - (k > 0)]
         y[k] = state.real
-    assert not spikes(y + noise * rng.standard_normal(n), u[:, None]).any()
+    assert not outliers(y + noise * rng.standard_normal(n), u[:, None]).any()
 
 
 def test_coloured_noise_has_no_spikes(rng):
@@ -54,7 +54,7 @@ def test_coloured_noise_has_no_spikes(rng):
 
     drive = np.sin(0.01 * np.arange(20_000))[:, None]
     for denominator in ([1.0], [1, -0.95], [1, -1.9, 0.9025]):
-        assert not spikes(lfilter([1], denominator, rng.standard_normal(20_000)), drive).any()
+        assert not outliers(lfilter([1], denominator, rng.standard_normal(20_000)), drive).any()
 
 
 def test_a_channel_that_runs_into_its_end_is_clipped(rng):
@@ -62,12 +62,12 @@ def test_a_channel_that_runs_into_its_end_is_clipped(rng):
     drive = np.sin(0.3 * t)[:, None]  # too fast to stay in the end for the eight samples of a frozen channel
     reading = np.sin(0.3 * t) + 1e-3 * rng.standard_normal(4000)
     clipped = np.minimum(reading, 0.7)
-    marked = stuck(clipped, drive)
+    marked = stuck_samples(clipped, drive)
     assert not marked[reading < 0.7].any() and marked[reading >= 0.7].mean() > 0.6  # runs of four are left
-    assert not stuck(reading, drive).any()
+    assert not stuck_samples(reading, drive).any()
 
 
 def test_a_coarse_sensor_at_rest_is_not_stuck():
     drive = np.clip(np.sin(0.01 * np.arange(4000)), -0.5, 0.5)
     reading = np.round(drive * 200 + 0.1 * np.random.default_rng(0).standard_normal(4000))
-    assert not stuck(reading, drive[:, None]).any()
+    assert not stuck_samples(reading, drive[:, None]).any()

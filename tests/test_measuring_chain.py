@@ -11,9 +11,9 @@ from ctrlgen.physics import sensor_models as chain
 from ctrlgen.physics.sensor_models import (
     SENSORS,
     Adc,
+    CalibrationRun,
     Interferometer,
-    Recording,
-    calibrate,
+    calibrate_sensor,
     find_fringes,
     move,
     record,
@@ -25,7 +25,7 @@ NM, UM, CELSIUS = 1e-9, 1e-6, 273.15
 
 def slopes(sensor: chain.Sensor, distance: float, speed: float, seeds: range) -> list[chain.Slope]:
     runs = (record(sensor, LASER, distance, speed, np.random.default_rng(seed)) for seed in seeds)
-    return [calibrate(run, LASER.wavelength) for run in runs]
+    return [calibrate_sensor(run, LASER.wavelength) for run in runs]
 
 
 @pytest.mark.parametrize(
@@ -123,8 +123,10 @@ def test_a_mirror_at_rest_gives_no_fringes():
 def test_without_noise_the_sensitivity_is_exact():
     d = move(95 * UM, 4 * UM, 5e3)
     fine = Adc(bits=40)
-    recording = Recording(d / 10.264e-6, replace(LASER, noise=0.0).read(d, np.random.default_rng(0), fine), fine.rate)
-    assert calibrate(recording, LASER.wavelength).sensitivity == pytest.approx(10.264e-6, rel=1e-7)
+    recording = CalibrationRun(
+        d / 10.264e-6, replace(LASER, noise=0.0).read(d, np.random.default_rng(0), fine), fine.rate
+    )
+    assert calibrate_sensor(recording, LASER.wavelength).sensitivity == pytest.approx(10.264e-6, rel=1e-7)
 
 
 @pytest.mark.parametrize("name", ["3316", "3317", "3338"])
@@ -134,43 +136,43 @@ def test_the_planted_sensitivity_is_recovered_within_the_stated_uncertainty(name
     z = np.array([(s.sensitivity - sensor.sensitivity) / s.sd for s in found])
     assert np.abs(z).max() < 4.5  # 25 draws of Student's t with 8 degrees of freedom: 1 in 20 000 each
     assert 0.6 < np.sqrt(np.mean(z**2)) < 1.7  # the uncertainty is neither boastful nor timid; expected 1.15
-    calibration = chain.Calibration(tuple(found))
+    calibration = chain.SensitivityStatistics(tuple(found))
     assert abs(calibration.mean - sensor.sensitivity) < 3.5 * calibration.sd_of_mean
     assert all(s.sd < 1e-4 * s.sensitivity for s in found)
 
 
 def test_the_fibre_sensor_is_recovered_over_its_one_volt():
     sensor = SENSORS["fibre"]
-    found = chain.Calibration(tuple(slopes(sensor, 11.5 * UM, 1 * UM, range(25))))
+    found = chain.SensitivityStatistics(tuple(slopes(sensor, 11.5 * UM, 1 * UM, range(25))))
     assert abs(found.mean - sensor.sensitivity) < 3.5 * found.sd_of_mean
     assert found.sd_of_mean < 1e-4 * sensor.sensitivity
 
 
 def test_a_wrong_wavelength_is_seen_in_the_sensitivity():
     run = record(SENSORS["3316"], LASER, 95 * UM, 8 * UM, np.random.default_rng(1))
-    found = calibrate(run, 1.001 * LASER.wavelength)
+    found = calibrate_sensor(run, 1.001 * LASER.wavelength)
     assert abs(found.sensitivity - SENSORS["3316"].sensitivity) > 20 * found.sd
 
 
 def test_a_falling_voltage_gives_a_negative_sensitivity():
     far = replace(SENSORS["fibre"], sensitivity=-11.77e-6)
     run = record(far, LASER, 10 * UM, 2 * UM, np.random.default_rng(1))
-    assert calibrate(run, LASER.wavelength).sensitivity == pytest.approx(-11.77e-6, rel=1e-3)
+    assert calibrate_sensor(run, LASER.wavelength).sensitivity == pytest.approx(-11.77e-6, rel=1e-3)
 
 
 def test_a_constant_thermal_offset_leaves_the_sensitivity_alone():
     sensor = SENSORS["3338"]
     cold, warm = (record(sensor, LASER, 80 * UM, 8 * UM, np.random.default_rng(3), CELSIUS + T) for T in (22.0, 25.0))
     assert warm.sensor.mean() - cold.sensor.mean() == pytest.approx(3 * 0.159, abs=1e-4)
-    a, b = (calibrate(run, LASER.wavelength) for run in (cold, warm))
+    a, b = (calibrate_sensor(run, LASER.wavelength) for run in (cold, warm))
     assert abs(a.sensitivity - b.sensitivity) < 4 * a.sd
 
 
 def test_statistics_of_repeated_recordings():
-    three = chain.Calibration(tuple(chain.Slope(s, 0.0, 0.0) for s in (9.0, 10.0, 11.0)))
+    three = chain.SensitivityStatistics(tuple(chain.Slope(s, 0.0, 0.0) for s in (9.0, 10.0, 11.0)))
     assert three.mean == 10 and three.sd == 1
     assert three.max_deviation == pytest.approx(0.2) and three.sd_of_mean == pytest.approx(3**-0.5)
     with pytest.raises(ValueError, match="at least two"):
-        chain.calibrate_all(
+        chain.sensitivity_statistics(
             [record(SENSORS["fibre"], LASER, 5 * UM, 5 * UM, np.random.default_rng(0))], LASER.wavelength
         )

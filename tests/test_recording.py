@@ -13,7 +13,7 @@ from recorded import AXES, COLUMNS, N, csv_text, described, refused, samples, tw
 
 from ctrlgen import build_model, load_device
 from ctrlgen.recordings.formats import read_table
-from ctrlgen.recordings.outliers import spikes, stuck
+from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.reproduce.s0_data import load_s0
 
@@ -356,4 +356,4 @@ def test_real_files_are_read_and_nothing_in_them_is_marked(name):
     drive, read = {".mat": ("vir", "qm"), ".json": (1, 2), ".csv": ("commanded_deg", "measured_deg")}[path.suffix]
     table = read_table(path)
     u, y = (table.numbers(table.find(column)) for column in (drive, read))
-    assert len(u) > 3000 and not spikes(y, u[:, None]).any() and not stuck(y, u[:, None]).any()
+    assert len(u) > 3000 and not outliers(y, u[:, None]).any() and not stuck_samples(y, u[:, None]).any()

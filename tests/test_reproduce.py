@@ -7,7 +7,7 @@ import math
 import pytest
 
 from ctrlgen.reproduce import all as everything
-from ctrlgen.reproduce.row import Row, Status, half_unit
+from ctrlgen.reproduce.row import PrintedNumber, ReproductionStatus, half_unit
 
 
 @pytest.fixture(scope="module", params=list(everything.SOURCES))
@@ -17,7 +17,7 @@ def rows(request):
 
 def test_every_row_that_is_not_reproduced_says_why(rows):
     assert rows
-    assert not [row.where for row in rows if row.status is not Status.REPRODUCED and not row.reason]
+    assert not [row.where for row in rows if row.status is not ReproductionStatus.REPRODUCED and not row.reason]
 
 
 def test_every_row_belongs_to_the_source_that_was_asked_for(rows, request):
@@ -39,7 +39,7 @@ def test_half_a_unit_of_the_last_printed_digit(printed, half):
 
 
 def test_a_row_that_is_off_differs_and_one_that_is_no_number_never_agrees():
-    assert Row("S", "w", "1.00", "1", 1.0049).status is Status.REPRODUCED
-    assert Row("S", "w", "1.00", "1", 1.0051).status is Status.DIFFERS
-    assert Row("S", "w", "1.00", "1", float("nan")).status is Status.DIFFERS
-    assert Row("S", "w", "1.00", "1", None, "lost").status is Status.NOT_COMPUTABLE
+    assert PrintedNumber("S", "w", "1.00", "1", 1.0049).status is ReproductionStatus.REPRODUCED
+    assert PrintedNumber("S", "w", "1.00", "1", 1.0051).status is ReproductionStatus.DIFFERS
+    assert PrintedNumber("S", "w", "1.00", "1", float("nan")).status is ReproductionStatus.DIFFERS
+    assert PrintedNumber("S", "w", "1.00", "1", None, "lost").status is ReproductionStatus.NOT_COMPUTABLE

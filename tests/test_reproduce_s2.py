@@ -9,7 +9,7 @@ from ctrlgen.physics import circular_hinge_table as table
 from ctrlgen.physics.sensor_models import SENSORS
 from ctrlgen.reproduce import all as everything
 from ctrlgen.reproduce import s2, s3_hinges
-from ctrlgen.reproduce.row import Row, Status
+from ctrlgen.reproduce.row import PrintedNumber, ReproductionStatus
 from ctrlgen.reproduce.s3_hinges import PRINTED_ERRORS
 
 
@@ -33,7 +33,7 @@ def test_the_page_of_s2_shows_its_measuring_chain_and_the_hinge_errors(tmp_path,
 
 
 @pytest.fixture(scope="module")
-def found() -> dict[str, Row]:
+def found() -> dict[str, PrintedNumber]:
     pytest.importorskip("skfem")
     listed = [*s2.rows(), *s3_hinges.rows()]
     by_place = {f"{row.source} {row.where}": row for row in listed}
@@ -42,20 +42,22 @@ def found() -> dict[str, Row]:
 
 
 def test_what_is_not_reproduced_has_a_reason(found):
-    silent = [place for place, row in found.items() if row.status is not Status.REPRODUCED and not row.reason]
+    silent = [
+        place for place, row in found.items() if row.status is not ReproductionStatus.REPRODUCED and not row.reason
+    ]
     assert not silent
 
 
 def test_every_computable_number_of_s2_is_reproduced_but_two(found):
     listed = [row for row in found.values() if row.source == "S2" and row.ours is not None]
-    differing = {row.where for row in listed if row.status is Status.DIFFERS}
+    differing = {row.where for row in listed if row.status is ReproductionStatus.DIFFERS}
     assert differing == {"A.5.1.1, eq. (A.2), 3338", "below C.15, coefficient, Tseytlin"}
     assert len(listed) >= 30
 
 
 def test_the_hinge_errors_of_s3_table_3_agree_where_the_reading_does_not_matter(found):
     bending = [row for place, row in found.items() if "delta_y_per_F_y" in place and row.ours is not None]
-    assert len(bending) == 12 and Counter(row.status for row in bending)[Status.REPRODUCED] >= 8
+    assert len(bending) == 12 and Counter(row.status for row in bending)[ReproductionStatus.REPRODUCED] >= 8
     assert max(abs(row.difference) for row in bending) < 0.15
 
 

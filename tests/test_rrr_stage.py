@@ -16,7 +16,7 @@ from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices import rrr_stage as device_module
 from ctrlgen.physics import circular_hinge_table, piezo_stack, rrr_stage
 from ctrlgen.reproduce import s3, s3_lengths, s3_tables
-from ctrlgen.reproduce.row import Row, Status, half_unit
+from ctrlgen.reproduce.row import PrintedNumber, ReproductionStatus, half_unit
 from ctrlgen.trajectory.workspace import Workspace
 
 CASES = (1, 2)
@@ -51,7 +51,7 @@ def random_hinge(rng: np.random.Generator, R: float) -> np.ndarray:
     return array(circular_hinge_table.end_compliance(x, R**2 * alpha * rng.uniform(1.01, 1.3), alpha, R))
 
 
-def printed_rows(where: str) -> list[Row]:
+def printed_rows(where: str) -> list[PrintedNumber]:
     return [row for row in s3.rows() if row.where.startswith(where)]
 
 
@@ -155,7 +155,9 @@ def test_the_corrected_stage_is_the_direct_stiffness_assembly(case: int, correct
     scale = np.append(ROTATION_SCALE, [1.0, 1.0, 1.0])
     reference = direct.assemble(hinges, g) * np.outer(scale, scale)
     ours = whole(corrected, corrected.input_compliance)
-    assert np.abs(ours - reference).max() < 1e-9 * np.abs(reference).max()  # one linear model solved twice in float64
+    assert (
+        np.abs(ours - reference).max() < 1e-9 * np.abs(reference).max()
+    )  # one linear model solved twice in float64
 
 
 def test_b_83_leaves_out_what_an_input_yields_with_the_platform_held(corrected: rrr_stage.Kinetostatics) -> None:
@@ -218,12 +220,12 @@ def test_an_output_load_reaches_the_inputs_as_an_input_force_reaches_the_output(
 
 def test_table_4_case_1_is_reproduced_in_all_36_entries() -> None:
     rows = printed_rows("Table 4, case 1")
-    assert len(rows) == 36 and all(row.status is Status.REPRODUCED for row in rows)
+    assert len(rows) == 36 and all(row.status is ReproductionStatus.REPRODUCED for row in rows)
 
 
 def test_table_4_case_2_is_reproduced_in_all_entries_but_the_one_that_lost_its_sign() -> None:
     rows = printed_rows("Table 4, case 2")
-    differing = [row for row in rows if row.status is not Status.REPRODUCED]
+    differing = [row for row in rows if row.status is not ReproductionStatus.REPRODUCED]
     assert len(rows) == 36 and [row.where for row in differing] == ["Table 4, case 2, C_oFin (3,1)"]
     assert differing[0].ours is not None and abs(differing[0].ours + differing[0].value) <= differing[0].allowed
 
@@ -299,7 +301,7 @@ def test_a_planted_wrong_length_is_found(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_table_6_is_reproduced_to_a_tenth_of_a_point_but_for_three_lost_signs() -> None:
     rows = printed_rows("Table 6")
-    differing = [row for row in rows if row.status is not Status.REPRODUCED]
+    differing = [row for row in rows if row.status is not ReproductionStatus.REPRODUCED]
     assert len(rows) == 60 and all(row.allowed == 0.1 for row in rows)
     assert [row.where for row in differing] == [f"Table 6, case 1, C_oFin ({i},2)" for i in (1, 2, 3)]
     assert all(row.ours is not None and abs(row.ours + row.value) <= 0.1 for row in differing)
@@ -310,11 +312,11 @@ def test_a_finite_element_number_taken_within_its_print_meets_both_cases() -> No
     short = [
         (symbol, i, j, text)
         for symbol, i, j, text in s3_tables.entries(s3_tables.TABLE_5)
-        if text != "0" and s3.reference(symbol, i, j).reason
+        if text != "0" and s3.finite_element_value(symbol, i, j).reason
     ]
     assert len(short) == 8
     for symbol, i, j, text in short:
-        assert abs(s3.reference(symbol, i, j).value - float(text)) <= half_unit(text)
+        assert abs(s3.finite_element_value(symbol, i, j).value - float(text)) <= half_unit(text)
 
 
 def test_the_model_stands_eleven_per_cent_off_the_finite_elements_in_the_jacobian() -> None:
@@ -327,9 +329,9 @@ def test_the_model_stands_eleven_per_cent_off_the_finite_elements_in_the_jacobia
 
 def test_every_row_that_differs_says_why() -> None:
     rows = s3.rows()
-    assert all(row.reason for row in rows if row.status is not Status.REPRODUCED)
+    assert all(row.reason for row in rows if row.status is not ReproductionStatus.REPRODUCED)
     assert len({row.where for row in rows}) == len(rows)
-    assert {row.where for row in rows if row.status is Status.DIFFERS and "Table 5" not in row.where} == {
+    assert {row.where for row in rows if row.status is ReproductionStatus.DIFFERS and "Table 5" not in row.where} == {
         "Table 1, l1",
         "section 4.1, C_inFin diagonal over off-diagonal, case 2",
         "Table 4, case 2, C_oFin (3,1)",

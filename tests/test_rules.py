@@ -19,7 +19,7 @@ from ctrlgen.firmware.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.folder import CFolder, generate, write_harness
 from ctrlgen.firmware.misra import ADVISORY, MANDATORY, rule_class
-from ctrlgen.model.feedforward import Status
+from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.verification.check import Check
 from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile
@@ -298,7 +298,7 @@ def test_from_a_state_of_garbage_c_and_python_answer_alike_and_admissibly(
     answer = run_host(program, "follow", target, 2 * n + model.n_states, (x, z))
     low, high = model.u_bounds
     for row, step in zip(answer, steps, strict=True):
-        assert not step.status & Status.INPUT and int(row[0]) == step.status
+        assert not step.status & ControllerStatus.INPUT and int(row[0]) == step.status
         if not np.isfinite(garbage):  # huge numbers cancel: there the last digit decides
             assert row[1 : 1 + n] == pytest.approx(step.drive, rel=1e-9, abs=1e-12)
         assert np.all((row[1 : 1 + n] >= low) & (row[1 : 1 + n] <= high))

@@ -15,11 +15,11 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import matrices
 from ctrlgen.physics import meso_hexapod
-from ctrlgen.recordings.calibration import calibrate
-from ctrlgen.recordings.pose_errors import drift, opposites, parasitic, pose_errors, repeatability
+from ctrlgen.recordings.calibration import calibrate_jacobian
+from ctrlgen.recordings.pose_errors import opposites, parasitic, pose_drift, pose_errors, repeatability
 from ctrlgen.reproduce import s0, s0_figures
 from ctrlgen.reproduce.rounding import carried, half_units
-from ctrlgen.reproduce.row import Status
+from ctrlgen.reproduce.row import ReproductionStatus
 from ctrlgen.reproduce.s0_data import load_s0, read_jacobian
 
 SHARED = ROOT.parent / "shared"
@@ -128,7 +128,7 @@ def test_a_planted_jacobian_is_found_within_its_covariance(noise) -> None:
     inside, distance = 0.0, 0.0
     for _ in range(runs):
         J, U, T = planted(rng, n, noise)
-        estimated, known = calibrate(U, T), calibrate(U, T, noise=noise)
+        estimated, known = calibrate_jacobian(U, T), calibrate_jacobian(U, T, noise=noise)
         width = student.ppf(0.975, n - 6) * estimated.sd
         inside += np.mean(np.abs(estimated.jacobian - J) < width) / runs
         error = (known.jacobian - J).ravel()
@@ -140,7 +140,7 @@ def test_a_planted_jacobian_is_found_within_its_covariance(noise) -> None:
 def test_noise_is_estimated_from_the_residuals(noise) -> None:
     rng = np.random.default_rng(3)
     _, U, T = planted(rng, 4000, noise)
-    found = calibrate(U, T)
+    found = calibrate_jacobian(U, T)
     sd = np.sqrt(np.diag(noise))
     assert np.abs((found.noise - noise) / np.outer(sd, sd)).max() < 5 * np.sqrt(2 / 4000)  # five standard errors
     assert found.residuals == pytest.approx(T - U @ found.jacobian.T, abs=1e-18)
@@ -148,24 +148,24 @@ def test_noise_is_estimated_from_the_residuals(noise) -> None:
 
 def test_exact_recordings_give_the_jacobian_exactly(rng) -> None:
     J, U, T = planted(rng, 9, np.zeros((6, 6)))
-    found = calibrate(U, T)
+    found = calibrate_jacobian(U, T)
     assert np.abs(found.jacobian - J).max() < 1e-13 * found.condition  # rounding of one least-squares solution
     assert found.condition == pytest.approx(np.linalg.cond(U), rel=1e-12)
 
 
 def test_six_poses_give_equation_13_and_no_covariance(rng) -> None:
     U, T = rng.normal(size=(6, 6)) * 1e-4, rng.normal(size=(6, 6)) * 1e-4
-    found = calibrate(U, T)
+    found = calibrate_jacobian(U, T)
     assert np.abs(found.jacobian - T.T @ np.linalg.inv(U.T)).max() < 1e-12 * found.condition
     assert found.covariance is None and found.noise is None and found.sd is None
-    given = calibrate(U, T, noise=np.eye(6) * 1e-14)
+    given = calibrate_jacobian(U, T, noise=np.eye(6) * 1e-14)
     assert given.sd == pytest.approx(np.tile(1e-7 * np.sqrt(np.diag(np.linalg.inv(U.T @ U))), (6, 1)), rel=1e-9)
 
 
 def test_an_offset_of_home_is_told_from_the_jacobian(rng, noise) -> None:
     J, U, T = planted(rng, 54, noise)
     home = np.array([1e-5, -2e-5, 0, 1e-6, -3e-6, 2e-6])
-    found = calibrate(U, T + home, offset=True)
+    found = calibrate_jacobian(U, T + home, offset=True)
     assert (np.abs(found.offset - home) < 4 * np.sqrt(np.diag(found.offset_covariance))).all()  # four sd of six
     assert (np.abs(found.jacobian - J) < 5 * found.sd).all()
     assert np.sqrt(np.diag(found.offset_covariance)) == pytest.approx(np.sqrt(np.diag(found.noise) / 54), rel=0.2)
@@ -174,7 +174,7 @@ def test_an_offset_of_home_is_told_from_the_jacobian(rng, noise) -> None:
 def test_a_calibration_moves_to_another_point_like_its_poses(p, rng, noise) -> None:
     _, U, T = planted(rng, 30, noise)
     Ad = ca.DM(meso_hexapod.cube_to_platform(p.cube.depth)).full()
-    moved, again = calibrate(U, T, offset=True).moved(Ad), calibrate(U, T @ Ad.T, offset=True)
+    moved, again = calibrate_jacobian(U, T, offset=True).moved(Ad), calibrate_jacobian(U, T @ Ad.T, offset=True)
     for name in ("jacobian", "covariance", "noise", "offset", "offset_covariance", "residuals"):
         theirs = getattr(again, name)
         assert np.abs(getattr(moved, name) - theirs).max() < 1e-9 * np.abs(theirs).max(), name
@@ -183,28 +183,28 @@ def test_a_calibration_moves_to_another_point_like_its_poses(p, rng, noise) -> N
 def test_poses_that_cannot_calibrate_are_refused(rng) -> None:
     J, U, T = planted(rng, 12, np.zeros((6, 6)))
     with pytest.raises(InputError, match="5 poses cannot tell 6 inputs; record at least 6"):
-        calibrate(U[:5], T[:5])
+        calibrate_jacobian(U[:5], T[:5])
     with pytest.raises(InputError, match="6 poses cannot tell 6 inputs and an offset; record at least 7"):
-        calibrate(U[:6], T[:6], offset=True)
+        calibrate_jacobian(U[:6], T[:6], offset=True)
     still = U.copy()
     still[:, 4] = still[:, 1]
     with pytest.raises(InputError, match=r"-?\+?0\.71 input 2 .*0\.71 input 5 stays still"):
-        calibrate(still, still @ J.T)
+        calibrate_jacobian(still, still @ J.T)
     with pytest.raises(InputError, match="no input moves"):
-        calibrate(0 * U, T)
+        calibrate_jacobian(0 * U, T)
     with pytest.raises(InputError, match="pose 4 has a value that is not finite"):
-        calibrate(U, np.where(np.arange(12)[:, None] == 3, np.nan, T))
+        calibrate_jacobian(U, np.where(np.arange(12)[:, None] == 3, np.nan, T))
     with pytest.raises(InputError, match="do not fit"):
-        calibrate(U, T[:5])
+        calibrate_jacobian(U, T[:5])
     with pytest.raises(InputError, match=r"noise: has shape \(5, 5\)"):
-        calibrate(U, T, noise=np.eye(5))
+        calibrate_jacobian(U, T, noise=np.eye(5))
 
 
 def test_single_motions_calibrate_the_coupled_ones(data) -> None:
     single, coupled = slice(0, 24), slice(24, 54)
     model = pose_errors(data.measured[coupled], data.kinematic[coupled])
-    plain = calibrate(data.inputs[single], data.measured[single])
-    home = calibrate(data.inputs[single], data.measured[single], offset=True)
+    plain = calibrate_jacobian(data.inputs[single], data.measured[single])
+    home = calibrate_jacobian(data.inputs[single], data.measured[single], offset=True)
     held = pose_errors(data.measured[coupled], data.inputs[coupled] @ plain.jacobian.T)
     with_home = pose_errors(data.measured[coupled], data.inputs[coupled] @ home.jacobian.T + home.offset)
     for part, gain in (("translation", 4), ("rotation", 3)):  # the paper claims four to five times over all 54
@@ -264,15 +264,15 @@ def test_the_device_s_travel_covers_the_recorded_commands(device, data) -> None:
 def test_a_planted_drift_is_found_and_the_recording_shows_none(data, rng) -> None:
     slopes = np.array([1, -2, 0, 3, 0, 5]) * 1e-8
     order = np.arange(54)
-    found = drift(np.outer(order, slopes) + rng.normal(0, 1e-7, (54, 6)))
+    found = pose_drift(np.outer(order, slopes) + rng.normal(0, 1e-7, (54, 6)))
     assert (np.abs(found.level - order.mean() * slopes) < 4 * found.level_sd).all()
     assert found.level_sd == pytest.approx(np.full(6, 1e-7 / np.sqrt(54)), rel=0.4)
     assert (np.abs(found.slope - slopes) < 4 * found.slope_sd).all() and (found.slope_sd < 2e-9).all()
     assert found.slope_sd == pytest.approx(np.full(6, 1e-7 / np.sqrt(54 * (54**2 - 1) / 12)), rel=0.4)
-    ours = drift(calibrate(data.inputs, data.measured, offset=True).residuals)
+    ours = pose_drift(calibrate_jacobian(data.inputs, data.measured, offset=True).residuals)
     assert (np.abs(ours.slope) < 2 * ours.slope_sd).all()
     with pytest.raises(InputError, match="2 poses"):
-        drift(np.zeros((2, 6)))
+        pose_drift(np.zeros((2, 6)))
 
 
 # Rows and figures
@@ -288,7 +288,9 @@ def test_rounded_data_move_a_mean_by_three_standard_deviations() -> None:
 
 def test_every_row_has_its_own_place_and_says_why_it_differs(rows) -> None:
     assert len({row.where for row in rows}) == len(rows) == 456
-    assert all(row.reason for row in rows if row.status is not Status.REPRODUCED or row.tolerance is not None)
+    assert all(
+        row.reason for row in rows if row.status is not ReproductionStatus.REPRODUCED or row.tolerance is not None
+    )
 
 
 def test_what_follows_from_the_recordings_is_reproduced(rows) -> None:
@@ -296,15 +298,17 @@ def test_what_follows_from_the_recordings_is_reproduced(rows) -> None:
         row.where
         for row in rows
         if row.where.startswith(("Table 2", "Table 3", "Section", "Abstract", "Conclusion", "Eq. (16)"))
-        and row.status is not Status.REPRODUCED
+        and row.status is not ReproductionStatus.REPRODUCED
     ]
     assert missed == []
 
 
 def test_what_follows_from_the_device_as_printed_is_not(rows) -> None:
     for start in ("Eq. (14)", "Table 4"):
-        assert all(row.status is Status.DIFFERS for row in rows if row.where.startswith(start))
-    differing = [row.where for row in rows if row.where.startswith("Table 1") and row.status is Status.DIFFERS]
+        assert all(row.status is ReproductionStatus.DIFFERS for row in rows if row.where.startswith(start))
+    differing = [
+        row.where for row in rows if row.where.startswith("Table 1") and row.status is ReproductionStatus.DIFFERS
+    ]
     assert differing == [
         "Table 1, L from eq. (1)", "Table 1, c_3 from r_a and its angles", "Table 1, c_4 from r_a and its angles",
         "Table 1, r_a from c_3 and c_4",

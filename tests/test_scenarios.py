@@ -10,7 +10,7 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import InputError, Unreachable, load_scenario, run
-from ctrlgen.trajectory.metrics import expectations, measure
+from ctrlgen.trajectory.metrics import expectations, metric
 
 ALL = sorted(path.parent.name for path in SCENARIOS.glob("*/scenario.toml"))
 
@@ -75,7 +75,7 @@ def test_the_report_is_one_file_that_refers_to_nothing_outside(circle, tmp_path)
 )  # fmt: skip
 def test_an_expectation_of_something_that_does_not_exist_is_refused(circle, name, says):
     with pytest.raises(ValueError, match=says):
-        measure(circle, name)
+        metric(circle, name)
 
 
 def test_an_expectation_that_is_missed_is_reported(circle):

@@ -63,7 +63,7 @@ def test_a_limit_that_the_relaxed_solution_breaks_is_added(scenario):
     s = scenario('[path]\nkind = "poses"\npoints = [{ theta_y = "-4.1 mrad", delta_z = "30 um" }]\n')
     with pytest.raises(Unreachable, match="wire flexure stress") as caught:
         solve(s, build_model(s.device))
-    nearest = caught.value.shortfall.nearest[0]
+    nearest = caught.value.infeasibility.nearest[0]
     assert abs(nearest[1] + 4.1e-3) > 1e-6 and abs(nearest[5] - 3e-5) < 2e-6
 
 
@@ -71,7 +71,7 @@ def test_the_nearest_pose_of_an_unreachable_one_is_reachable(scenario):
     s = scenario('[path]\nkind = "poses"\npoints = [{ delta_x = "10 um" }]\n')
     with pytest.raises(Unreachable) as caught:
         solve(s, build_model(s.device))
-    message, short = str(caught.value), caught.value.shortfall
+    message, short = str(caught.value), caught.value.infeasibility
     assert (
         "actuator 2X: needs -5 um" in message and "3Y: needs -8.66 um" in message
     )  # rigid translation: d = R(psi)' (10, 0)

@@ -25,8 +25,8 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.package import verify_package
 from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import BUDGETS, Build, record
-from ctrlgen.verification.check import Check, Finding, not_run
-from ctrlgen.verification.comparison import Comparison, Row
+from ctrlgen.verification.check import Check, CheckFinding, not_run
+from ctrlgen.verification.comparison import Comparison, ComparisonRow
 from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun
 
 KEYS = {
@@ -115,7 +115,7 @@ def example(circle, tmp_path_factory) -> Build:
     c = generate(circle.scenario, circle.model, tmp_path_factory.mktemp("c"), circle)
     cost = Cost("step, along the scenario", 10, 500.0, 601, 601)
     run = TargetRun("Cortex-M4F", "zig 0.13", Real.FLOAT, (cost,), 256, 1000, 100, 0, 500, 0, 0, "")
-    rows = (Row("gcc double", "scenario, online C - CasADi", "drive", "W", 0.0, 0.0, 1.0, 10, None),)
+    rows = (ComparisonRow("gcc double", "scenario, online C - CasADi", "drive", "W", 0.0, 0.0, 1.0, 10, None),)
     errors = {"online C": {real: np.full((5, 6), 1e-12) for real in Real}}
     check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), "passed")
     return Build(circle, c, (), Comparison(rows, {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors)
@@ -135,7 +135,7 @@ def test_what_is_well_passes_and_budgets_are_stated_for_six_drives(example, tmp_
 def broken(build: Build) -> dict[str, tuple[Build, str]]:
     """The same build with one thing wrong, and what must be said of it."""
     run, row, check = build.in_loop.runs[0], build.comparison.rows[0], build.checks[0]
-    finding = Finding("x.c", 7, "misra-c2012-13.6", "mandatory", "MISRA C:2012 rule 13.6")
+    finding = CheckFinding("x.c", 7, "misra-c2012-13.6", "mandatory", "MISRA C:2012 rule 13.6")
     off = replace(run, differing=3, ulp=2, where="step, along the scenario, call 4")
     stopped = Stopped("Cortex-M7", "zig 0.13", Real.DOUBLE, "f did not return within 10 s on the emulated core")
     return {
@@ -190,7 +190,7 @@ def stubbed(monkeypatch, compiler):
 
 @pytest.mark.long
 def test_a_failing_check_gives_status_1_and_the_page_is_written(stubbed, tmp_path):
-    finding = Finding("a.c", 3, "misra-c2012-15.1", "advisory", "MISRA C:2012 rule 15.1")
+    finding = CheckFinding("a.c", 3, "misra-c2012-15.1", "advisory", "MISRA C:2012 rule 15.1")
     failing = Check("cppcheck --addon=misra", "2.10", (), "failed", (finding,))
     stubbed.setattr(pipeline, "check_rules", lambda *_, **__: (failing,))
     out = tmp_path / "out"

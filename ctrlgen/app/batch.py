@@ -78,7 +78,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Row:
+class BatchRow:
     """One line of the table. `state`: "done", "done before" or "failed" (then `error` says why)."""
 
     name: str
@@ -150,7 +150,7 @@ def run_batch(
     scheduler: str | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
-) -> tuple[Row, ...]:
+) -> tuple[BatchRow, ...]:
     """Every diagnosis into its folder in `out`, and the table results.csv, which is kept up with every one.
 
     Where it runs is `ctrlgen.core.parallel`'s business; only this process writes. A diagnosis that fails is a row that says
@@ -162,7 +162,7 @@ def run_batch(
         try:
             made_from = task.made_from()
         except (InputError, OSError) as error:
-            rows[task.name] = Row(task.name, "failed", error=_one_line(str(error)))
+            rows[task.name] = BatchRow(task.name, "failed", error=_one_line(str(error)))
             continue
         if _is_there(out / task.name, made_from):
             rows[task.name] = _row(task.name, "done before", (out / task.name / "diagnosis.json").read_bytes())
@@ -188,10 +188,10 @@ def _work(task: Task) -> dict[str, bytes]:
     return task()
 
 
-def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Failure, out: Path) -> Row:
+def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Failure, out: Path) -> BatchRow:
     """The result written whole into its folder, as a row."""
     if isinstance(result, Failure):
-        return Row(task.name, "failed", error=_one_line(result.what))
+        return BatchRow(task.name, "failed", error=_one_line(result.what))
     try:
         with whole_folder(out / task.name) as draft:
             for name, content in result.items():
@@ -199,7 +199,7 @@ def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Fail
                 (draft / name).write_bytes(content)
             (draft / MADE_FROM).write_text(json.dumps(made_from, indent=1) + "\n", encoding="utf-8")
     except InputError as error:  # somebody else's files stand there
-        return Row(task.name, "failed", error=_one_line(str(error)))
+        return BatchRow(task.name, "failed", error=_one_line(str(error)))
     return _row(task.name, "done", result["diagnosis.json"])
 
 
@@ -210,7 +210,7 @@ def _is_there(folder: Path, made_from: dict[str, Any]) -> bool:
         return False
 
 
-def _row(name: str, state: str, content: bytes) -> Row:
+def _row(name: str, state: str, content: bytes) -> BatchRow:
     """A line of the table from a diagnosis.json: the channel whose error is largest beside its noise."""
     found = json.loads(content)
     causes = "; ".join(f"{f['effect']} at {f['location']}" for f in found["findings"])
@@ -220,7 +220,7 @@ def _row(name: str, state: str, content: bytes) -> Row:
         return (e["rms_before"] or 0.0) / (e["noise_floor"] or e["rms_after"] or 1.0)
 
     channel, e = max(found["held_out"].items(), key=size)
-    return Row(
+    return BatchRow(
         name, state, found["verdict"], causes, channel, e["rms_before"], e["rms_after"], e["noise_floor"], e["unit"]
     )  # fmt: skip
 
@@ -229,11 +229,11 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _write_table(tasks: Sequence[Task], rows: dict[str, Row], out: Path) -> None:
+def _write_table(tasks: Sequence[Task], rows: dict[str, BatchRow], out: Path) -> None:
     """results.csv: a line for every diagnosis that is done, was done before or failed."""
     text = io.StringIO()
     table = csv.DictWriter(
-        text, [f for f in Row.__dataclass_fields__ if f != "state"], lineterminator="\n", extrasaction="ignore"
+        text, [f for f in BatchRow.__dataclass_fields__ if f != "state"], lineterminator="\n", extrasaction="ignore"
     )
     table.writeheader()
     table.writerows(asdict(rows[task.name]) for task in tasks if task.name in rows)

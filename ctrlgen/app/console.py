@@ -22,11 +22,11 @@ from ctrlgen.reporting import report
 from ctrlgen.trajectory.metrics import in_unit
 
 if TYPE_CHECKING:
-    from ctrlgen.app.batch import Row
+    from ctrlgen.app.batch import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
     from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
     from ctrlgen.reporting.build_record import Build
-    from ctrlgen.reproduce.row import Row as Reproduced
+    from ctrlgen.reproduce.row import PrintedNumber
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
@@ -174,11 +174,15 @@ def print_diagnosis(found: Diagnosis) -> None:
         out.print(f"next: {step}", markup=False, soft_wrap=True)
 
 
-def print_reproduced(rows: Sequence[Reproduced]) -> None:
+def print_reproduced(rows: Sequence[PrintedNumber]) -> None:
     """Printed, ours, status and why, number by number."""
-    from ctrlgen.reproduce.row import Status
+    from ctrlgen.reproduce.row import ReproductionStatus
 
-    colours = {Status.REPRODUCED: "green", Status.DIFFERS: "red", Status.NOT_COMPUTABLE: "yellow"}
+    colours = {
+        ReproductionStatus.REPRODUCED: "green",
+        ReproductionStatus.DIFFERS: "red",
+        ReproductionStatus.NOT_COMPUTABLE: "yellow",
+    }
     table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
     for words in (table.columns[1], table.columns[-1]):
         words.no_wrap = False  # long words break; the numbers never make way for them
@@ -211,7 +215,7 @@ def print_bootstrap(found: Bootstrap) -> None:
         out.print(f"some failed: {reason}", markup=False, soft_wrap=True)
 
 
-def print_batch(rows: Sequence[Row]) -> None:
+def print_batch(rows: Sequence[BatchRow]) -> None:
     """One line a diagnosis, then what failed and why."""
     from ctrlgen.diagnosis.report.narrative import number
 

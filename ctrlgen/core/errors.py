@@ -41,7 +41,7 @@ class InputError(CtrlgenError):
 
 
 @dataclass(frozen=True)
-class Shortfall:
+class Infeasibility:
     """What keeps a trajectory from being followed: samples, and the nearest admissible trajectory."""
 
     samples: tuple[int, ...]
@@ -53,8 +53,8 @@ class Shortfall:
 class Unreachable(CtrlgenError):
     """No admissible drive produces the commanded trajectory."""
 
-    def __init__(self, message: str, shortfall: Shortfall) -> None:
-        self.shortfall = shortfall
+    def __init__(self, message: str, infeasibility: Infeasibility) -> None:
+        self.infeasibility = infeasibility
         super().__init__(message)
 
 

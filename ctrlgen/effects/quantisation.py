@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.effects import Effect, Param, Place
-from ctrlgen.numerics.quantisation_step import lattice
+from ctrlgen.numerics.quantisation_step import quantisation_step
 
 
 class Quantisation(Effect):
@@ -27,5 +27,5 @@ class Quantisation(Effect):
 
     @classmethod
     def read_off(cls, readings):
-        step = lattice(readings)
+        step = quantisation_step(readings)
         return ({"share": 1.0, "quantum": step}, step / np.sqrt(12.0)) if step else None

@@ -30,7 +30,7 @@ FINEST = 42  # 10^(-42/6) of a drive's range: below a float's rounding
 
 
 @dataclass(frozen=True)
-class Table:
+class SampleTable:
     """Every sample as solved, `drive` (samples, axes)."""
 
     drive: np.ndarray
@@ -60,7 +60,7 @@ class Table:
         return low + part.astype(low.dtype)[:, None] * (high - low)
 
 
-Curve = Table | Spline | Fourier
+Curve = SampleTable | Spline | Fourier
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _compress(
             curve.kind, _size(curve), curve.bytes(real), curve.operations, cost, length, angle, off, False, ""
         )
 
-    table = Table(np.clip(solution.drive, *bounds))
+    table = SampleTable(np.clip(solution.drive, *bounds))
     found: list[tuple[Curve | None, Candidate]] = [(table, measured(table))]
 
     def search(
@@ -194,7 +194,7 @@ def instructions(curve: Curve, limited: int) -> int:
 
     Fitted to the counts of an emulator for clang -O2, one to eight drives. Double takes a library there, or a Cortex-M7.
     """
-    if isinstance(curve, Table):
+    if isinstance(curve, SampleTable):
         return 20 + 2 * curve.drive.shape[1]
     if isinstance(curve, Spline):
         return round(45 + 12.5 * curve.axes + (SEARCH if len(curve.pieces) > 1 else 0) + 6 * limited)
@@ -244,7 +244,7 @@ def _none(kind: str, remark: str) -> Candidate:
 
 
 def _size(curve: Curve) -> str:
-    if isinstance(curve, Table):
+    if isinstance(curve, SampleTable):
         return f"{len(curve.drive)} rows"
     if isinstance(curve, Fourier):
         return f"{curve.harmonics} harmonic{'s' * (curve.harmonics > 1)}"
@@ -253,7 +253,7 @@ def _size(curve: Curve) -> str:
 
 
 def _samples(curve: Curve) -> int:
-    return len(curve.drive) if isinstance(curve, Table) else curve.samples
+    return len(curve.drive) if isinstance(curve, SampleTable) else curve.samples
 
 
 def _inward(model: Model, real: Real) -> tuple[np.ndarray, np.ndarray]:
@@ -272,7 +272,7 @@ def _kept(curve: Curve, bounds: tuple[np.ndarray, np.ndarray], real: Real) -> tu
     """The bounds that must be kept at run time: those that the curve's own extremes, with eight roundings, may pass; else infinite."""
     low, high = curve.extremes()
     slack = 8 * float(np.finfo(np.float32 if real is Real.FLOAT else np.float64).eps) * np.maximum(abs(low), abs(high))
-    if isinstance(curve, Table):
+    if isinstance(curve, SampleTable):
         slack = 0 * slack
     positive = (bounds[0] == 0) & (low >= 0) & isinstance(curve, Spline)  # a sum of products of none below zero
     keep_low, keep_high = (low - slack < bounds[0]) & ~positive, high + slack > bounds[1]

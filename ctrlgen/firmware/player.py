@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.firmware.compression import BUDGET, Candidate, Compression, Table
+from ctrlgen.firmware.compression import BUDGET, Candidate, Compression, SampleTable
 from ctrlgen.firmware.spline import Spline
 from ctrlgen.firmware.templates import comment
 from ctrlgen.trajectory.solution import Solution
@@ -26,7 +26,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
         "curve": curve,
-        "table": curve.drive if isinstance(curve, Table) else None,
+        "table": curve.drive if isinstance(curve, SampleTable) else None,
         "segments": [piece.segments for piece in pieces],
         "scales": [1 / (piece.stop - piece.start) for piece in pieces],
         "limited": limited if any(limited.values()) else None,

@@ -10,7 +10,7 @@ import numpy as np
 from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.online import FLOAT_SLACK
-from ctrlgen.model.feedforward import Controller, Status
+from ctrlgen.model.feedforward import Controller, ControllerStatus
 
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
 PLAYED = 17  # samples of the player
@@ -34,12 +34,12 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
         before, step = state, controller.step(state, target, settle=settle)
         state = step.state
         exact = (
-            not step.status & Status.DRIVE
+            not step.status & ControllerStatus.DRIVE
         )  # a bisection may turn the other way in float: only its status is compared
         rows.append(
             {"target": target, "drive": step.drive, "status": int(step.status), "settle": settle, "exact": exact}
         )
-        if exact and not step.status & Status.INPUT:
+        if exact and not step.status & ControllerStatus.INPUT:
             kernel = (controller.static if settle or controller.moving is None else controller.moving).drive
             reached = (step.displacement, step.actuator_state)
             off = kernel(*before, *(value * (1 + rounding) for value in reached)) - kernel(*before, *reached)

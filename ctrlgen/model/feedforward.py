@@ -28,7 +28,7 @@ SWEEPS = 3  # over the displacements, toward the nearest pose: 0.5 % farther at 
 NEGLIGIBLE = 1e-6  # of a limit: directions in which nothing comes near it
 
 
-class Status(IntFlag):
+class ControllerStatus(IntFlag):
     """What the controller had to do. 0: everything as commanded."""
 
     DISPLACEMENT = 1  # the target needs a displacement outside its range; the nearest target inside was taken
@@ -211,21 +211,25 @@ class Controller:
         def drive(wanted: np.ndarray, held: np.ndarray) -> np.ndarray:
             return _row(k.drive(x, z, wanted, held))
 
-        wanted, status = _row(k.displacement(x, z, target)), Status(0)
+        wanted, status = _row(k.displacement(x, z, target)), ControllerStatus(0)
         if not np.all((wanted >= z_low) & (wanted <= z_high)):  # not for NaN either
             if not np.all(np.abs(target) <= self.input_limits):
                 x_next = _row(k.advance(x, z, self.safe_drive))
                 return Step(
-                    Status.INPUT, z, x[:n], self.safe_drive, (x_next, _row(k.settle(x_next, z, self.safe_drive)))
+                    ControllerStatus.INPUT,
+                    z,
+                    x[:n],
+                    self.safe_drive,
+                    (x_next, _row(k.settle(x_next, z, self.safe_drive))),
                 )
             beyond = wanted
             wanted, hit = _clamp(beyond, z_low, z_high, z_slack)
             if hit:
                 wanted = _row(self.nearest(beyond))
-                status |= Status.DISPLACEMENT
+                status |= ControllerStatus.DISPLACEMENT
         held, hit = acting(wanted)
         if hit:
-            status |= Status.STATE
+            status |= ControllerStatus.STATE
             wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, self.safe_drive))
         if self.guarded_limits and (self.gauge is None or not float(self.gauge(wanted)) <= 1):
             first = ratio = float(self.composite_ratio(x, z, wanted))
@@ -234,10 +238,10 @@ class Controller:
                 ratio = float(self.composite_ratio(x, z, wanted)) if self.shrinks > 1 else 1.0
             if first > 1:
                 held, _ = acting(wanted)
-            status |= Status.COMPOSITE if first > 1 + self.slack else Status(0)
+            status |= ControllerStatus.COMPOSITE if first > 1 + self.slack else ControllerStatus(0)
         u, beyond = _clamp(drive(wanted, held), u_low, u_high, u_slack)
         if beyond:
-            status |= Status.DRIVE
+            status |= ControllerStatus.DRIVE
             origin = np.zeros_like(z) if settle or self.moving is None else z
             way = wanted - origin
             wanted = origin + self._share_of(lambda s: drive(origin + s * way, acting(origin + s * way)[0])) * way
@@ -274,7 +278,7 @@ class Controller:
 class Step:
     """One answer of the controller, SI: what it did, and the state it expects at the next sample."""
 
-    status: Status
+    status: ControllerStatus
     displacement: np.ndarray
     actuator_state: np.ndarray
     drive: np.ndarray

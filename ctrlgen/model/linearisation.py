@@ -7,7 +7,7 @@ import control
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.model.feedforward import Controller, Status
+from ctrlgen.model.feedforward import Controller, ControllerStatus
 from ctrlgen.model.model import Model
 
 
@@ -16,7 +16,7 @@ def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     controller = Controller(model, "pose", None)
     step = controller.step(controller.rest(), pose)
     if step.status:
-        broken = ", ".join(flag.name.lower() for flag in Status if flag in step.status and flag.name)
+        broken = ", ".join(flag.name.lower() for flag in ControllerStatus if flag in step.status and flag.name)
         raise InputError(
             "pose",
             [

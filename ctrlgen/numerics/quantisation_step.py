@@ -8,7 +8,7 @@ FEWEST = 200  # readings that a lattice is seen in
 OFF = 0.1  # of a step: how far a reading may lie from the lattice, for what was rounded again when it was written
 
 
-def lattice(values: np.ndarray) -> float:
+def quantisation_step(values: np.ndarray) -> float:
     """The step of which all differences of `values` are multiples; zero where there is none to be seen."""
     levels = np.unique(values[np.isfinite(values)])
     if len(values) < FEWEST or len(levels) < 2:

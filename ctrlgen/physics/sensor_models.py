@@ -158,7 +158,7 @@ class Interferometer:
 
 
 @dataclass(frozen=True)
-class Recording:
+class CalibrationRun:
     """Sensor and photodiode sampled together [V] at `rate` [Hz] while the target moved one way."""
 
     sensor: np.ndarray
@@ -189,7 +189,7 @@ class Slope:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class SensitivityStatistics:
     """Statistics of repeated recordings as in S2 Table A.1. Sensitivities in m/V."""
 
     slopes: tuple[Slope, ...]
@@ -232,11 +232,11 @@ def record(
     speed: float,
     rng: np.random.Generator,
     temperature: float | None = None,
-) -> Recording:
+) -> CalibrationRun:
     """One calibration run: the target moves `distance` [m] at `speed` [m/s] away from the sensor."""
     d = move(distance, speed, sensor.adc.rate)
     phase = replace(interferometer, phase=rng.uniform(0, 2 * pi))
-    return Recording(sensor.read(d, rng, temperature), phase.read(d, rng, sensor.adc), sensor.adc.rate)
+    return CalibrationRun(sensor.read(d, rng, temperature), phase.read(d, rng, sensor.adc), sensor.adc.rate)
 
 
 def find_fringes(photodiode: np.ndarray) -> Fringes:
@@ -263,7 +263,7 @@ def find_fringes(photodiode: np.ndarray) -> Fringes:
     return Fringes(at, int(np.sum(signs > 0)), int(np.sum(signs < 0)))
 
 
-def calibrate(recording: Recording, wavelength: float) -> Slope:
+def calibrate_sensor(recording: CalibrationRun, wavelength: float) -> Slope:
     """Sensitivity from one recording: sensor voltage at each extremum against the distance counted in fringes.
 
     Voltage is fitted on distance, since the voltage carries the noise. The uncertainty lets residuals be correlated
@@ -288,11 +288,11 @@ def calibrate(recording: Recording, wavelength: float) -> Slope:
     return Slope(sensitivity, spread * sensitivity**2, float(np.sqrt(residual @ residual / (residual.size - 2))))
 
 
-def calibrate_all(recordings: Sequence[Recording], wavelength: float) -> Calibration:
+def sensitivity_statistics(recordings: Sequence[CalibrationRun], wavelength: float) -> SensitivityStatistics:
     """Statistics over repeated recordings; at least two."""
     if len(recordings) < 2:
         raise ValueError("a standard deviation needs at least two recordings")
-    return Calibration(tuple(calibrate(recording, wavelength) for recording in recordings))
+    return SensitivityStatistics(tuple(calibrate_sensor(recording, wavelength) for recording in recordings))
 
 
 def low_pass(signal: np.ndarray, cutoff: float, rate: float, settled: bool = True) -> np.ndarray:

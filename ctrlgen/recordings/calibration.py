@@ -18,7 +18,7 @@ CONDITION_LIMIT = 1e6  # an input combination moved by a millionth of the larges
 
 
 @dataclass(frozen=True)
-class Calibration:
+class JacobianCalibration:
     """A calibrated Jacobian; SI.
 
     `jacobian` (channels, inputs); `covariance` of its entries row by row (`jacobian.ravel()`), None where as many poses
@@ -40,7 +40,7 @@ class Calibration:
         """Standard deviation of every entry of the Jacobian, (channels, inputs)."""
         return None if self.covariance is None else np.sqrt(np.diag(self.covariance)).reshape(self.jacobian.shape)
 
-    def moved(self, adjoint: np.ndarray) -> Calibration:
+    def moved(self, adjoint: np.ndarray) -> JacobianCalibration:
         """The same calibration for another point of the body: T' = [Ad] T. Source: S0 eq. (15)."""
 
         def twice(matrix: np.ndarray | None, factor: np.ndarray) -> np.ndarray | None:
@@ -57,9 +57,9 @@ class Calibration:
         )
 
 
-def calibrate(
+def calibrate_jacobian(
     inputs: np.ndarray, measured: np.ndarray, *, offset: bool = False, noise: np.ndarray | None = None
-) -> Calibration:
+) -> JacobianCalibration:
     """[J] = [T_1 .. T_n] [U_1 .. U_n]^+ by least squares; six poses of six inputs give S0 eq. (13) itself.
 
     `inputs` (n, inputs) [m], `measured` (n, channels) [rad, m]. `offset` also estimates the pose T_0 at zero input:
@@ -85,7 +85,7 @@ def calibrate(
     residuals = T - design @ solution.T
     if noise is None and n > unknowns:
         noise = residuals.T @ residuals / (n - unknowns)
-    return Calibration(
+    return JacobianCalibration(
         jacobian=solution[:, :k],
         covariance=None if noise is None else np.kron(noise, spread[:k, :k]),
         noise=noise,

@@ -29,7 +29,7 @@ MOST_FAULTS = 5  # bad cells of one column that are listed; the others are count
 
 
 @dataclass(frozen=True)
-class Table:
+class MeasurementTable:
     """Columns of one file by name: numbers (n,), or cells of text (CSV) that become numbers when asked for.
 
     `units` holds what the file itself says, where it does; `lines` the line of each row in a text file.
@@ -88,7 +88,7 @@ class Table:
         return InputError(self.path, [Fault(self.path.name, what)])
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> MeasurementTable:
     """The columns of a measurement file. Raises InputError: no such file, unknown or damaged format, missing package."""
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -107,7 +107,7 @@ def read_table(path: Path) -> Table:
         raise InputError(path, [Fault(path.name, what)]) from None
 
 
-def read_csv(path: Path) -> Table:
+def read_csv(path: Path) -> MeasurementTable:
     """Text separated by comma, semicolon or tab; a header unless row 1 is numbers; lines with # are left out."""
     text = read_text(path).removeprefix("\ufeff")
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
@@ -130,7 +130,7 @@ def read_csv(path: Path) -> Table:
     body = rows[header:]
     cells = list(zip(*(row for _, row in body), strict=True)) or [()] * width
     units = {name: match[1].strip() for name in names if (match := re.search(r"\[([^]]+)\]$", name))}
-    return Table(path, dict(zip(names, cells, strict=True)), units, tuple(line for line, _ in body))
+    return MeasurementTable(path, dict(zip(names, cells, strict=True)), units, tuple(line for line, _ in body))
 
 
 def _is_number(cell: str) -> bool:
@@ -141,21 +141,21 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def read_mat(path: Path) -> Table:
+def read_mat(path: Path) -> MeasurementTable:
     """Variables of a .mat file, structures flattened; 7.3, which is HDF5 with rows and columns exchanged, by h5py."""
     try:
         content = scipy.io.loadmat(path, simplify_cells=True)
     except NotImplementedError:
         return _read_h5(path, ".", turned=True)
-    return Table(path, dict(_flat({k: v for k, v in content.items() if not k.startswith("__")}, "")))
+    return MeasurementTable(path, dict(_flat({k: v for k, v in content.items() if not k.startswith("__")}, "")))
 
 
-def read_hdf5(path: Path) -> Table:
+def read_hdf5(path: Path) -> MeasurementTable:
     """Datasets by their path; the attribute `unit` or `units` says the unit."""
     return _read_h5(path, "/", turned=False)
 
 
-def _read_h5(path: Path, joint: str, turned: bool) -> Table:
+def _read_h5(path: Path, joint: str, turned: bool) -> MeasurementTable:
     h5py = _package("h5py", path)
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
@@ -173,10 +173,10 @@ def _read_h5(path: Path, joint: str, turned: bool) -> Table:
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)
-    return Table(path, columns, units)
+    return MeasurementTable(path, columns, units)
 
 
-def read_tdms(path: Path) -> Table:
+def read_tdms(path: Path) -> MeasurementTable:
     """Channels of LabVIEW's TDMS as `group/channel`; the property `unit_string` says the unit."""
     nptdms = _package("nptdms", path)
     columns, units = {}, {}
@@ -187,10 +187,10 @@ def read_tdms(path: Path) -> Table:
                     columns[name] = numbers
                     if channel.properties.get("unit_string"):
                         units[name] = str(channel.properties["unit_string"])
-    return Table(path, columns, units)
+    return MeasurementTable(path, columns, units)
 
 
-def read_mdf4(path: Path) -> Table:
+def read_mdf4(path: Path) -> MeasurementTable:
     """Channels of ASAM MDF; `time` is the master channel, and all channels must have the same one."""
     asammdf = _package("asammdf", path)
     columns, units, clocks = {}, {}, []
@@ -208,10 +208,10 @@ def read_mdf4(path: Path) -> Table:
         raise InputError(path, [Fault(path.name, what)])
     if clocks:
         columns = {"time": clocks[0], **{name: column for name, column in columns.items() if name != "time"}}
-    return Table(path, columns, {name: unit for name, unit in units.items() if unit})
+    return MeasurementTable(path, columns, {name: unit for name, unit in units.items() if unit})
 
 
-def read_json(path: Path) -> Table:
+def read_json(path: Path) -> MeasurementTable:
     """An object of lists, a list of row objects, or a matrix (list of rows) under a name; null is a missing number."""
     content = json.loads(read_text(path))
     if isinstance(content, list):
@@ -220,7 +220,7 @@ def read_json(path: Path) -> Table:
             content = {name: [row.get(name) for row in content] for name in names}
         else:
             content = {"data": content}
-    return Table(path, dict(_flat(content, "")))
+    return MeasurementTable(path, dict(_flat(content, "")))
 
 
 def _flat(value: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
@@ -252,7 +252,7 @@ def _package(name: str, path: Path) -> ModuleType:
         raise InputError(path, [Fault(path.name, what)]) from None
 
 
-READERS: dict[str, Callable[[Path], Table]] = {
+READERS: dict[str, Callable[[Path], MeasurementTable]] = {
     ".csv": read_csv, ".mat": read_mat, ".h5": read_hdf5, ".hdf5": read_hdf5, ".tdms": read_tdms, ".mf4": read_mdf4,
     ".json": read_json,
 }  # fmt: skip

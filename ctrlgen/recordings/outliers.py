@@ -14,7 +14,7 @@ STUCK = 8  # equal samples in a row
 RAIL_RUN = 5  # equal samples in a row at the end of the range
 
 
-def spikes(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
+def outliers(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
     """Where one channel `observed` (n,) leaves for at most three samples and comes back: (n,) bool.
 
     A stretch of w = 1, 2 or 3 samples is a spike where every one of them stands off the chord between the samples
@@ -83,7 +83,7 @@ def quantum(y: np.ndarray) -> float:
     return float(step.min()) if len(step) else 0.0
 
 
-def stuck(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
+def stuck_samples(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
     """Where one channel `observed` (n,) repeats itself to the last bit although it should not: (n,) bool.
 
     A stretch of eight equal samples or more counts where the channel is seen to be noisy with the drive at rest, or,

@@ -16,7 +16,7 @@ BOX = (5.0, 95.0)  # percentiles: the boxes of S0 Figs. 7 and 8 hold 90 % of the
 
 
 @dataclass(frozen=True)
-class Summary:
+class ErrorStatistics:
     """Statistics over poses: a number for a norm, or one number a channel; SI. `sd` divides by n - 1."""
 
     maximum: np.ndarray
@@ -46,14 +46,14 @@ class PoseErrors:
         return np.linalg.norm(self.errors[:, 3:], axis=1)
 
     @property
-    def signed(self) -> Summary:
+    def signed(self) -> ErrorStatistics:
         """Of the errors, channel by channel."""
-        return summarise(self.errors)
+        return error_statistics(self.errors)
 
     @property
-    def absolute(self) -> Summary:
+    def absolute(self) -> ErrorStatistics:
         """Of the absolute errors, channel by channel."""
-        return summarise(np.abs(self.errors))
+        return error_statistics(np.abs(self.errors))
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Repeatability:
 
 
 @dataclass(frozen=True)
-class Drift:
+class PoseDrift:
     """Errors fitted by level + slope * (order - mean order): `slope` (6,) per pose, `level` (6,), and their `sd`s."""
 
     slope: np.ndarray
@@ -105,9 +105,9 @@ class Opposites:
     even: np.ndarray
 
 
-def summarise(values: np.ndarray) -> Summary:
+def error_statistics(values: np.ndarray) -> ErrorStatistics:
     """Statistics over the rows (poses) of `values`."""
-    return Summary(values.max(0), values.min(0), values.mean(0), values.std(0, ddof=1))
+    return ErrorStatistics(values.max(0), values.min(0), values.mean(0), values.std(0, ddof=1))
 
 
 def pose_errors(measured: np.ndarray, expected: np.ndarray) -> PoseErrors:
@@ -151,7 +151,7 @@ def repeatability(commanded: np.ndarray, measured: np.ndarray) -> Repeatability:
     return Repeatability(tuple(tuple(map(int, group)) for group in groups), np.sqrt(squares / freedom))
 
 
-def drift(errors: np.ndarray) -> Drift:
+def pose_drift(errors: np.ndarray) -> PoseDrift:
     """Least-squares line through the errors in order of measurement; `errors` (n, 6), n >= 3.
 
     Errors that depend on the command (a wrong Jacobian) pass for drift where the order of the commands does: fit
@@ -164,7 +164,7 @@ def drift(errors: np.ndarray) -> Drift:
     level, slope = errors.mean(0), order @ errors / (order @ order)
     residual = errors - level - np.outer(order, slope)
     noise = np.sqrt((residual**2).sum(0) / (n - 2))
-    return Drift(slope, noise / np.sqrt(order @ order), level, noise / np.sqrt(n))
+    return PoseDrift(slope, noise / np.sqrt(order @ order), level, noise / np.sqrt(n))
 
 
 def opposites(commanded: np.ndarray, measured: np.ndarray) -> Opposites:

@@ -17,7 +17,7 @@ from ctrlgen.core.files import read_toml, validate
 from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings import preprocessing, validation
-from ctrlgen.recordings.formats import Table, read_table
+from ctrlgen.recordings.formats import MeasurementTable, read_table
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits
 
@@ -48,11 +48,11 @@ def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
     faults = [fault for *_, found in judged for fault in found]
     records = [record for found, *_ in judged for record in found]
     if not faults:
-        faults = validation.compare([record for _, record in records], [where for where, _ in records], names)
+        faults = validation.compare_records([record for _, record in records], [where for where, _ in records], names)
     parts = (
-        validation.hold_out([record for _, record in records], read[0].written.kind)
+        validation.with_hold_out([record for _, record in records], read[0].written.kind)
         if not faults
-        else validation.Judged()
+        else validation.Validated()
     )
     if faults or parts.faults:
         raise InputError(source, [*faults, *parts.faults])
@@ -69,9 +69,9 @@ def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
     )
 
 
-def _names(model: Model, channels: tuple[str, ...], units: tuple[str, ...]) -> validation.Names:
+def _names(model: Model, channels: tuple[str, ...], units: tuple[str, ...]) -> validation.ChannelNames:
     drive = model.signals["drive"]
-    return validation.Names(tuple(f"drive.{c}" for c in drive.channels), drive.units, channels, units)
+    return validation.ChannelNames(tuple(f"drive.{c}" for c in drive.channels), drive.units, channels, units)
 
 
 def _noise(
@@ -121,7 +121,7 @@ class _File:
             if raw is None:
                 continue
             raw = replace(raw, name=f"{self.path.resolve().parent.name}/{raw.name}") if self.prefix else raw
-            found = validation.examine(raw, self.written.kind, self.model, names, where)
+            found = validation.validate_record(raw, self.written.kind, self.model, names, where)
             records += [(where, piece) for piece in found.records]
             notes += found.notes
             faults += found.faults
@@ -152,9 +152,9 @@ class _Reader:
     ) -> None:
         self.folder, self.written, self.record, self.columns, self.where = folder, written, record, columns, where
         self.faults: list[Fault] = []
-        self.tables: dict[str, Table | None] = {}
+        self.tables: dict[str, MeasurementTable | None] = {}
 
-    def read(self, names: validation.Names) -> Record | None:
+    def read(self, names: validation.ChannelNames) -> Record | None:
         """The record before any judgement; None where drives or clock cannot be read. `valid`: the channel was read."""
         r, kind = self.record, self.written.kind
         read = {name: self._column(f"{self.where}.columns.{name!r}", column) for name, column in self.columns.items()}
@@ -223,7 +223,7 @@ class _Reader:
 
     def _record(
         self,
-        names: validation.Names,
+        names: validation.ChannelNames,
         values: dict[str, np.ndarray],
         time: np.ndarray,
         period: float,

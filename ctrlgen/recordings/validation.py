@@ -17,7 +17,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.model import Model
-from ctrlgen.recordings.outliers import spikes, stuck
+from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
 
 JITTER = 0.01  # of the sample time, rms
@@ -31,7 +31,7 @@ RESTLESS = 0.01  # of the drive's range: more is no rest
 
 
 @dataclass(frozen=True)
-class Names:
+class ChannelNames:
     """What a reader calls things: the drives and observed channels of a record, and their units."""
 
     drives: tuple[str, ...]
@@ -41,7 +41,7 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Judged:
+class Validated:
     """What became of a record: its usable stretches, what was marked, why it is refused."""
 
     records: tuple[Record, ...] = ()
@@ -49,7 +49,7 @@ class Judged:
     faults: tuple[Fault, ...] = ()
 
 
-def examine(record: Record, kind: str, model: Model, names: Names, where: str) -> Judged:
+def validate_record(record: Record, kind: str, model: Model, names: ChannelNames, where: str) -> Validated:
     """One record as read -> its stretches without a break, each sample marked.
 
     `record.valid` says which channels it has columns for; `where` is its place in recording.toml.
@@ -68,7 +68,7 @@ def examine(record: Record, kind: str, model: Model, names: Names, where: str) -
                 faults = [Fault(where, f"{record.name}: {notes[-1]} Nothing is left; record without gaps")]
     faults = faults or _nothing_happens(record, where)
     if faults:
-        return Judged(faults=tuple(faults))
+        return Validated(faults=tuple(faults))
     if record.role != "rest" and (record.drive == record.drive[0]).all():
         notes.append(f"{record.name}: no drive moves; what the reading does is drift, noise, or what came before.")
     marked = []
@@ -76,10 +76,10 @@ def examine(record: Record, kind: str, model: Model, names: Names, where: str) -
         piece, said = _mark(piece, kind, names, spoken)
         marked.append(piece)
         notes += said
-    return Judged(tuple(marked), tuple(notes))
+    return Validated(tuple(marked), tuple(notes))
 
 
-def _empty(record: Record, kind: str, names: Names, where: str, spoken: np.ndarray) -> list[Fault]:
+def _empty(record: Record, kind: str, names: ChannelNames, where: str, spoken: np.ndarray) -> list[Fault]:
     """Faults of channels without numbers and of records too short."""
     n = len(record.drive)
     if n < SHORTEST[kind]:
@@ -107,7 +107,7 @@ def _empty(record: Record, kind: str, names: Names, where: str, spoken: np.ndarr
     return faults
 
 
-def _beyond_limits(record: Record, kind: str, model: Model, names: Names, where: str) -> list[Fault]:
+def _beyond_limits(record: Record, kind: str, model: Model, names: ChannelNames, where: str) -> list[Fault]:
     """Drives that the device's own limits exclude: a wrong unit, sign or device."""
     faults = []
     for i, (low, high) in enumerate(zip(*model.u_bounds, strict=True)):
@@ -248,7 +248,7 @@ def _bridge(before: Record, after: Record) -> Record | None:
     )
 
 
-def _mark(record: Record, kind: str, names: Names, spoken: np.ndarray) -> tuple[Record, list[str]]:
+def _mark(record: Record, kind: str, names: ChannelNames, spoken: np.ndarray) -> tuple[Record, list[str]]:
     """Spikes and stuck stretches made NaN and invalid; a sentence for each kind of mark and for dead channels."""
     observed, valid, notes = record.observed.copy(), record.valid.copy(), []
     for i, name in enumerate(names.observed):
@@ -262,9 +262,9 @@ def _mark(record: Record, kind: str, names: Names, spoken: np.ndarray) -> tuple[
             if record.role != "rest":
                 notes.append(f"{title}: {reads}; a dead channel?")
         elif kind == "series":
-            frozen = stuck(y, record.drive)
+            frozen = stuck_samples(y, record.drive)
             found["in stretches that repeat themselves to the last bit (stuck or clipped)"] = frozen
-            found["spikes"] = spikes(np.where(frozen, np.nan, y), record.drive)
+            found["spikes"] = outliers(np.where(frozen, np.nan, y), record.drive)
         for what, where in found.items():
             if where.any():
                 first = f"{record.time[where.argmax()]:.6g} s" if kind == "series" else f"row {where.argmax()}"
@@ -274,7 +274,7 @@ def _mark(record: Record, kind: str, names: Names, spoken: np.ndarray) -> tuple[
     return replace(record, observed=observed, valid=valid), notes
 
 
-def compare(records: Sequence[Record], wheres: Sequence[str], names: Names) -> list[Fault]:
+def compare_records(records: Sequence[Record], wheres: Sequence[str], names: ChannelNames) -> list[Fault]:
     """Faults between records: rest that moves, and held-out data that were fitted. `wheres` are their places."""
     faults = []
     span = np.max([np.nanmax(r.drive, 0) for r in records], 0) - np.min([np.nanmin(r.drive, 0) for r in records], 0)
@@ -302,7 +302,7 @@ def _repeats(held: Record, fitted: Record) -> bool:
     return bool(telling) and 2 * sum(block in text for block in telling) > len(telling)
 
 
-def hold_out(records: Sequence[Record], kind: str) -> Judged:
+def with_hold_out(records: Sequence[Record], kind: str) -> Validated:
     """The records with a held-out part: as given, else the end of the longest series, or every third of its poses.
 
     Held-out poses keep their place: both parts have every row, with the other part's samples marked not valid, so that
@@ -310,16 +310,16 @@ def hold_out(records: Sequence[Record], kind: str) -> Judged:
     """
     fits = [record for record in records if record.role == "fit"]
     if not fits:
-        return Judged(faults=(Fault("record", 'has none with role = "fit"; there is nothing to learn from'),))
+        return Validated(faults=(Fault("record", 'has none with role = "fit"; there is nothing to learn from'),))
     if any(record.role == "hold_out" for record in records):
-        return Judged(tuple(records))
+        return Validated(tuple(records))
     longest = max(fits, key=lambda record: len(record.time))
     n, least = len(longest.time), DIVISIBLE[kind]
     if n < least:
         what = (
             f'has none with role = "hold_out", and {longest.name} is too short to divide ({n} rows, {least} are needed)'
         )
-        return Judged(faults=(Fault("record", f"{what}; record a second run"),))
+        return Validated(faults=(Fault("record", f"{what}; record a second run"),))
     if kind == "series":
         cut = round((1 - HELD_OUT) * n)
         parts = (_rows(longest, 0, cut), replace(_rows(longest, cut, n), role="hold_out"))
@@ -339,7 +339,7 @@ def hold_out(records: Sequence[Record], kind: str) -> Judged:
         if still
         else ()
     )
-    return Judged(tuple(p for r in records for p in (parts if r is longest else (r,))), (note, *rests))
+    return Validated(tuple(p for r in records for p in (parts if r is longest else (r,))), (note, *rests))
 
 
 def _only(record: Record, rows: np.ndarray) -> Record:

@@ -12,7 +12,7 @@ from ctrlgen.core.units import base_unit, from_si, show
 from ctrlgen.firmware.compression import BUDGET
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.model.feedforward import Controller, Status
+from ctrlgen.model.feedforward import Controller, ControllerStatus
 from ctrlgen.reporting.report import passed, summary
 from ctrlgen.trajectory.metrics import Expected
 from ctrlgen.trajectory.solution import Solution
@@ -23,11 +23,11 @@ from ctrlgen.verification.in_loop import InLoop, Stopped, TargetRun
 BUDGET_CORE, BUDGET_DRIVES = "Cortex-M4F", 6  # what the budgets are stated for
 BUDGETS = {"scenario": 700, "worst": 6000, "player": BUDGET}  # instructions of one sample; goals, not conditions
 STATUS_WORDS = {
-    Status.DISPLACEMENT: "displacement beyond its range: the nearest target inside was taken",
-    Status.COMPOSITE: "a limit of several channels, such as a stress: displacement shrunk toward home",
-    Status.STATE: "actuator state held at its limit",
-    Status.DRIVE: "drive at its limit: as far toward the target as it reaches in one sample",
-    Status.INPUT: "target is no number, or absurd: safe drives",
+    ControllerStatus.DISPLACEMENT: "displacement beyond its range: the nearest target inside was taken",
+    ControllerStatus.COMPOSITE: "a limit of several channels, such as a stress: displacement shrunk toward home",
+    ControllerStatus.STATE: "actuator state held at its limit",
+    ControllerStatus.DRIVE: "drive at its limit: as far toward the target as it reaches in one sample",
+    ControllerStatus.INPUT: "target is no number, or absurd: safe drives",
 }
 
 
@@ -132,9 +132,9 @@ def interface(build: Build) -> dict[str, Any]:
         return [f"{c} [{base_unit(u)}]" for c, u in zip(signal.channels, signal.units, strict=True)]
 
     possible = [
-        s for s in Status
-        if not (s is Status.COMPOSITE and not controller.guarded_limits)
-        and not (s is Status.STATE and not controller.state_can_be_limited)
+        s for s in ControllerStatus
+        if not (s is ControllerStatus.COMPOSITE and not controller.guarded_limits)
+        and not (s is ControllerStatus.STATE and not controller.state_can_be_limited)
     ]  # fmt: skip
     return {
         "functions": {real.value: _functions(build, build.c.online[real], build.c.player.get(real)) for real in build.c.online},

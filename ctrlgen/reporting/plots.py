@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from ctrlgen.core.units import from_si
-from ctrlgen.trajectory.infeasibility import REACHED
+from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.workspace import Ball, Workspace
@@ -87,7 +87,7 @@ def draw_path(solution: Solution) -> Figure:
     left.set_xlabel(f"{signal.channels[first]} [um]")
     left.set_ylabel(f"{signal.channels[second]} [um]")
     left.legend(loc="center", fontsize=8)
-    time, tolerance = solution.trace.time, from_si(REACHED * signal.scale[lengths[0]], "nm")
+    time, tolerance = solution.trace.time, from_si(FEASIBILITY_TOLERANCE * signal.scale[lengths[0]], "nm")
     for i, colour in zip(lengths, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
         right.plot(
             time, from_si(reached[:, i] - command[:, i], "um") * 1e3, color=colour, lw=1, label=signal.channels[i]

@@ -14,13 +14,13 @@ from ctrlgen.model.model import build_model
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import STYLE, draw_path, draw_signal, draw_stage_force, svg
 from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
-from ctrlgen.reproduce.row import Row
+from ctrlgen.reproduce.row import PrintedNumber
 from ctrlgen.reproduce.s0_data import SCENARIOS
 from ctrlgen.trajectory.scenario import load_scenario
 from ctrlgen.trajectory.solution import solve
 
 
-def _s3_rows() -> list[Row]:
+def _s3_rows() -> list[PrintedNumber]:
     return [*s3.rows(), *s3_hinges.rows()]
 
 
@@ -57,12 +57,12 @@ def _s3_figures() -> dict[str, str]:
 FIGURES = {"S0": s0_figures.figures, "S1": _s1_figures, "S2": s2_figures.figures, "S3": _s3_figures}
 
 
-def reproduce(sources: list[str]) -> list[Row]:
+def reproduce(sources: list[str]) -> list[PrintedNumber]:
     """Rows of the named sources, in the order of the papers."""
     return [row for name in sources for row in SOURCES[name]()]
 
 
-def as_json(rows: list[Row]) -> list[dict[str, Any]]:
+def as_json(rows: list[PrintedNumber]) -> list[dict[str, Any]]:
     """A list of plain rows: source, where, printed, ours, difference, unit, status, reason."""
     return [
         {
@@ -73,12 +73,12 @@ def as_json(rows: list[Row]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def counts(rows: list[Row]) -> Counter[tuple[str, str]]:
+def counts(rows: list[PrintedNumber]) -> Counter[tuple[str, str]]:
     """How many rows of each (source, status)."""
     return Counter((row.source, row.status.value) for row in rows)
 
 
-def write_page(rows: list[Row], path: Path) -> None:
+def write_page(rows: list[PrintedNumber], path: Path) -> None:
     """One self-contained HTML page: counts, the figures redrawn from our own results, and every row."""
     sources = list(dict.fromkeys(row.source for row in rows))
     figures = {source: FIGURES[source]() for source in sources if source in FIGURES}

@@ -8,7 +8,7 @@ from decimal import Decimal
 from enum import Enum
 
 
-class Status(Enum):
+class ReproductionStatus(Enum):
     """What became of a printed number."""
 
     REPRODUCED = "reproduced"
@@ -17,7 +17,7 @@ class Status(Enum):
 
 
 @dataclass(frozen=True)
-class Row:
+class PrintedNumber:
     """`source` such as 'S3', `where` such as 'Table 4, case 1, C_oFin (1,2)', `printed` the text as printed, `unit`.
 
     `ours` is None where it cannot be computed. `tolerance` is half a unit of the last printed digit
@@ -48,16 +48,16 @@ class Row:
         return None if self.ours is None else self.ours - self.value
 
     @property
-    def status(self) -> Status:
+    def status(self) -> ReproductionStatus:
         """Reproduced within what the print can tell; not a number never is."""
         if self.ours is None:
-            return Status.NOT_COMPUTABLE
+            return ReproductionStatus.NOT_COMPUTABLE
         close = math.isfinite(self.ours) and abs(self.ours - self.value) <= self.allowed * (1 + 1e-9)
-        return Status.REPRODUCED if close else Status.DIFFERS
+        return ReproductionStatus.REPRODUCED if close else ReproductionStatus.DIFFERS
 
-    def settled(self) -> Row:
+    def settled(self) -> PrintedNumber:
         """This row without its reason where the print is reproduced after all."""
-        return replace(self, reason="") if self.status is Status.REPRODUCED else self
+        return replace(self, reason="") if self.status is ReproductionStatus.REPRODUCED else self
 
 
 def half_unit(printed: str) -> float:

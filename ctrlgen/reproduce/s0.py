@@ -18,8 +18,8 @@ from ctrlgen.devices.meso_hexapod import MesoHexapod
 from ctrlgen.physics import meso_hexapod
 from ctrlgen.recordings.pose_errors import CHANNELS, parasitic, pose_errors
 from ctrlgen.reproduce.rounding import carried, half_units
-from ctrlgen.reproduce.row import Row, half_unit
-from ctrlgen.reproduce.s0_data import Recordings, load_s0
+from ctrlgen.reproduce.row import PrintedNumber, half_unit
+from ctrlgen.reproduce.s0_data import PaperRecordings, load_s0
 
 UNITS = ("deg",) * 3 + ("um",) * 3
 SCALE = np.array([to_si(1.0, unit) for unit in UNITS])
@@ -71,7 +71,7 @@ EXTREMES = (
 )
 
 
-def rows(device: MesoHexapod | None = None) -> list[Row]:
+def rows(device: MesoHexapod | None = None) -> list[PrintedNumber]:
     """One row a printed number, in the order of the paper; `device` replaces the one printed."""
     printed, recordings = load_s0()
     used = device or printed
@@ -81,7 +81,7 @@ def rows(device: MesoHexapod | None = None) -> list[Row]:
     ]  # fmt: skip
 
 
-def _table_1(device: MesoHexapod) -> list[Row]:
+def _table_1(device: MesoHexapod) -> list[PrintedNumber]:
     """Lengths and angles of Table 1 from one another: struts, spacings, and radii and angles back from spacings."""
     h = device.values().hexapod
     found = []
@@ -126,7 +126,7 @@ def _with(values: Any, **changes: Any) -> Any:
     return type(values)(**{**vars(values), **changes})
 
 
-def _unit_motions(data: Recordings, kinematic: np.ndarray) -> np.ndarray:
+def _unit_motions(data: PaperRecordings, kinematic: np.ndarray) -> np.ndarray:
     """K = [J^k] [J^c]^-1 from Table 4: its kinematic poses are K times the commands; (6, 6) in SI.
 
     Each number counts as much as its print resolves: 3.70E-04 is a thousand times sharper than 1.03E-01. Only
@@ -141,7 +141,7 @@ def _unit_motions(data: Recordings, kinematic: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-def _table_2(device: MesoHexapod, data: Recordings) -> list[Row]:
+def _table_2(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumber]:
     """The cube's motion from Table 4: its kinematic lines are [J^k] [J^c]^-1 T, the inverse of what Table 2 measured."""
     back = ca.DM(meso_hexapod.cube_to_platform(-device.cube.depth.si)).full()
 
@@ -161,7 +161,7 @@ def _table_2(device: MesoHexapod, data: Recordings) -> list[Row]:
     ]
 
 
-def _equation_14(device: MesoHexapod, data: Recordings) -> list[Row]:
+def _equation_14(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumber]:
     """[J_cube] by eq. (11) and (13): the motions of Table 2 over the inputs the device's own Jacobian asks for."""
     p = device.values()
     J_k = ca.DM(meso_hexapod.kinematic_jacobian(p.hexapod, p.directions.jacobian))
@@ -185,7 +185,7 @@ def _equation_14(device: MesoHexapod, data: Recordings) -> list[Row]:
     return found
 
 
-def _equation_16(data: Recordings) -> list[Row]:
+def _equation_16(data: PaperRecordings) -> list[PrintedNumber]:
     """h: the depth that carries the cube's translations of Table 2 over to the platform's of Table 4."""
     table = np.array(TABLE_2.split(), dtype=float).reshape(6, 6)
 
@@ -203,14 +203,14 @@ def _equation_16(data: Recordings) -> list[Row]:
     return [_row("Eq. (16), h", "31.57", "mm", depth(numbers)[0], extra=extra, reason=reason)]
 
 
-def _counts(data: Recordings) -> list[Row]:
+def _counts(data: PaperRecordings) -> list[PrintedNumber]:
     single = sum(len(part.poses) for part in parasitic(data.commanded, data.measured))
     n = len(data.commanded)
     named = (("poses", "54", n), ("poses in one degree of freedom", "24", single), ("coupled poses", "30", n - single))
     return [_row(f"Section 5.1, {name}", text, "1", float(count)) for name, text, count in named]
 
 
-def _statistics(data: Recordings, numbers: np.ndarray) -> np.ndarray:
+def _statistics(data: PaperRecordings, numbers: np.ndarray) -> np.ndarray:
     """The 8 NORMS, the 10 EXTREMES and the 18 entries of Table 3, in deg and um, from printed numbers."""
     measured, kinematic = numbers.reshape(2, -1, 6)
     commanded = data.commanded / SCALE
@@ -229,13 +229,13 @@ def _statistics(data: Recordings, numbers: np.ndarray) -> np.ndarray:
     return np.concatenate([norms, extremes, calibrated.signed.maximum, calibrated.signed.minimum, sd])
 
 
-def _section_5(data: Recordings) -> tuple[np.ndarray, np.ndarray]:
+def _section_5(data: PaperRecordings) -> tuple[np.ndarray, np.ndarray]:
     printed = np.concatenate([data.measured / SCALE, data.kinematic / SCALE]).ravel()
     half = half_units(printed, DIGITS)
     return _statistics(data, printed), carried(lambda numbers: _statistics(data, numbers), printed, half)
 
 
-def _norms(data: Recordings) -> list[Row]:
+def _norms(data: PaperRecordings) -> list[PrintedNumber]:
     ours, extra = _section_5(data)
     named = [(f"section 5.2, {name}", text, unit) for name, text, unit in NORMS] + list(EXTREMES)
     return [
@@ -244,7 +244,7 @@ def _norms(data: Recordings) -> list[Row]:
     ]
 
 
-def _table_3(data: Recordings) -> list[Row]:
+def _table_3(data: PaperRecordings) -> list[PrintedNumber]:
     ours, extra = _section_5(data)
     start = len(NORMS) + len(EXTREMES)
     found = []
@@ -257,7 +257,7 @@ def _table_3(data: Recordings) -> list[Row]:
     return found
 
 
-def _table_4(device: MesoHexapod, data: Recordings) -> list[Row]:
+def _table_4(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumber]:
     """The kinematic model's 54 poses [J^k] U_j, with U_j = [J^c]^-1 T_j as well known as eq. (14) prints [J_cube]."""
     p = device.values()
     J_k = ca.DM(meso_hexapod.kinematic_jacobian(p.hexapod, p.directions.jacobian)).full()
@@ -279,9 +279,9 @@ def _table_4(device: MesoHexapod, data: Recordings) -> list[Row]:
     return found
 
 
-def _row(where: str, printed: str, unit: str, ours: float, *, extra: float = 0.0, reason: str = "") -> Row:
+def _row(where: str, printed: str, unit: str, ours: float, *, extra: float = 0.0, reason: str = "") -> PrintedNumber:
     """A row; `extra` is what rounded data add to half a unit of the print. The reason stands where it is needed."""
     tolerance = half_unit(printed) + extra if extra else None
-    row = Row("S0", where, printed, unit, float(ours), reason, tolerance)
+    row = PrintedNumber("S0", where, printed, unit, float(ours), reason, tolerance)
     needed = extra or abs(row.difference or 0.0) > row.allowed * (1 + 1e-9)
-    return row if needed else Row("S0", where, printed, unit, float(ours))
+    return row if needed else PrintedNumber("S0", where, printed, unit, float(ours))

@@ -24,7 +24,7 @@ FRAME = Frame(CHANNELS, ("rad",) * 3 + ("um",) * 3)
 
 
 @dataclass(frozen=True)
-class Recordings:
+class PaperRecordings:
     """54 poses, rows (theta, delta) [rad, m], and the actuator inputs U_j = [J^c]^-1 T_j [m], (54, 6).
 
     `J_cube` and `J_c` = [Ad] [J_cube] (6, 6) [rad/m, 1] are the paper's calibrated Jacobians of cube and platform.
@@ -38,7 +38,7 @@ class Recordings:
     inputs: np.ndarray
 
 
-def load_recordings(device: MesoHexapod, folder: Path = SCENARIOS / "nist_hexapod") -> Recordings:
+def load_paper_recordings(device: MesoHexapod, folder: Path = SCENARIOS / "nist_hexapod") -> PaperRecordings:
     """The four files of `folder`; the depth of the cube is the device's."""
     commanded, kinematic, measured = (
         read_poses(folder / f"{name}.csv", FRAME) for name in ("commanded", "kinematic_model", "measured")
@@ -46,7 +46,7 @@ def load_recordings(device: MesoHexapod, folder: Path = SCENARIOS / "nist_hexapo
     J_cube = read_jacobian(folder / "J_cube.csv", device.axes)
     J_c = ca.DM(meso_hexapod.cube_to_platform(device.cube.depth.si)).full() @ J_cube
     inputs = meso_hexapod.commands(ca.DM(J_c), ca.DM(commanded.T)).full().T
-    return Recordings(commanded, kinematic, measured, J_cube, J_c, inputs)
+    return PaperRecordings(commanded, kinematic, measured, J_cube, J_c, inputs)
 
 
 def read_jacobian(path: Path, axes: tuple[str, ...]) -> np.ndarray:
@@ -69,8 +69,8 @@ def read_jacobian(path: Path, axes: tuple[str, ...]) -> np.ndarray:
     return np.array(values)
 
 
-def load_s0(scenarios: Path = SCENARIOS) -> tuple[MesoHexapod, Recordings]:
+def load_s0(scenarios: Path = SCENARIOS) -> tuple[MesoHexapod, PaperRecordings]:
     """The device as printed and the paper's recordings."""
     device = load_device(scenarios / "devices" / "meso_hexapod.toml")
     assert isinstance(device, MesoHexapod)
-    return device, load_recordings(device, scenarios / "nist_hexapod")
+    return device, load_paper_recordings(device, scenarios / "nist_hexapod")

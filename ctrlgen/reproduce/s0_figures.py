@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 from ctrlgen.core.units import from_si
 from ctrlgen.recordings.pose_errors import BOX, CHANNELS, Parasitic, PoseErrors, parasitic, pose_errors
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
-from ctrlgen.reproduce.s0_data import Recordings, load_s0
+from ctrlgen.reproduce.s0_data import PaperRecordings, load_s0
 
 BLUE, RED = COLOURS[0], COLOURS[2]
 PARTS = {"rotation": (slice(0, 3), "deg"), "translation": (slice(3, 6), "um")}
 
 
-def figures(recordings: Recordings | None = None) -> dict[str, str]:
+def figures(recordings: PaperRecordings | None = None) -> dict[str, str]:
     """Name -> SVG text. The calibrated model expects the command, the kinematic one its line of Table 4."""
     data = recordings or load_s0()[1]
     model = pose_errors(data.measured, data.kinematic)

@@ -12,7 +12,7 @@ from ctrlgen.devices.mems_hexapod import MemsHexapod, matrices
 from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.model import Model, build_model
 from ctrlgen.physics import hexapod, xy_stage
-from ctrlgen.reproduce.row import Row, half_unit
+from ctrlgen.reproduce.row import PrintedNumber, half_unit
 from ctrlgen.trajectory.workspace import Workspace
 
 DEVICE = Path(__file__).resolve().parents[2] / "scenarios" / "devices" / "mems_hexapod.toml"
@@ -35,7 +35,7 @@ SIGNS_19 = ("-1", "-1", "-1", "1", "1", "1")  # F <= 0 or F >= 0, in the order o
 NO_PLANT = "compares with the paper's own finite elements; an independent plant answers this: python -m plants"
 
 
-def rows() -> list[Row]:
+def rows() -> list[PrintedNumber]:
     """Every number of S1 that is printed, with what the program makes of it."""
     device = cast(MemsHexapod, load_device(DEVICE))
     return [*_matrices(device), *_geometry(device), *_force(device), *_signs(device), *_table_3(device), *_circle()]
@@ -46,7 +46,7 @@ def _in_micrometres(matrix: np.ndarray, row: int, column: int) -> float:
     return float(matrix[row - 1, column - 1]) * (1e6 if row > 3 else 1.0) * (1e-6 if column > 3 else 1.0)
 
 
-def _matrices(device: MemsHexapod) -> list[Row]:
+def _matrices(device: MemsHexapod) -> list[PrintedNumber]:
     found, result = matrices(device), []
     for symbol, equation, table in (("K_tb", "eq. (5)", K_TB), ("K_t", "eq. (6)", K_T)):
         for (row, column), printed in table.items():
@@ -56,11 +56,11 @@ def _matrices(device: MemsHexapod) -> list[Row]:
                 reason = "misprint: reciprocity with (2,3) demands -0.0216"
             elif symbol == "K_t" and (row, column) not in ((1, 4), (2, 5), (3, 6)):
                 reason = "the moment entries do not follow from the printed beam spacing"
-            result.append(Row("S1", f"{equation} ({row},{column})", printed, "N, um", ours, reason))
+            result.append(PrintedNumber("S1", f"{equation} ({row},{column})", printed, "N, um", ours, reason))
     return result
 
 
-def _geometry(device: MemsHexapod) -> list[Row]:
+def _geometry(device: MemsHexapod) -> list[PrintedNumber]:
     p = device.values()
     g = hexapod.geometry(p.hexapod)
     A, B = ([np.array(point.full()).ravel() for point in points] for points in (g.platform, g.base))
@@ -73,21 +73,23 @@ def _geometry(device: MemsHexapod) -> list[Row]:
         ("Table 2, c_2", "7.2", spacing(B, 0, 1)), ("Table 2, c_3", "0.4", spacing(A, 0, 1)), ("Table 2, c_4", "2.5", spacing(A, 1, 2)),
     )  # fmt: skip
     ratio = p.stage.lever_long / p.stage.lever_short
-    result = [Row("S1", where, printed, "mm", ours) for where, printed, ours in lengths]
-    return [*result, Row("S1", "section 3.3, e_4/e_3", "10", "1", ratio)]
+    result = [PrintedNumber("S1", where, printed, "mm", ours) for where, printed, ours in lengths]
+    return [*result, PrintedNumber("S1", "section 3.3, e_4/e_3", "10", "1", ratio)]
 
 
-def _force(device: MemsHexapod) -> list[Row]:
+def _force(device: MemsHexapod) -> list[PrintedNumber]:
     p = device.values()
     linear = float(xy_stage.linear_force(55e-6, p.stage, p.actuator))
     total = float(xy_stage.force(55e-6, p.stage, p.actuator))
     fitted = "k_a is chosen to meet this number, since Fig. 5 is lost"
     result = [
-        Row("S1", "section 6.2, linear force at 55 um", "0.104", "N", linear),
-        Row("S1", "section 6.2, nonlinear force at 55 um", "0.19", "N", total, fitted),
+        PrintedNumber("S1", "section 6.2, linear force at 55 um", "0.104", "N", linear),
+        PrintedNumber("S1", "section 6.2, nonlinear force at 55 um", "0.19", "N", total, fitted),
     ]
     errors = (("mean error, nonlinear", "1.93"), ("mean error, linear", "16.19"), ("error at the beginning", "5.33"))
-    return result + [Row("S1", f"section 6.2, {what}", printed, "%", None, NO_PLANT) for what, printed in errors]
+    return result + [
+        PrintedNumber("S1", f"section 6.2, {what}", printed, "%", None, NO_PLANT) for what, printed in errors
+    ]
 
 
 def _poses(model: Model) -> list[np.ndarray]:
@@ -101,7 +103,7 @@ def _poses(model: Model) -> list[np.ndarray]:
     return poses
 
 
-def _signs(device: MemsHexapod) -> list[Row]:
+def _signs(device: MemsHexapod) -> list[PrintedNumber]:
     """The signs of the six forces of eq. (19): those of the forces that hold the poses of Table 3, in the paper's axes."""
     model = build_model(device)
     displacement = Controller(model, "pose", None).static.displacement
@@ -110,10 +112,13 @@ def _signs(device: MemsHexapod) -> list[Row]:
     forces = device.in_paper_axes(np.array([[float(xy_stage.force(x, p.stage, p.actuator)) for x in row] for row in d]))
     signs = (np.sign(forces.min(axis=0)) + np.sign(forces.max(axis=0))) / 2  # 0 where a force changes its sign
     printed = zip(device.axes, SIGNS_19, signs, strict=True)
-    return [Row("S1", f"eq. (19), sign of the force on {axis}", text, "1", float(sign)) for axis, text, sign in printed]
+    return [
+        PrintedNumber("S1", f"eq. (19), sign of the force on {axis}", text, "1", float(sign))
+        for axis, text, sign in printed
+    ]
 
 
-def _table_3(device: MemsHexapod) -> list[Row]:
+def _table_3(device: MemsHexapod) -> list[PrintedNumber]:
     """The printed errors from the printed values, as far as their digits tell; and whether the poses can be held."""
     workspace = Workspace(build_model(device))
     result = []
@@ -122,22 +127,26 @@ def _table_3(device: MemsHexapod) -> list[Row]:
         spread = 100 * abs(float(analytic)) * half_unit(element) / float(element) ** 2
         reason = "from values printed with three digits"
         result.append(
-            Row("S1", f"Table 3, error of {channel}", percent, "%", ours, reason, half_unit(percent) + spread)
+            PrintedNumber("S1", f"Table 3, error of {channel}", percent, "%", ours, reason, half_unit(percent) + spread)
         )
         held = float(workspace.holds(pose))
-        result.append(Row("S1", f"Table 3, {channel} at delta_z = 30 um can be held", "1", "yes = 1", held))
+        result.append(PrintedNumber("S1", f"Table 3, {channel} at delta_z = 30 um can be held", "1", "yes = 1", held))
     return result
 
 
-def _circle() -> list[Row]:
+def _circle() -> list[PrintedNumber]:
     """Section 6.3: the mean of the three printed means; the rest needs a plant."""
     means = ("3.94", "3.65", "2.55")
     mean = float(np.mean([float(m) for m in means]))
     result = [
-        Row("S1", "section 6.3, mean of the three mean errors", "3.38", "%", mean, "", 0.5e-2 + half_unit(means[0]))
+        PrintedNumber(
+            "S1", "section 6.3, mean of the three mean errors", "3.38", "%", mean, "", 0.5e-2 + half_unit(means[0])
+        )
     ]
     for axis, printed in zip("xyz", means, strict=True):
-        result.append(Row("S1", f"section 6.3, mean error of delta_{axis} on the circle", printed, "%", None, NO_PLANT))
+        result.append(
+            PrintedNumber("S1", f"section 6.3, mean error of delta_{axis} on the circle", printed, "%", None, NO_PLANT)
+        )
     for axis, printed in zip("xyz", ("5.28e-6", "1.395e-5", "4.23e-6"), strict=True):
-        result.append(Row("S1", f"section 6.3, mean parasitic theta_{axis}", printed, "rad", None, NO_PLANT))
+        result.append(PrintedNumber("S1", f"section 6.3, mean parasitic theta_{axis}", printed, "rad", None, NO_PLANT))
     return result

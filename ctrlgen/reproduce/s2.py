@@ -6,7 +6,7 @@ from math import pi
 
 from ctrlgen.core.units import parse, to_si
 from ctrlgen.physics.sensor_models import SENSORS, Sensor, max_deviation
-from ctrlgen.reproduce.row import Row
+from ctrlgen.reproduce.row import PrintedNumber
 
 UNPUBLISHED = "measured; the recordings behind it are not published"
 NM, UM = 1e9, 1e6
@@ -30,12 +30,12 @@ NOISE = {"3316": ("1.8", "5"), "3317": ("1.0", "3.5"), "3338": ("1.5", "5"), "fi
 WRONG_DIGIT = "10.184 um/V times 20 V/2^16 is 3.108 nm; the print has cut the digit off"
 
 
-def rows() -> list[Row]:
+def rows() -> list[PrintedNumber]:
     """Every number of S2 beside ours."""
     return [*_adc_and_noise(), *_statistics(), *_ranges(), *_coefficients()]
 
 
-def _adc_and_noise() -> list[Row]:
+def _adc_and_noise() -> list[PrintedNumber]:
     found = []
     for name, (adc, filtered, unfiltered, _) in RESOLUTIONS.items():
         sensor = SENSORS[name]
@@ -45,32 +45,36 @@ def _adc_and_noise() -> list[Row]:
             _row("A.5.1.2, unfiltered", name, unfiltered, "nm", sensor.resolution_noise(filtered=False) * NM),
         ]
         for what, printed in zip(("filtered", "unfiltered"), NOISE[name], strict=True):
-            found.append(Row("S2", f"A.5.1.2, V_pp {what}, {name}", printed, "mV", None, UNPUBLISHED))
+            found.append(PrintedNumber("S2", f"A.5.1.2, V_pp {what}, {name}", printed, "mV", None, UNPUBLISHED))
     return found
 
 
-def _statistics() -> list[Row]:
+def _statistics() -> list[PrintedNumber]:
     found = []
     for name, (size, mean, sd, deviation) in TABLE_A1.items():
         for what, printed, unit in (("sample size", size, "1"), ("mean", mean, "um/V"), ("std. dev.", sd, "um/V")):
-            found.append(Row("S2", f"Table A.1, {what}, {name}", printed, unit, None, UNPUBLISHED))
+            found.append(PrintedNumber("S2", f"Table A.1, {what}, {name}", printed, unit, None, UNPUBLISHED))
         ours = 100 * max_deviation(parse(f"{mean} um/V", "m/V"), parse(f"{sd} um/V", "m/V"))
         found.append(_row("Table A.1 and A.2, eq. (A.3)", name, deviation, "%", ours))
     manufacturer = parse("12.046 um/V", "m/V")  # A.3.3, calibrated by the manufacturer in 2002
     change = (manufacturer - SENSORS["fibre"].sensitivity) * UM
     found.append(_row("A.4.2, change since the manufacturer's calibration", "fibre", "0.3", "um/V", change))
-    found.append(Row("S2", "A.3.3, near side, manufacturer", "12.046", "um/V", None, "the manufacturer's figure"))
-    found.append(Row("S2", "A.3.3, far side, manufacturer", "-116", "um/V", None, "the manufacturer's figure"))
+    found.append(
+        PrintedNumber("S2", "A.3.3, near side, manufacturer", "12.046", "um/V", None, "the manufacturer's figure")
+    )
+    found.append(
+        PrintedNumber("S2", "A.3.3, far side, manufacturer", "-116", "um/V", None, "the manufacturer's figure")
+    )
     return found
 
 
-def _ranges() -> list[Row]:
+def _ranges() -> list[PrintedNumber]:
     found = [
         _row("Table A.2, measuring range", name, printed, "um", SENSORS[name].usable_range() * UM)
         for name, (*_, printed) in RESOLUTIONS.items()
     ]
     found += [
-        Row("S2", f"A.6.2, offset rate, {name}", printed, "mV/degC", None, UNPUBLISHED)
+        PrintedNumber("S2", f"A.6.2, offset rate, {name}", printed, "mV/degC", None, UNPUBLISHED)
         for name, printed in OFFSETS.items()
     ]
     sensor, warm = SENSORS["3316"], to_si(25.0, "degC")
@@ -82,9 +86,13 @@ def _ranges() -> list[Row]:
     about = "printed as approximate"
     for name in ("3316", "3317", "3338"):
         safe = parse("7 V", "V") * SENSORS[name].sensitivity * UM
-        found.append(Row("S2", f"A.6.2, range of 1.5 V to 8.5 V, {name}", "70", "um", safe, about, tolerance=5.0))
+        found.append(
+            PrintedNumber("S2", f"A.6.2, range of 1.5 V to 8.5 V, {name}", "70", "um", safe, about, tolerance=5.0)
+        )
         volts = _bare_voltage(SENSORS[name])
-        found.append(Row("S2", f"A.1, 100 um before the amplifier, {name}", "1", "V", volts, about, tolerance=0.5))
+        found.append(
+            PrintedNumber("S2", f"A.1, 100 um before the amplifier, {name}", "1", "V", volts, about, tolerance=0.5)
+        )
     return found
 
 
@@ -92,7 +100,7 @@ def _bare_voltage(sensor: Sensor) -> float:
     return 100e-6 / sensor.bare_sensitivity
 
 
-def _coefficients() -> list[Row]:
+def _coefficients() -> list[PrintedNumber]:
     limit = 1 + pi / 2  # of pi (R/t)^(1/2) minus C.3 as t/R -> 0
     return [
         _row("C.7, constant", "Paros and Weisbord", "2.57", "1", limit),
@@ -109,5 +117,5 @@ def _coefficients() -> list[Row]:
     ]
 
 
-def _row(where: str, what: str, printed: str, unit: str, ours: float, reason: str = "") -> Row:
-    return Row("S2", f"{where}, {what}", printed, unit, ours, reason).settled()
+def _row(where: str, what: str, printed: str, unit: str, ours: float, reason: str = "") -> PrintedNumber:
+    return PrintedNumber("S2", f"{where}, {what}", printed, unit, ours, reason).settled()

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ctrlgen.core.units import from_si, to_si
-from ctrlgen.physics.sensor_models import SENSORS, Interferometer, calibrate, find_fringes, record
+from ctrlgen.physics.sensor_models import SENSORS, Interferometer, calibrate_sensor, find_fringes, record
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 SECONDS = 12.0  # of a recording; the printed ones are not published
@@ -31,7 +31,7 @@ def draw_sensitivities() -> Figure:
     for k, (name, sensor) in enumerate(SENSORS.items()):
         distance = SHARE * sensor.usable_range()
         run = record(sensor, laser, distance, distance / SECONDS, np.random.default_rng(k))
-        fringes, slope = find_fringes(run.photodiode), calibrate(run, laser.wavelength)
+        fringes, slope = find_fringes(run.photodiode), calibrate_sensor(run, laser.wavelength)
         counted = np.arange(fringes.at.size) * laser.wavelength / 4
         volts = np.interp(fringes.at, np.arange(run.sensor.size), run.sensor)
         found = f"{name}: {from_si(slope.sensitivity, 'um/V'):.3f} um/V"

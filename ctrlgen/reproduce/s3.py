@@ -12,7 +12,7 @@ import numpy as np
 from ctrlgen.core.units import from_si
 from ctrlgen.devices.rrr_stage import stage
 from ctrlgen.physics.rrr_stage import Kinetostatics
-from ctrlgen.reproduce.row import Row, half_unit
+from ctrlgen.reproduce.row import PrintedNumber, half_unit
 from ctrlgen.reproduce.s3_lengths import corrected, diagnosis, fit, printed_device
 from ctrlgen.reproduce.s3_tables import (
     CASES,
@@ -31,7 +31,7 @@ COMPLETE = {"C_inFin": "input_compliance", "J": "complete_J"}  # the same with t
 STRUCTURAL = "zero by the threefold symmetry; allowed: rounding of the model"
 
 
-def rows() -> list[Row]:
+def rows() -> list[PrintedNumber]:
     """All rows of S3, in the order of the print."""
     return [*_table_1(), *_text_on_coupling(), *_table_4(), *_table_5(), *_table_6(), *_text_on_agreement()]
 
@@ -47,16 +47,16 @@ def computed(case: int, symbol: str, i: int, j: int, k: Kinetostatics | None = N
     return float(from_si(matrix[i - 1, j - 1], unit(symbol, i, j)))
 
 
-def _entry_row(where: str, case: int, symbol: str, i: int, j: int, text: str, reason: str) -> Row:
+def _entry_row(where: str, case: int, symbol: str, i: int, j: int, text: str, reason: str) -> PrintedNumber:
     ours = computed(case, symbol, i, j)
     place, u = f"{where}, {symbol} ({i},{j})", unit(symbol, i, j)
     if text == "0":
         rounding = 1e-9 * float(from_si(np.abs(ca.DM(getattr(_stage(case), symbol)).full()).max(), u))
-        return Row("S3", place, text, u, ours, STRUCTURAL, rounding)
-    return Row("S3", place, text, u, ours, reason)
+        return PrintedNumber("S3", place, text, u, ours, STRUCTURAL, rounding)
+    return PrintedNumber("S3", place, text, u, ours, reason)
 
 
-def _table_1() -> Iterator[Row]:
+def _table_1() -> Iterator[PrintedNumber]:
     best = diagnosis()[0]
     printed = printed_device(1).lengths
     for name in best.lengths:
@@ -70,22 +70,24 @@ def _table_1() -> Iterator[Row]:
         else:
             length = fit(*best.freed, name).lengths[name]
             reason = f"recovered from Table 4 together with {' and '.join(best.freed)}"
-        yield Row("S3", f"Table 1, {name}", text, "mm", float(from_si(length, "mm")), reason)
+        yield PrintedNumber("S3", f"Table 1, {name}", text, "mm", float(from_si(length, "mm")), reason)
     device = printed_device(1)
     for k, text in RATIOS.items():
-        yield Row("S3", f"Table 1, t/R of hinge {k}", text, "1", device.hinges[f"hinge{k}"].ratio)
+        yield PrintedNumber("S3", f"Table 1, t/R of hinge {k}", text, "1", device.hinges[f"hinge{k}"].ratio)
 
 
-def _text_on_coupling() -> Iterator[Row]:
+def _text_on_coupling() -> Iterator[PrintedNumber]:
     for case in CASES:
         ratio = -computed(case, "C_inFin", 1, 1) / computed(case, "C_inFin", 1, 2)
         reason = (
             "" if case == 1 else "said of both cases, holds for case 1; case 2's own Table 4 gives 0.175/0.024 = 7.3"
         )
-        yield Row("S3", f"section 4.1, C_inFin diagonal over off-diagonal, case {case}", "8", "1", ratio, reason)
+        yield PrintedNumber(
+            "S3", f"section 4.1, C_inFin diagonal over off-diagonal, case {case}", "8", "1", ratio, reason
+        )
 
 
-def _table_4() -> Iterator[Row]:
+def _table_4() -> Iterator[PrintedNumber]:
     for case in CASES:
         for symbol, i, j, text in entries(TABLE_4[case]):
             reason = "lengths from the fit to this table (Table 1, l1 and l2)"
@@ -94,7 +96,7 @@ def _table_4() -> Iterator[Row]:
             yield _entry_row(f"Table 4, case {case}", case, symbol, i, j, text, reason)
 
 
-def _table_5() -> Iterator[Row]:
+def _table_5() -> Iterator[PrintedNumber]:
     for symbol, i, j, text in entries(TABLE_5):
         yield _entry_row("Table 5", 2, symbol, i, j, text, _gap(symbol, i, j, text))
 
@@ -113,14 +115,14 @@ def _gap(symbol: str, i: int, j: int, text: str) -> str:
 
 
 @dataclass(frozen=True)
-class Reference:
+class FiniteElementValue:
     """A finite-element number of Table 5: `value` in the unit of the print, `reason` where it is not the print itself."""
 
     value: float
     reason: str
 
 
-def reference(symbol: str, i: int, j: int) -> Reference:
+def finite_element_value(symbol: str, i: int, j: int) -> FiniteElementValue:
     """The finite-element value that Table 6 was made with.
 
     The print, unless it is too short for Table 6: then the one number within its half digit that meets both cases best.
@@ -131,10 +133,10 @@ def reference(symbol: str, i: int, j: int) -> Reference:
         ours.append(computed(case, symbol, i, j))
         percent.append(_percent(case, symbol, i, j))
     if all(abs(100 * (a / printed - 1) - p) <= POINT for a, p in zip(ours, percent, strict=True)):
-        return Reference(printed, "")
+        return FiniteElementValue(printed, "")
     implied = float(np.mean([a / (1 + p / 100) for a, p in zip(ours, percent, strict=True)]))
     value = float(np.clip(implied, printed - half_unit(text), printed + half_unit(text)))
-    return Reference(
+    return FiniteElementValue(
         value, f"finite elements taken as {value:.5f}, which rounds to the printed {text}: one number for both cases"
     )
 
@@ -145,25 +147,25 @@ def _percent(case: int, symbol: str, i: int, j: int) -> float:
     return -float(text) if (case, symbol, i, j) in SIGN_LOST_6 else float(text)
 
 
-def _table_6() -> Iterator[Row]:
+def _table_6() -> Iterator[PrintedNumber]:
     for case in CASES:
         for symbol, i, j, text in entries(TABLE_6[case]):
-            fea = reference(symbol, i, j)
+            fea = finite_element_value(symbol, i, j)
             ours = 100 * (computed(case, symbol, i, j) / fea.value - 1)
             lost = (case, symbol, i, j) in SIGN_LOST_6
             reason = (
                 "; ".join(part for part in ("printed without its minus sign" if lost else "", fea.reason) if part)
                 or "0.1 percentage point: Table 5 is rounded"
             )
-            yield Row("S3", f"Table 6, case {case}, {symbol} ({i},{j})", text, "%", ours, reason, POINT)
+            yield PrintedNumber("S3", f"Table 6, case {case}, {symbol} ({i},{j})", text, "%", ours, reason, POINT)
 
 
-def _text_on_agreement() -> Iterator[Row]:
+def _text_on_agreement() -> Iterator[PrintedNumber]:
     """The largest differences of case 2 that section 5.1.1 and the conclusions state."""
     for place, symbol, text in (("kinematics", "J", "13"), ("input", "C_inFin", "4"), ("output", "C_oFo", "6")):
         worst = max(
-            abs(100 * (computed(2, symbol, i, j) / reference(symbol, i, j).value - 1))
+            abs(100 * (computed(2, symbol, i, j) / finite_element_value(symbol, i, j).value - 1))
             for s, i, j, _ in entries(TABLE_6[2])
             if s == symbol
         )
-        yield Row("S3", f"section 5.1.1, largest difference of {place}, case 2", text, "%", worst)
+        yield PrintedNumber("S3", f"section 5.1.1, largest difference of {place}, case 2", text, "%", worst)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ctrlgen.physics import circular_hinge_table as table
-from ctrlgen.reproduce.row import Row
+from ctrlgen.reproduce.row import PrintedNumber
 
 NEAREST_END = (
     "3.8 % is reached at t/R = 0.1 and 5 % at t/R = 0.13: the printed errors belong to a range that ends there, "
@@ -21,7 +21,7 @@ SAMPLES = "depends on the t/R at which the print was sampled, which it does not 
 UNPRINTED = "the empirical equations of S3 ref. [16] are printed in neither source"
 
 
-def rows() -> list[Row]:
+def rows() -> list[PrintedNumber]:
     """S3 Table 3, the errors of S2's hinge equations against finite elements, beside ours."""
     try:
         from ctrlgen.reproduce.hinge_errors import hinge_errors
@@ -38,11 +38,11 @@ def rows() -> list[Row]:
         for what, printed, value in zip(("min.", "max.", "mean"), texts.split(), ours, strict=True):
             where = f"Table 3, {equation.compliance}, {equation.group}, {what} error"
             reason = missing or _why_errors_differ(equation, what)
-            found.append(Row("S3", where, printed, "%", value, reason).settled())
+            found.append(PrintedNumber("S3", where, printed, "%", value, reason).settled())
     for compliance, texts in ((table.DELTA_Y, "0 2.7 0.07"), (table.DELTA_X, "0 1.1 0.08")):
         for what, printed in zip(("min.", "max.", "mean"), texts.split(), strict=True):
             where = f"Table 3, {compliance}, its own empirical equation, {what} error"
-            found.append(Row("S3", where, printed, "%", None, UNPRINTED))
+            found.append(PrintedNumber("S3", where, printed, "%", None, UNPRINTED))
     return found
 
 

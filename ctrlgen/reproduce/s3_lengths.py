@@ -29,7 +29,7 @@ STEPS = 60
 
 
 @dataclass(frozen=True)
-class Fit:
+class LengthFit:
     """`lengths` [m] and `frame_angle` [rad] that fit Table 4 best with the lengths in `freed` unknown.
 
     `misfit`: per printed entry, in units of half its last digit; above 1 the entry is not reproduced.
@@ -108,29 +108,29 @@ def _fitted(x: np.ndarray, columns: list[int]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def fit(*freed: str) -> Fit:
+def fit(*freed: str) -> LengthFit:
     """The best fit with the lengths `freed` and the frame angle unknown, from several starts."""
     columns = [LENGTHS.index(name) for name in freed]
-    best: Fit | None = None
+    best: LengthFit | None = None
     for start in [()] + [(c, factor) for c in columns for factor in STARTS[1:]]:
         x = _printed()
         if start:
             x[start[0]] *= start[1]
         x, misfit = _fitted(x, [*columns, 6])
-        found = Fit(freed, dict(zip(LENGTHS, x[:6].tolist(), strict=True)), float(x[6]), misfit)
+        found = LengthFit(freed, dict(zip(LENGTHS, x[:6].tolist(), strict=True)), float(x[6]), misfit)
         best = found if best is None or found.cost < best.cost else best
     assert best is not None
     return best
 
 
 @cache
-def diagnosis() -> tuple[Fit, ...]:
+def diagnosis() -> tuple[LengthFit, ...]:
     """Every pair of lengths as the explanation of Table 4, the best first; a negative length explains nothing."""
     pairs = (fit(*pair) for pair in combinations(LENGTHS, 2))
     return tuple(sorted((f for f in pairs if min(f.lengths.values()) >= 0), key=lambda f: f.cost))
 
 
-def corrected(case: int, found: Fit | None = None) -> SimpleNamespace:
+def corrected(case: int, found: LengthFit | None = None) -> SimpleNamespace:
     """Values of the stage of case 1 or 2 with the lengths and frame angle of `found`, by default the best pair's."""
     found = diagnosis()[0] if found is None else found
     p = printed_device(case).values()

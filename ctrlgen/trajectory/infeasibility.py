@@ -6,18 +6,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ctrlgen.core.errors import Shortfall, Unreachable
+from ctrlgen.core.errors import Infeasibility, Unreachable
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.model import Limit, Model, Signal
-from ctrlgen.trajectory.optimisation import Result
+from ctrlgen.trajectory.optimisation import OptimisationResult
 from ctrlgen.trajectory.scenario import Scenario
 
-REACHED = 1e-5  # shortfall, in typical sizes (1 um, or 1 um at the platform's rim), that counts as none: 0.01 nm
+FEASIBILITY_TOLERANCE = (
+    1e-5  # shortfall, in typical sizes (1 um, or 1 um at the platform's rim), that counts as none: 0.01 nm
+)
 
 
-def unreachable(
-    scenario: Scenario, model: Model, command: np.ndarray, wanted: Result, nearest: Result | None, rows: Sequence[Limit]
+def infeasibility_error(
+    scenario: Scenario,
+    model: Model,
+    command: np.ndarray,
+    wanted: OptimisationResult,
+    nearest: OptimisationResult | None,
+    rows: Sequence[Limit],
 ) -> Unreachable:
     """An error that says which samples, which actuators, by how much, and what is nearest.
 
@@ -26,9 +33,9 @@ def unreachable(
     """
     signal = model.signals[scenario.file.follow]
     excess = _excess(model, wanted, rows)
-    short = np.linalg.norm((nearest or wanted).shortfall, axis=1)
+    short = np.linalg.norm((nearest or wanted).unreachable_by, axis=1)
     size = short if nearest else np.max([e.max(axis=1) for e in excess.values()], axis=0)
-    samples = tuple(int(k) for k in np.flatnonzero(size > (REACHED if nearest else 0.0)))
+    samples = tuple(int(k) for k in np.flatnonzero(size > (FEASIBILITY_TOLERANCE if nearest else 0.0)))
     worst = int(np.argmax(size))
     where = f"the worst is sample {worst}: {_point(signal, command[worst])}"
     lines = [f"cannot follow {len(samples)} of {len(command)} samples ({_intervals(samples)}); {where}"]
@@ -51,7 +58,9 @@ def unreachable(
     if heats:
         advice.append("slow the path down")
     lines.append("  " + "; ".join(advice or ["shrink the path or move it"]))
-    return Unreachable("\n".join(lines), Shortfall(samples, worst, command, command if reached is None else reached))
+    return Unreachable(
+        "\n".join(lines), Infeasibility(samples, worst, command, command if reached is None else reached)
+    )
 
 
 def _intervals(samples: Sequence[int]) -> str:
@@ -66,7 +75,7 @@ def _intervals(samples: Sequence[int]) -> str:
     return ", ".join(shown) + (f", ... {len(runs) - 6} more runs" if len(runs) > 6 else "")
 
 
-def _stroke_causes(scenario: Scenario, model: Model, command: np.ndarray, wanted: Result) -> list[str]:
+def _stroke_causes(scenario: Scenario, model: Model, command: np.ndarray, wanted: OptimisationResult) -> list[str]:
     """Actuators that would have to leave their displacement range."""
     kernel = Controller(model, scenario.file.follow, None).static.displacement
     needed = kernel.map(len(command))(wanted.x.T, wanted.z.T, command.T).full().T
@@ -86,7 +95,7 @@ def _stroke_causes(scenario: Scenario, model: Model, command: np.ndarray, wanted
     return causes
 
 
-def _excess(model: Model, wanted: Result, rows: Sequence[Limit]) -> dict[Limit, np.ndarray]:
+def _excess(model: Model, wanted: OptimisationResult, rows: Sequence[Limit]) -> dict[Limit, np.ndarray]:
     """(n, channels) by which the relaxed solution exceeds each limit of `rows`, SI."""
     n = len(wanted.u)
     values = model.evaluate_limits.map(n)(wanted.x.T, wanted.z.T, wanted.u.T, np.tile(model.p_nominal[:, None], (1, n)))
@@ -103,7 +112,7 @@ def _limit_cause(limit: Limit, excess: np.ndarray, count: int) -> str:
     return f"  {limit.label} at {limit.channels[i]}: {amount}, worst at sample {k}, in {bad} of {count}"
 
 
-def _drive_causes(model: Model, result: Result, samples: Sequence[int]) -> list[str]:
+def _drive_causes(model: Model, result: OptimisationResult, samples: Sequence[int]) -> list[str]:
     """Actuators whose drive or state sits on a bound around the samples that fall short."""
     slowest = "it cannot cool faster than passively" if "power" in model.signals else "that is its minimum"
     around = sorted({max(k + shift, 0) for k in samples for shift in (-1, 0)})

@@ -43,7 +43,7 @@ def force_parts(solution: Solution) -> dict[str, np.ndarray]:
     return {name: part.full().T for name, part in zip(m.force_parts, parts, strict=True)}
 
 
-def measure(solution: Solution, name: str) -> tuple[float, str]:
+def metric(solution: Solution, name: str) -> tuple[float, str]:
     """The value of `name` in SI and the reader's unit. Raises InputError for a name that does not exist.
 
     SIGNAL.CHANNEL.min|max|rms|abs (abs: the largest size) or SIGNAL.CHANNEL[sample]: signals of the model, `force_linear` and
@@ -88,7 +88,7 @@ def expectations(solution: Solution) -> tuple[Expected, ...]:
     results, faults = [], []
     for k, expect in enumerate(solution.scenario.file.expect):
         try:
-            measured, unit = measure(solution, expect.value)
+            measured, unit = metric(solution, expect.value)
             low, high = (parse(text, unit) for text in expect.range)
             if low > high:
                 raise ValueError(f"range {list(expect.range)} is reversed; write the smaller bound first")

@@ -29,18 +29,18 @@ WEIGHT = 1e8  # of the shortfall against the barrier, which otherwise pushes it 
 
 
 @dataclass(frozen=True)
-class Result:
-    """IPOPT's answer in SI, one row a sample; `shortfall` in typical sizes of the followed signal."""
+class OptimisationResult:
+    """IPOPT's answer in SI, one row a sample; `unreachable_by` in typical sizes of the followed signal."""
 
     x: np.ndarray
     z: np.ndarray
     u: np.ndarray
-    shortfall: np.ndarray
+    unreachable_by: np.ndarray
     trace: Trace
     iterations: int
 
 
-class Programme:
+class TrajectoryProgramme:
     """The nonlinear programme of one scenario; `run` solves it with a choice of composite limits."""
 
     def __init__(self, model: Model, scenario: Scenario, command: np.ndarray) -> None:
@@ -91,7 +91,7 @@ class Programme:
             rows[i] = m.x[i] - ca.substitute(value, m.x[stepped], ca.SX.zeros(len(stepped)))
         return ca.Function("settled", [m.x, m.z, m.u, m.p], [rows])
 
-    def run(self, limits: Sequence[Limit]) -> Result:
+    def run(self, limits: Sequence[Limit]) -> OptimisationResult:
         """IPOPT's solution with the rows of `limits` added. Raises SolverError, KeyboardInterrupt."""
         m, n, static, closed = self.model, self.n, self.scenario.sample_time is None, self.scenario.closed
         rows, row_low, row_high = self._rows(limits)
@@ -165,7 +165,7 @@ class Programme:
         if not static:
             reached = trace(m, result.time, x, z, before)
             result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
-        return Result(x, z, u, s, result, stats["iter_count"])
+        return OptimisationResult(x, z, u, s, result, stats["iter_count"])
 
     def _bounds(self, symbol: str) -> tuple[np.ndarray, np.ndarray]:
         """Scaled bounds of x, z, u or the shortfall s of one sample."""

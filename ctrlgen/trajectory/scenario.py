@@ -23,7 +23,7 @@ FILE = "scenario.toml"
 
 
 class Expectation(Section):
-    """One value that must come out: `value` names it (see `ctrlgen.trajectory.metrics.measure`), `range` in its unit."""
+    """One value that must come out: `value` names it (see `ctrlgen.trajectory.metrics.metric`), `range` in its unit."""
 
     value: str
     range: tuple[str, str]

@@ -10,8 +10,8 @@ import numpy as np
 from ctrlgen.core.errors import SolverError
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace
-from ctrlgen.trajectory.infeasibility import REACHED, unreachable
-from ctrlgen.trajectory.optimisation import Programme, Result
+from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, infeasibility_error
+from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.scenario import Scenario
 
 KEPT = 1e-7  # of a limit: what IPOPT's relaxed bounds (1e-8) may leave
@@ -60,9 +60,9 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
     the problem is solved again. A relaxed optimum that keeps all limits is the optimum.
     """
     command = scenario.command(model)
-    programme = Programme(model, scenario, command)
+    programme = TrajectoryProgramme(model, scenario, command)
     rows: list[Limit] = []
-    relaxed: Result | None = None
+    relaxed: OptimisationResult | None = None
     while True:
         progress(f"IPOPT, {len(command)} samples" + (f", with {', '.join(r.label for r in rows)}" if rows else ""))
         try:
@@ -70,9 +70,9 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
         except SolverError:
             if relaxed is None:
                 raise
-            raise unreachable(scenario, model, command, relaxed, None, rows) from None
-        if np.linalg.norm(result.shortfall, axis=1).max() > REACHED:
-            raise unreachable(scenario, model, command, relaxed or result, result, rows)
+            raise infeasibility_error(scenario, model, command, relaxed, None, rows) from None
+        if np.linalg.norm(result.unreachable_by, axis=1).max() > FEASIBILITY_TOLERANCE:
+            raise infeasibility_error(scenario, model, command, relaxed or result, result, rows)
         margins = _margins(model, result)
         broken = [
             m.limit for m in margins if m.distance < -KEPT * max(abs(m.bound), abs(m.value)) and m.limit not in rows
@@ -84,7 +84,7 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
         rows += broken
 
 
-def _margins(model: Model, result: Result) -> list[Margin]:
+def _margins(model: Model, result: OptimisationResult) -> list[Margin]:
     """The smallest distance to each side of each limit, one Margin per limit."""
     n = len(result.u)
     values = model.evaluate_limits.map(n)(result.x.T, result.z.T, result.u.T, np.tile(model.p_nominal[:, None], (1, n)))

@@ -18,7 +18,7 @@ State = Literal["passed", "failed", "not run"]
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckFinding:
     """One remark of a tool: `rule` in the tool's own naming; `permitted` where DEVIATIONS.md lists it, or it only informs."""
 
     file: str
@@ -40,7 +40,7 @@ class Check:
     version: str
     subjects: tuple[tuple[str, Real], ...]
     state: State
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[CheckFinding, ...] = ()
     note: str = ""
 
     @property
@@ -50,7 +50,7 @@ class Check:
 
 
 def judged(
-    tool: str, version: str, subjects: Sequence[tuple[str, Real]], findings: Sequence[Finding], note: str = ""
+    tool: str, version: str, subjects: Sequence[tuple[str, Real]], findings: Sequence[CheckFinding], note: str = ""
 ) -> Check:
     """A check that ran: failed by any finding that is not permitted."""
     ordered = tuple(sorted(set(findings), key=lambda f: (f.file, f.line, f.rule, f.text)))

@@ -23,7 +23,7 @@ from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.firmware.toolchains import COMPILERS, find_compilers
-from ctrlgen.model.feedforward import INSET, Status
+from ctrlgen.model.feedforward import INSET, ControllerStatus
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.solution import Solution
@@ -43,7 +43,7 @@ ROUNDINGS = 16  # float C against CasADi: roundings of the largest value that th
 
 
 @dataclass(frozen=True)
-class Row:
+class ComparisonRow:
     """One comparison of one signal. `worst`, `rms`, `limit` in `unit`; `first` the first sample beyond the limit, or None."""
 
     build: str
@@ -66,7 +66,7 @@ class Row:
 class Comparison:
     """All rows, and the tools: compiler -> version line; `missing` compilers were not run."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[ComparisonRow, ...]
     compilers: dict[str, str]
     missing: tuple[str, ...]
 
@@ -93,14 +93,16 @@ def compare(
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
         programs = [pool.submit(build_host, compiler, real, folder, Path(scratch)) for compiler, real in builds]
         reference = reference or Reference(solution)  # while the compilers work
-        rows: list[Row] = []
+        rows: list[ComparisonRow] = []
         for (compiler, real), program in zip(builds, programs, strict=True):
             rows += _rows(f"{compiler} {real.value}", real, program.result(), reference, folder.compression.get(real))
             progress(f"{compiler} {real.value}")
     return Comparison(tuple(rows), compilers, tuple(c for c in COMPILERS if c not in compilers))
 
 
-def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Compression | None) -> list[Row]:
+def _rows(
+    build: str, real: Real, program: Path, ref: Reference, compression: Compression | None
+) -> list[ComparisonRow]:
     """All comparisons of one build."""
     n, m = len(ref.model.axes), ref.model
     signals = [("drive", slice(1, 1 + n)), ("displacement", slice(1 + n, 1 + 2 * n))]
@@ -135,13 +137,13 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
         from such a sample on, if the first to differ is one, the difference may be what that trial moves."""
         rows.append(_row(build, what, "status", "1", answer[:, :1] - reference[:, :1], 0.0))
         if real is Real.FLOAT:  # where a limited drive is bisected, float may turn the other way, as good an answer
-            plain = (reference[:, 0].astype(int) & Status.DRIVE) == 0
+            plain = (reference[:, 0].astype(int) & ControllerStatus.DRIVE) == 0
             answer, reference = answer[plain], reference[plain]
         off = {role: answer[:, columns] - reference[:, columns] for role, columns in signals}
         sizes = {role: np.abs(reference[:, columns]).max() or m.signals[role].scale[0] for role, columns in signals}
         limits = {role: strict(role, size, wider) for role, size in sizes.items()}
         differs = np.any([np.abs(off[role]).max(axis=1) > limit for role, limit in limits.items()], axis=0)
-        if ties and differs.any() and int(reference[np.argmax(differs), 0]) & Status.DRIVE:
+        if ties and differs.any() and int(reference[np.argmax(differs), 0]) & ControllerStatus.DRIVE:
             limits = {role: max(limit, ties_of[role]) for role, limit in limits.items()}
         for role, limit in limits.items():
             add(what, role, off[role], limit)
@@ -210,11 +212,11 @@ def _rows(build: str, real: Real, program: Path, ref: Reference, compression: Co
     return rows
 
 
-def _shipped_test(build: str, program: Path) -> Row:
+def _shipped_test(build: str, program: Path) -> ComparisonRow:
     """The generated folder's own test of reference vectors: 0 when it passes."""
     done = subprocess.run([f"{program}_test"], capture_output=True, text=True, check=False, start_new_session=True)
     failed = float(done.returncode != 0)
-    return Row(
+    return ComparisonRow(
         build, "the folder's own test", "vectors", "1", failed, failed, 0.0, 1, None if done.returncode == 0 else 0
     )
 
@@ -282,12 +284,12 @@ def _float_limit(model: Model, role: str, size: float, ref: Reference) -> float:
     return max(worst, ROUNDINGS * eps * size)
 
 
-def _row(build: str, what: str, label: str, unit: str, difference: np.ndarray, limit: float) -> Row:
+def _row(build: str, what: str, label: str, unit: str, difference: np.ndarray, limit: float) -> ComparisonRow:
     """Worst and rms of a difference (n, channels) in SI; expressed in `unit`."""
     size = np.abs(difference).max(axis=1)
     beyond = np.flatnonzero(~(size <= limit))
     scale = from_si(1.0, unit) if unit not in ("K",) else 1.0
     worst, rms = float(size.max()) * scale, float(np.sqrt(np.mean(difference**2))) * scale
-    return Row(
+    return ComparisonRow(
         build, what, label, unit, worst, rms, limit * scale, len(difference), int(beyond[0]) if beyond.size else None
     )

@@ -19,10 +19,10 @@ import numpy as np
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import write
-from ctrlgen.model.feedforward import Controller, Status
+from ctrlgen.model.feedforward import Controller, ControllerStatus
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Scenario
-from ctrlgen.verification.check import LEFT_OUT, Check, Finding, judged, not_run, run_tool, version_of
+from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, judged, not_run, run_tool, version_of
 
 RANDOM, FUZZER = "sanitizers, random calls", "libFuzzer"
 RUNS = 200_000
@@ -74,8 +74,10 @@ def check_hostile(
 def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
     controller = Controller(model, scenario.file.follow, scenario.sample_time)
     nominal = controller.nominal
-    bits = Status.DISPLACEMENT | Status.DRIVE | Status.INPUT
-    bits |= (Status.STATE if nominal.n_states else bits) | (Status.COMPOSITE if controller.guarded_limits else bits)
+    bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT
+    bits |= (ControllerStatus.STATE if nominal.n_states else bits) | (
+        ControllerStatus.COMPOSITE if controller.guarded_limits else bits
+    )
     samples = len(scenario.command(model))
     return {
         "real": real, "online": folder.online[real], "player": folder.player.get(real) if folder.player else None,
@@ -124,7 +126,7 @@ def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
             subjects,
             "; ".join([*against.values(), INSTALL]),
         )
-    findings: list[Finding] = []
+    findings: list[CheckFinding] = []
     notes = []
     for real in Real:
         sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
@@ -133,7 +135,10 @@ def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
             said = _build(compiler, flags, sources, folder.path, program)
             if said and flags is STOPPING:
                 return judged(
-                    tool, version_of(compiler) or "", subjects, [Finding(sources[0].name, 0, "build", "error", said)]
+                    tool,
+                    version_of(compiler) or "",
+                    subjects,
+                    [CheckFinding(sources[0].name, 0, "build", "error", said)],
                 )
             if said:
                 notes.append(f"{real.value}: divisions by zero not looked for ({compiler} has no {flags[0]})")
@@ -153,7 +158,7 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
         major = re.search(r"version (\d+)", version or "")
         install = "apt-get install clang" + (f" libclang-rt-{major[1]}-dev" if major else " libclang-rt-14-dev")
         return not_run(tool, subjects, f"{said}; {install}", version or "")
-    findings: list[Finding] = []
+    findings: list[CheckFinding] = []
     notes = []
     for real in Real:
         program, corpus = scratch / f"fuzz_{real.suffix}", scratch / f"corpus_{real.suffix}"
@@ -164,7 +169,7 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
         sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
         said = _build("clang", FUZZING, sources, folder.path, program)
         if said:
-            return judged(tool, version or "", subjects, [Finding(sources[0].name, 0, "build", "error", said)])
+            return judged(tool, version or "", subjects, [CheckFinding(sources[0].name, 0, "build", "error", said)])
         words = [
             f"-runs={runs}",
             f"-max_total_time={FUZZ_SECONDS}",
@@ -194,19 +199,19 @@ def _coverage(sources: Sequence[Path], include: Path, corpus: Path) -> str:
     return f"{reached} of {there} edges of the generated C" + (f"; never entered: {', '.join(never)}" if never else "")
 
 
-def _told(words: str, harness: str, status: int, *, judge: bool) -> list[Finding]:
+def _told(words: str, harness: str, status: int, *, judge: bool) -> list[CheckFinding]:
     """The findings in what a sanitized program said. A program that stops without a word is a finding too."""
     found = [
-        Finding(
+        CheckFinding(
             Path(m["file"]).name, int(m["line"]), "undefined", "error" if judge else "information", m["text"], not judge
         )
         for m in RUNTIME_ERROR.finditer(words)
     ]
-    found += [Finding(harness, 0, "promise", "error", m["text"]) for m in PROMISE.finditer(words)]
+    found += [CheckFinding(harness, 0, "promise", "error", m["text"]) for m in PROMISE.finditer(words)]
     if not found and (error := ADDRESS.search(words)):
         place = PLACE.search(words, error.end())
         file, line = (Path(place["file"]).name, int(place["line"])) if place else (harness, 0)
-        found.append(Finding(file, line, error["rule"], "error", error["text"][:200]))
+        found.append(CheckFinding(file, line, error["rule"], "error", error["text"][:200]))
     if not found and status != 0:
-        found.append(Finding(harness, 0, "stopped", "error", f"status {status}: {words.strip()[-200:]}"))
+        found.append(CheckFinding(harness, 0, "stopped", "error", f"status {status}: {words.strip()[-200:]}"))
     return found

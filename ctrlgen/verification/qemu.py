@@ -12,7 +12,7 @@ from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import write
-from ctrlgen.verification.check import Check, Finding, judged, not_run, run_tool, version_of
+from ctrlgen.verification.check import Check, CheckFinding, judged, not_run, run_tool, version_of
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile
 
 TOOL = "qemu-system-arm"
@@ -48,10 +48,10 @@ def _run(folder: CFolder, core: Core, real: Real, compiler: str, scratch: Path) 
     try:
         cross_compile(compiler, core, sources, folder.path, "reset", program, ("-T", str(scratch / "board.ld"), "-lc"))
     except ToolError as error:
-        return judged(tool, version, subject, [Finding(sources[0].name, 1, "build", "error", str(error))])
+        return judged(tool, version, subject, [CheckFinding(sources[0].name, 1, "build", "error", str(error))])
     done = run_tool([TOOL, "-M", core.board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
     said = SAID.search(done.stdout)
     if said and said[1] == "0" and done.returncode == 0:
         return judged(tool, version, subject, (), f"{said[2]} of {said[2]} reference vectors agree")
     text = done.stdout.strip() or done.stderr.strip()[:500] or f"ended with status {done.returncode} and said nothing"
-    return judged(tool, version, subject, [Finding(f"{subject[0][0]}.c", 1, "vectors", "error", text)])
+    return judged(tool, version, subject, [CheckFinding(f"{subject[0][0]}.c", 1, "vectors", "error", text)])

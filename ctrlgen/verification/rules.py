@@ -16,7 +16,7 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.misra import CPPCHECK, rule_class
-from ctrlgen.verification.check import LEFT_OUT, Check, Finding, judged, not_run, run_tool, version_of
+from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, judged, not_run, run_tool, version_of
 
 MISRA = "cppcheck --addon=misra"
 AT_ONCE = 2  # tools running side by side
@@ -96,7 +96,7 @@ def _misra(folder: CFolder) -> Check:
     version = version_of("cppcheck")
     if version is None:
         return not_run(tool, subjects, "cppcheck is missing; apt-get install cppcheck")
-    findings: list[Finding] = []
+    findings: list[CheckFinding] = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:  # what one run has analysed the next takes over
         words = [
             "cppcheck", f"-j{AT_ONCE}", f"--cppcheck-build-dir={scratch}", "--addon=misra", "--std=c99", "-U__cplusplus", "--quiet",
@@ -123,12 +123,12 @@ def _misra(folder: CFolder) -> Check:
     return judged(tool, version, subjects, findings, note)
 
 
-def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> Finding:
+def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> CheckFinding:
     name = Path(file).name
     if not rule.startswith("misra-c2012-"):
-        return Finding(name, int(line), rule, severity, text)
+        return CheckFinding(name, int(line), rule, severity, text)
     number = rule.removeprefix("misra-c2012-")
-    return Finding(name, int(line), rule, rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name))
+    return CheckFinding(name, int(line), rule, rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name))
 
 
 def _analyzed(analyzer: _Analyzer, folder: CFolder) -> Check:
@@ -138,12 +138,12 @@ def _analyzed(analyzer: _Analyzer, folder: CFolder) -> Check:
         return not_run(analyzer.tool, subjects, f"{analyzer.program} is missing; {analyzer.install}")
     files = [path for path, _ in _files(folder)]
 
-    def run(path: Path) -> tuple[list[Finding], str]:
+    def run(path: Path) -> tuple[list[CheckFinding], str]:
         include = ("-I", str(folder.path))
         words = [analyzer.program, *analyzer.words, *(() if analyzer.after else include), str(path)]
         done = run_tool([*words, *((*analyzer.after, *include) if analyzer.after else ())], cwd=folder.path)
         found = [
-            Finding(Path(m["file"]).name, int(m["line"]), m["rule"] or m["severity"], m["severity"], m["text"])
+            CheckFinding(Path(m["file"]).name, int(m["line"]), m["rule"] or m["severity"], m["severity"], m["text"])
             for m in REMARK.finditer(done.stdout + "\n" + done.stderr)
         ]
         return found, "" if done.returncode == 0 or found else (done.stderr or done.stdout).strip()[:500]
@@ -164,5 +164,5 @@ def _analyzed(analyzer: _Analyzer, folder: CFolder) -> Check:
     return judged(analyzer.tool, version, subjects, _flat([found for found, _ in results]))
 
 
-def _flat(rows: Sequence[list[Finding]]) -> list[Finding]:
+def _flat(rows: Sequence[list[CheckFinding]]) -> list[CheckFinding]:
     return [finding for row in rows for finding in row]

@@ -13,7 +13,7 @@ import ctrlgen
 from ctrlgen import Diagnosis
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.model.model import build_model
-from ctrlgen.recordings.calibration import calibrate
+from ctrlgen.recordings.calibration import calibrate_jacobian
 from ctrlgen.recordings.pose_errors import PoseErrors
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.reproduce.s0_data import load_s0
@@ -35,7 +35,7 @@ def fairly(found: Diagnosis) -> PoseErrors:
     """Held-out errors of the paper's way, 36 numbers of a Jacobian, fitted to the poses that the diagnosis was fitted to."""
     fitted, held = found.fitter.to_fit, found.fitter.held
     inputs, poses = (np.vstack([getattr(r, name) for r in fitted]) for name in ("drive", "observed"))
-    jacobian = calibrate(inputs, poses).jacobian
+    jacobian = calibrate_jacobian(inputs, poses).jacobian
     return PoseErrors(np.vstack([r.observed - r.drive @ jacobian.T for r in held]))
 
 

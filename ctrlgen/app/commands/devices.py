@@ -135,7 +135,7 @@ def reproduce(
     Example:  ctrlgen reproduce S3 --differing
     """
     from ctrlgen.reproduce import all as everything  # scientific work of seconds; other commands need none of it
-    from ctrlgen.reproduce.row import Status
+    from ctrlgen.reproduce.row import ReproductionStatus
 
     chosen = [name.upper() for name in source or everything.SOURCES]
     unknown = [name for name in chosen if name not in everything.SOURCES]
@@ -155,8 +155,8 @@ def reproduce(
     if json_:
         print(json.dumps(everything.as_json(rows), indent=1))
         return
-    print_reproduced([row for row in rows if not (differing and row.status is Status.REPRODUCED)])
+    print_reproduced([row for row in rows if not (differing and row.status is ReproductionStatus.REPRODUCED)])
     counts = everything.counts(rows)
     for name in chosen:
-        numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in Status)
+        numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in ReproductionStatus)
         out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)

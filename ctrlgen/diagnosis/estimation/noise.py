@@ -15,7 +15,7 @@ from scipy import stats
 from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
-from ctrlgen.numerics.quantisation_step import lattice
+from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record, Recording
 
 LONGEST_ORDER = 8
@@ -106,7 +106,9 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         said = f"{name}: not stated and {few}; taken from what the best model leaves"
         return 1.0, none, False, said, np.inf, False
     moving = [r for r in recording.records if r.role != "rest"]
-    rounding = lattice(np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])) / np.sqrt(12.0)
+    rounding = quantisation_step(np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])) / np.sqrt(
+        12.0
+    )
     samples = {
         "a record at rest": (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
         "repeated periods": (1, [e for r in moving for e in _repeats(r, i)]),

@@ -15,7 +15,7 @@ from scipy import stats
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.noise import LAGS, ljung_box, without_lines
-from ctrlgen.numerics.quantisation_step import lattice
+from ctrlgen.numerics.quantisation_step import quantisation_step
 
 STEPS = 20  # at most, to where the held-out records are most likely, as the numbers are known
 RATIO = 1.10  # held-out error over what is expected: the gate of the design
@@ -83,7 +83,7 @@ def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
             continue
         e = fitter.whitened(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
         read = record.observed[record.valid[:, i], i]
-        step = lattice(read)
+        step = quantisation_step(read)
         if len(e) < 5 * LAGS or np.ptp(read) == 0 or step > ROUNDED * fitter.noise.floor[i]:
             continue
         e = without_lines(e)  # a vibration is looked for by itself

@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.numerics.quantisation_step import lattice
+from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
 
 APART = 0.5  # periods by which two lines must part over what the records to fit cover: nearer, they only beat as one
@@ -44,7 +44,7 @@ def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> bool:
     values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
     read, *_ = cause.law.read_off(values) or ({},)
     steps = (p.name for p in cause.law.params if p.off is None and (p.seen == "pitches" or p.name in read))
-    return any(fit.values(k)[name] < STEPS * lattice(values) for name in steps)
+    return any(fit.values(k)[name] < STEPS * quantisation_step(values) for name in steps)
 
 
 def _line(fit: Fit, k: int) -> float:
