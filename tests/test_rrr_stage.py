@@ -155,9 +155,7 @@ def test_the_corrected_stage_is_the_direct_stiffness_assembly(case: int, correct
     scale = np.append(ROTATION_SCALE, [1.0, 1.0, 1.0])
     reference = direct.assemble(hinges, g) * np.outer(scale, scale)
     ours = whole(corrected, corrected.input_compliance)
-    assert (
-        np.abs(ours - reference).max() < 1e-9 * np.abs(reference).max()
-    )  # one linear model solved twice in float64
+    assert np.abs(ours - reference).max() < 1e-9 * np.abs(reference).max()  # one linear model solved twice in float64
 
 
 def test_b_83_leaves_out_what_an_input_yields_with_the_platform_held(corrected: rrr_stage.Kinetostatics) -> None:
