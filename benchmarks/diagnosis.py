@@ -16,7 +16,7 @@ from benchmarks.samples import SCENARIO, Disagreement
 from ctrlgen import build_model, diagnose, load_device
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_links
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -50,7 +50,7 @@ def _screen(repeat: int) -> list[Line | Note]:
     slow, fast = 0.3 + 0.07 * np.arange(6), 7.0 + 1.3 * np.arange(6)
     u = model.u_scale * (0.4 + 0.15 * np.sin(2 * np.pi * slow * t) + 0.06 * np.sin(2 * np.pi * fast * t))
     blank = Record("fit", "fit", t[:, 0], H, u, np.zeros((LONG, 6)), False, None, np.ones((LONG, 6), bool))
-    y = Response(plant, (), channels, H, False).outputs(blank, np.zeros(0))
+    y = Simulator(plant, (), channels, H, False).simulate(blank, np.zeros(0))
     sd = np.ptp(y, axis=0) / 1000
     noisy = y + sd * np.random.default_rng(1).standard_normal(y.shape)
     record = Record("fit", "fit", t[:, 0], H, u, noisy, False, None, blank.valid)
@@ -68,8 +68,8 @@ def _screen(repeat: int) -> list[Line | Note]:
             raise Disagreement(f"the screen does not suspect {creep.effect} at {creep.location}")
         columns.append(len(screened.cosine))
 
-    nominal = Response(device, (), channels, H, False)
-    seconds = interleave({"ours": timed(ours), "peer": timed(lambda: nominal.outputs(record, np.zeros(0)))}, repeat)
+    nominal = Simulator(device, (), channels, H, False)
+    seconds = interleave({"ours": timed(ours), "peer": timed(lambda: nominal.simulate(record, np.zeros(0)))}, repeat)
     each = [s * columns[0] for s in seconds["peer"]]
     what = f"screen, hexapod, {LONG} samples x 6, {columns[0]} columns"
     return [Line(what, seconds["ours"], "a simulation a column", each, SCREEN_AIM)]

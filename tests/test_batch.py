@@ -187,7 +187,7 @@ def test_replicates_agree_with_the_slopes_where_the_noise_is_white(creeping):
     assert found.replicates == 24 and found.failed == () and list(found.vanished.values()) == [0.0]
     gain, fit = found.values["effect[0].gain"], creeping.search.chosen.fit
     assert gain.ci95[0] < 0.03 < gain.ci95[1]
-    k = next(i for i, u in enumerate(fit.structure.unknowns) if u.path == "effect[0].gain")
+    k = next(i for i, u in enumerate(fit.structure.free_parameters) if u.path == "effect[0].gain")
     of_slopes = 2 * 1.96 * np.sqrt(fit.covariance[k, k])
     assert 0.4 < (gain.ci95[1] - gain.ci95[0]) / of_slopes < 2.0
     said = creeping.values["effect[0].gain"].ci95  # with what the law's form may be off

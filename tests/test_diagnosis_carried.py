@@ -9,7 +9,7 @@ from conftest import SCENARIOS
 
 from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation import sample_equations
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import hypotheses, nominal_links
 from ctrlgen.model import integrators
@@ -25,7 +25,7 @@ SHAPES = {
 }  # fmt: skip
 
 
-def response(text, effects, linear, folder) -> tuple[Response, np.ndarray]:
+def simulator(text, effects, linear, folder) -> tuple[Simulator, np.ndarray]:
     """Of a device with some effects, all their parameters free, and where these start."""
     (folder / "device.toml").write_text(text)
     device, channel = load_device(folder / "device.toml"), "reading.axis"
@@ -34,8 +34,8 @@ def response(text, effects, linear, folder) -> tuple[Response, np.ndarray]:
         if h.effect in effects:
             structure = structure.with_cause(h, SHAPES[h.effect])
     assert len(structure.causes) == len(effects)
-    free = [unknown.path for unknown in structure.unknowns]
-    return Response(structure.described, free, (channel,), H, linear), structure.start
+    free = [unknown.path for unknown in structure.free_parameters]
+    return Simulator(structure.device_with_causes, free, (channel,), H, linear), structure.start
 
 
 def record(amplitude) -> Record:
@@ -44,17 +44,17 @@ def record(amplitude) -> Record:
     return Record("fit", "fit", t, H, u[:, None], np.zeros((N, 1)), False, None, np.ones((N, 1), bool))
 
 
-def differentiated(r: Response, moved: Record, p: np.ndarray) -> np.ndarray:
+def differentiated(r: Simulator, moved: Record, p: np.ndarray) -> np.ndarray:
     """dy/dp and dy/dstart (n, n_y, m): D+ = F_S D + F_p, with whole samples differentiated by CasADi."""
     q = r._equations
     by = [q.given[0], q.given[4]]
     slopes = ca.Function("slopes", q.given, [ca.jacobian(value, s) for value in (q.following, q.y) for s in by])
-    after, _ = r.motion(moved, p)
-    before = np.vstack([r.begin(moved, p), after[:-1]])
+    after, _ = r.simulate_states(moved, p)
+    before = np.vstack([r.initial_state(moved, p), after[:-1]])
     c, c_p = q.constants(p)
-    starts = len(r.initial)
+    starts = len(r.free_initial_states)
     D, Y = np.zeros((r.n_s, len(p) + starts)), []
-    D[list(r.initial), len(p) + np.arange(starts)] = 1.0
+    D[list(r.free_initial_states), len(p) + np.arange(starts)] = 1.0
     entering = np.hstack([c_p.full(), np.zeros((len(c.full()), starts))])
     for S, u, u_next, e in zip(before, *r._inputs(moved), strict=True):
         F_S, F_c, H_S, H_c = (value.full() for value in slopes(S, u, u_next, e, c))
@@ -63,11 +63,11 @@ def differentiated(r: Response, moved: Record, p: np.ndarray) -> np.ndarray:
     return np.array(Y)
 
 
-def linearised(r: Response, moved: Record, p: np.ndarray) -> np.ndarray:
+def linearised(r: Simulator, moved: Record, p: np.ndarray) -> np.ndarray:
     """dy/dp (n, n_y, m) from the motion linearised sample by sample."""
-    after, _ = r.motion(moved, p)
-    before = np.vstack([r.begin(moved, p), after[:-1]])
-    F_S, F_p, H_S, H_p = r.linearised(p, range(len(p))).along(before, *r._inputs(moved))
+    after, _ = r.simulate_states(moved, p)
+    before = np.vstack([r.initial_state(moved, p), after[:-1]])
+    F_S, F_p, H_S, H_p = r.linearise(p, range(len(p))).evaluate_along(before, *r._inputs(moved))
     D, Y = np.zeros((r.n_s, len(p))), []
     for k in range(N):
         Y.append(H_S[k] @ D + H_p[k])
@@ -92,14 +92,14 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
         integrators, "SOLVING", 14
     )  # to the end: where N is solved for, slopes of steps on the way are others
     monkeypatch.setattr(sample_equations, "WORTH", worth)
-    r, p = response(text, effects, linear, tmp_path)
+    r, p = simulator(text, effects, linear, tmp_path)
     assert isinstance(r._equations.steps, integrators.Sticking) == ("coulomb" in effects)
     assert r._equations.model.held.numel() == ("loop" in text)
     moved = record(size)
     y, Y = r.sensitivities(moved, p)
     agree(Y, differentiated(r, moved, p))
     agree(linearised(r, moved, p), Y[:, :, : len(p)])
-    assert np.allclose(y, r.outputs(moved, p), rtol=0, atol=1e-12 * np.abs(y).max())
+    assert np.allclose(y, r.simulate(moved, p), rtol=0, atol=1e-12 * np.abs(y).max())
     alone = r.sensitivities(moved, p, by_free=False)[1]
     agree(alone, Y[:, :, len(p) :])
 

@@ -10,13 +10,13 @@ from scipy.signal import lfilter
 from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, record
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.isolated_outliers import alone
-from ctrlgen.diagnosis.estimation.noise import coloured, estimate
-from ctrlgen.diagnosis.estimation.noise_update import learn_guessed
-from ctrlgen.diagnosis.estimation.prediction_uncertainty import uncertainty
-from ctrlgen.diagnosis.estimation.residual_noise import quiet_noise
-from ctrlgen.diagnosis.estimation.residual_tests import judge
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.isolated_outliers import isolated_outliers
+from ctrlgen.diagnosis.estimation.noise import estimate_noise, stationary_deviation
+from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
+from ctrlgen.diagnosis.estimation.prediction_uncertainty import prediction_uncertainty
+from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
+from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import HALF, Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import Trial
@@ -51,7 +51,7 @@ def fitter_of(change=lambda u: move(u), after=lambda y: y, n=1500, seed=4) -> Fi
     for u, role in zip(drives(n), ("fit", "hold_out"), strict=True):
         parts.append(record(u, after(change(u) + NOISE * rng.standard_normal(n)), role))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
-    return Fitter(recording, estimate(recording, SETTLING))
+    return Fitter(recording, estimate_noise(recording, SETTLING))
 
 
 def fine(u: np.ndarray, push: np.ndarray | float = 0.0) -> np.ndarray:
@@ -81,8 +81,10 @@ def test_play_is_followed_through_reversals_between_samples():
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 3e-8}))
     assert fit.theta[-1] == pytest.approx(6e-8, rel=0.05)
     assert fit.chi2 < 1.4 * fit.n  # the samples alone: 10 n
-    n = sum(int(r.valid.sum()) for r in fitter.held)
-    assert fitter.held_out(fit) < 1.4 * n  # rests first: inside the gap the slopes by the start say nothing of it
+    n = sum(int(r.valid.sum()) for r in fitter.held_out_records)
+    assert (
+        fitter.held_out_deviance(fit) < 1.4 * n
+    )  # rests first: inside the gap the slopes by the start say nothing of it
 
 
 def test_time_constants_are_found_decades_away():
@@ -119,7 +121,7 @@ def test_readings_on_a_lattice_are_read_off_as_quantised():
 
 def test_printed_digits_below_the_noise_are_no_finding():
     fitter = fitter_of(after=lambda y: np.round(y, 10))
-    assert quantisation_step(fitter.to_fit[0].observed[:, 0]) == pytest.approx(1e-10)
+    assert quantisation_step(fitter.fit_records[0].observed[:, 0]) == pytest.approx(1e-10)
     assert read_off(fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))) == ()
 
 
@@ -136,8 +138,8 @@ def test_a_push_on_a_mass_is_no_spike():
     spikes, pushed = left.copy(), left.copy()
     spikes[[100, 400, 401], 0] += 30
     pushed[300:305, 0] += [8, 30, 40, 25, 9]
-    assert np.flatnonzero(alone(spikes)).tolist() == [100, 400, 401]
-    assert not alone(pushed).any()
+    assert np.flatnonzero(isolated_outliers(spikes)).tolist() == [100, 400, 401]
+    assert not isolated_outliers(pushed).any()
 
 
 def test_a_start_that_is_far_off_is_begun_again_near_off():
@@ -190,15 +192,15 @@ def test_noise_is_told_at_the_frequencies_at_which_the_readings_move_least(a, sh
     left_out = lfilter([0.005], [1.0, -0.97], motion)
     total = 1 / np.sqrt(1 - a**2)
     for share in shares:
-        sd, ar, worth = quiet_noise(noise + share * left_out, motion)
-        assert 0.85 * total < coloured(sd, ar) < (2.2 if share else 1.15) * total
+        sd, ar, worth = noise_from_residual(noise + share * left_out, motion)
+        assert 0.85 * total < stationary_deviation(sd, ar) < (2.2 if share else 1.15) * total
         assert worth > 400
-    assert quiet_noise(noise + 20 * left_out, motion) is None  # physics at all frequencies tells no noise
+    assert noise_from_residual(noise + 20 * left_out, motion) is None  # physics at all frequencies tells no noise
 
 
 def test_a_stretch_that_is_too_short_tells_no_noise():
-    assert quiet_noise(np.ones(150), np.ones(150)) is None
-    assert quiet_noise(np.zeros(500), np.ones(500)) is None
+    assert noise_from_residual(np.ones(150), np.ones(150)) is None
+    assert noise_from_residual(np.zeros(500), np.ones(500)) is None
 
 
 def test_a_guessed_noise_is_refined_by_what_the_device_leaves():
@@ -206,10 +208,10 @@ def test_a_guessed_noise_is_refined_by_what_the_device_leaves():
     guess, fitter = (fitter_of() for _ in range(2))
     for f in (guess, fitter):
         f.recording = replace(f.recording, records=tuple(r for r in f.recording.records if r.role != "rest"))
-        f.noise = estimate(replace(f.recording, records=f.recording.records[:1]), SETTLING)
+        f.noise = estimate_noise(replace(f.recording, records=f.recording.records[:1]), SETTLING)
     assert guess.noise.guessed[0] and guess.noise.floor[0] > 3 * NOISE
-    fitter.noise = learn_guessed(fitter, fitter.fit(Structure(AXIS)))
-    assert fitter.noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in fitter.noise.said[0]
+    fitter.noise = update_guessed_noise(fitter, fitter.fit(Structure(AXIS)))
+    assert fitter.noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in fitter.noise.notes[0]
 
 
 def test_a_pitch_is_found_that_is_a_thousandth_of_the_path():
@@ -233,8 +235,8 @@ def test_fringes_that_bend_the_path_they_are_read_along_are_found_along_the_one_
 
     fitter = fitter_of(fringed)
     fit = fitter.fit(Structure(AXIS))
-    read = fitter.to_fit[0].observed[:, 0]
-    foreseen = fitter.predicted(fit, fitter.to_fit[0])[:, 0]
+    read = fitter.fit_records[0].observed[:, 0]
+    foreseen = fitter.predict(fit, fitter.fit_records[0])[:, 0]
     near = pytest.approx(pitch, rel=1e-3)
     assert near not in pitches(read, read - foreseen) and near in pitches(foreseen, read - foreseen)
     suggested = Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["pitches"]
@@ -257,7 +259,7 @@ def test_the_harmonic_of_a_fringe_that_is_known_is_found_along_what_the_fringe_c
     fringe = Hypothesis("cyclic", "sensor:axis", "axis")
     known = Structure(AXIS, (fringe,), ({"amplitude": size, "period": pitch, "phase": 0.0},))
     fit = fitter.fit(known)
-    read, foreseen = fitter.to_fit[0].observed[:, 0], fitter.predicted(fit, fitter.to_fit[0])[:, 0]
+    read, foreseen = fitter.fit_records[0].observed[:, 0], fitter.predict(fit, fitter.fit_records[0])[:, 0]
     near = pytest.approx(pitch / 2, rel=1e-3)
     assert near not in pitches(foreseen, read - foreseen) and near not in pitches(read, read - foreseen)
     assert near in Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["pitches"]
@@ -271,13 +273,13 @@ def test_a_reading_that_jumps_at_a_place_is_found_there(place):
         return y + 6e-8 * np.clip((y - place) / 2e-7 + 0.5, 0, 1)
 
     fitter = fitter_of(after=stitched)
-    assert np.ptp(fitter.to_fit[0].observed) > 2.5e-5
+    assert np.ptp(fitter.fit_records[0].observed) > 2.5e-5
     error = Hypothesis("stitching_error", "sensor:axis", "axis")
     start = Screen(fitter, [error]).run(fitter.fit(Structure(AXIS))).suspects[0].start
     fit = fitter.fit(Structure(AXIS).with_cause(error, start))
-    found = {u.name: value for u, value in zip(fit.structure.unknowns, fit.theta, strict=True)}
+    found = {u.name: value for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)}
     assert found["offset"] == pytest.approx(6e-8, rel=0.05)
-    beside = np.sort(fitter.to_fit[0].observed[:, 0] - place)
+    beside = np.sort(fitter.fit_records[0].observed[:, 0] - place)
     near = beside[beside < -1e-7][-1], beside[beside > 1e-7][0]  # the last reading before the ramp, the first beyond
     assert near[0] < found["position"] - place < near[1] and np.ptp(near) < 1e-6
     assert fit.chi2 < 1.1 * fit.n
@@ -299,7 +301,7 @@ def test_what_moves_at_rest_is_no_noise():
 
     for after, restless in ((lambda y: y, ()), (telegraph, ("reading.axis",))):
         fitter = fitter_of(after=after)
-        found = judge(fitter, fitter.fit(Structure(AXIS)))
+        found = run_residual_tests(fitter, fitter.fit(Structure(AXIS)))
         assert found.restless == restless and found.passed == (not restless)
 
 
@@ -311,7 +313,7 @@ def test_noise_so_slow_that_the_stage_may_move_is_said(poles, said):
     def wandering(y):
         return y + 3 * NOISE * lfilter([1.0], np.poly(poles), rng.standard_normal(len(y)))
 
-    (sentence,) = fitter_of(after=wandering).noise.said
+    (sentence,) = fitter_of(after=wandering).noise.notes
     assert ("may be the device" in sentence) == said
 
 
@@ -337,7 +339,7 @@ def test_the_moment_of_an_event_is_the_middle_of_its_rise(moment, rise):
     event = Hypothesis("force_step", "disturbance:axis", "axis", highest=HALF / H)
     start = Screen(fitter, [event]).run(fitter.fit(Structure(AXIS))).suspects[0].start
     fit = fitter.fit(Structure(AXIS).with_cause(event, start))
-    k = next(i for i, u in enumerate(fit.structure.unknowns) if u.name == "moment")
+    k = next(i for i, u in enumerate(fit.structure.free_parameters) if u.name == "moment")
     value, sd = fit.theta[k], np.sqrt(fit.covariance[k, k])
     assert abs(value - moment) < 3 * sd + H / FINE and sd < 1e-4
 
@@ -359,13 +361,13 @@ def test_a_drive_that_is_held_stays_held_through_its_sample():
 def test_numbers_that_the_fit_leaves_open_are_not_held_against_a_structure():
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
-    n = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+    n = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)
     off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
-    plain = sum(float(np.sum(fitter.whitened(off, r) ** 2)) for r in fitter.held)
+    plain = sum(float(np.sum(fitter.whitened_residual(off, r) ** 2)) for r in fitter.held_out_records)
     loose = replace(off, J=off.J / 40)  # as if known 40 times worse
     assert plain > 1.5 * n
-    assert fitter.held_out(loose) < 0.7 * plain
-    assert fitter.held_out(fit) < fitter.held_out(off)
+    assert fitter.held_out_deviance(loose) < 0.7 * plain
+    assert fitter.held_out_deviance(fit) < fitter.held_out_deviance(off)
 
 
 def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
@@ -373,39 +375,41 @@ def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
     fit = fitter.fit(Structure(AXIS))
     off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
     loose = replace(off, J=off.J / 40 * (np.arange(off.J.shape[1]) != 1))
-    assert fitter.held_out(loose) < 0.7 * fitter.held_out(replace(off, J=1e4 * off.J))
-    moved, *_ = fitter.as_known(loose)
+    assert fitter.held_out_deviance(loose) < 0.7 * fitter.held_out_deviance(replace(off, J=1e4 * off.J))
+    moved, *_ = fitter.refitted_to_held_out(loose)
     assert moved.theta[1] == off.theta[1] and np.all(moved.theta[[0, 2, 3]] != off.theta[[0, 2, 3]])
 
 
 def test_what_slopes_that_left_the_numbers_say_is_not_called_sure(monkeypatch):
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
-    (record,) = fitter.held
-    shape = (len(record.time), 1, len(fit.theta) + len(fit.starts[0]))
-    monkeypatch.setattr(Response, "sensitivities", lambda *_: (record.observed, np.full(shape, np.nan)))
-    assert np.array_equal(uncertainty(fitter, fit), [np.inf])
+    (record,) = fitter.held_out_records
+    shape = (len(record.time), 1, len(fit.theta) + len(fit.initial_states[0]))
+    monkeypatch.setattr(Simulator, "sensitivities", lambda *_: (record.observed, np.full(shape, np.nan)))
+    assert np.array_equal(prediction_uncertainty(fitter, fit), [np.inf])
 
 
 def test_what_uncertain_numbers_leave_is_what_numbers_drawn_from_it_leave(rng):
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
-    (record,) = fitter.held
+    (record,) = fitter.held_out_records
     drawn = rng.multivariate_normal(fit.theta, fit.covariance, 200)
-    off = [fitter.predicted(replace(fit, theta=theta), record) - fitter.predicted(fit, record) for theta in drawn]
-    assert uncertainty(fitter, fit) == pytest.approx(np.sqrt(np.mean(np.square(off), axis=(0, 1))), rel=0.15)
+    off = [fitter.predict(replace(fit, theta=theta), record) - fitter.predict(fit, record) for theta in drawn]
+    assert prediction_uncertainty(fitter, fit) == pytest.approx(np.sqrt(np.mean(np.square(off), axis=(0, 1))), rel=0.15)
     fixed = replace(fit, theta=np.zeros(0), J=np.zeros((len(fit.J), 0)))
-    assert np.array_equal(uncertainty(fitter, fixed), [0.0])
+    assert np.array_equal(prediction_uncertainty(fitter, fixed), [0.0])
 
 
 def test_a_fit_is_judged_where_the_records_leave_its_numbers_and_by_what_it_fitted():
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
-    assert judge(fitter, fit).passed
+    assert run_residual_tests(fitter, fit).passed
     off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
-    assert not judge(fitter, off).passed
-    assert judge(fitter, replace(off, J=off.J / 1e4)).passed  # as if nothing were known of it
-    assert not judge(fitter, replace(fit, chi2=1.5 * fit.n)).passed  # what shows in the records to fit alone
+    assert not run_residual_tests(fitter, off).passed
+    assert run_residual_tests(fitter, replace(off, J=off.J / 1e4)).passed  # as if nothing were known of it
+    assert not run_residual_tests(
+        fitter, replace(fit, chi2=1.5 * fit.n)
+    ).passed  # what shows in the records to fit alone
 
 
 def test_a_reading_that_moves_with_the_surroundings_at_rest_is_no_noise():
@@ -415,7 +419,7 @@ def test_a_reading_that_moves_with_the_surroundings_at_rest_is_no_noise():
     for warmth, told in ((None, 4.0), (ambient, 1.0)):
         still = replace(record(np.zeros(1500), y, "rest"), ambient=warmth)
         recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), (still,), ())
-        floor = estimate(recording, SETTLING).floor[0] / NOISE
+        floor = estimate_noise(recording, SETTLING).floor[0] / NOISE
         assert floor == pytest.approx(1.0, rel=0.05) if told == 1.0 else floor > 1.5
 
 
@@ -426,10 +430,10 @@ def test_what_bends_a_reading_is_delayed_afterwards():
         start = {delay: {"delay": 1.4e-3}, bow: {"curvature": 2e3}}
         s = Structure(AXIS, order, tuple(start[c] for c in order))
         fitter = fitter_of()
-        response = s.responses(fitter.recording, {})[H, False]
-        ends[order] = response.outputs(fitter.to_fit[0], s.start)[:, 0]
+        simulator = s.simulators(fitter.recording, {})[H, False]
+        ends[order] = simulator.simulate(fitter.fit_records[0], s.start)[:, 0]
     plain = Structure(AXIS, (delay,), ({"delay": 1.4e-3},))
-    late = plain.responses(fitter.recording, {})[H, False].outputs(fitter.to_fit[0], plain.start)[:, 0]
+    late = plain.simulators(fitter.recording, {})[H, False].simulate(fitter.fit_records[0], plain.start)[:, 0]
     assert np.array_equal(*ends.values())
     bent = late + 2e3 * late**2
     assert np.abs(ends[delay, bow] - bent).max() < 0.02 * np.abs(bent - late).max()
@@ -441,9 +445,11 @@ def test_fringes_count_in_what_a_bowed_scale_says():
     both = Structure(AXIS, (bow, fringe), starts)
     fitter = fitter_of()
     plain = (
-        Structure(AXIS).responses(fitter.recording, {})[H, False].outputs(fitter.to_fit[0], Structure(AXIS).start)[:, 0]
+        Structure(AXIS)
+        .simulators(fitter.recording, {})[H, False]
+        .simulate(fitter.fit_records[0], Structure(AXIS).start)[:, 0]
     )
-    read = both.responses(fitter.recording, {})[H, False].outputs(fitter.to_fit[0], both.start)[:, 0]
+    read = both.simulators(fitter.recording, {})[H, False].simulate(fitter.fit_records[0], both.start)[:, 0]
     said = plain + 1e3 * plain**2
     assert np.abs(said - plain).max() > 1e-7  # a twentieth of a fringe
     assert read == pytest.approx(said + 3e-8 * np.sin(2 * np.pi * said / 2e-6 + 0.3), abs=1e-13)
@@ -454,7 +460,7 @@ def test_fringes_that_the_records_cannot_part_are_one():
     fitter = fitter_of()
     fringe = Hypothesis("cyclic", "sensor:axis", "axis")
     once_more = replace(fringe, count=1)
-    path = max(float(np.ptp(r.observed)) for r in fitter.to_fit)
+    path = max(float(np.ptp(r.observed)) for r in fitter.fit_records)
     for apart, part in ((0.3, False), (0.8, True)):
         starts = tuple({"amplitude": 1e-8, "phase": 0.0, "period": path / periods} for periods in (5.0, 5.0 + apart))
         fit = fitter.fit(Structure(AXIS, (fringe, once_more), starts), steps=0)

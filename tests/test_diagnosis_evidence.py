@@ -13,10 +13,10 @@ from scipy.signal import cont2discrete, lfilter
 from ctrlgen import build_model, load_device, load_scenario
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import Noise, estimate
+from ctrlgen.diagnosis.estimation.noise import Noise, estimate_noise
 from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, profiles
-from ctrlgen.diagnosis.estimation.robust_covariance import deviations, sandwich_over_model
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations, sandwich_over_model
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence.detectability import detectable
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, shapes
@@ -84,7 +84,7 @@ def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=No
         y = change(move(given, force, numbers=numbers), given) + NOISE * (e if white is None else white(e))
         parts.append(record(given, y, role, first=0.0 if role == "fit" else n * H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
-    fitter = Fitter(recording, estimate(recording, SETTLING))
+    fitter = Fitter(recording, estimate_noise(recording, SETTLING))
     fitter.cache = CACHE
     return fitter
 
@@ -92,7 +92,7 @@ def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=No
 def mapped(fitter, structure=None):
     """The fit, its linearisations and the map of what it leaves."""
     fit = fitter.fit(structure or Structure(AXIS))
-    left = [along(fitter, fit, r) for r in (*fitter.to_fit, *fitter.held)]
+    left = [along(fitter, fit, r) for r in (*fitter.fit_records, *fitter.held_out_records)]
     return fit, left, where(left, fitter.recording.channels, fitter.recording.units)
 
 
@@ -168,22 +168,22 @@ def test_the_lines_of_a_periodic_drive_tell_the_class_of_the_nonlinearity(law, w
 def meso():
     device = load_device(SCENARIOS / "devices" / "meso_hexapod.toml")
     channels = tuple(f"reading.{c}" for c in build_model(device).signals["reading"].channels)
-    return device, channels, Response(device, (), channels, np.inf, False)
+    return device, channels, Simulator(device, (), channels, np.inf, False)
 
 
 def pose_fitter(meso, on_drive, on_pose):
     """40 poses to fit and 20 to hold out; what the device does wrong is done here, outside its model."""
-    device, channels, response = meso
+    device, channels, simulator = meso
     rng = np.random.default_rng(5)
     u = rng.uniform(-2e-4, 2e-4, (60, 6))
     noise = np.repeat([2e-6, 2e-7], 3)
     blank = record(u, np.zeros((60, 6)), "fit", h=np.inf)
     blank = Record(**{**blank.__dict__, "drive": u * on_drive})
-    y = response.outputs(blank, np.zeros(0)) * on_pose + noise * rng.standard_normal((60, 6))
+    y = simulator.simulate(blank, np.zeros(0)) * on_pose + noise * rng.standard_normal((60, 6))
     parts = [record(u[a], y[a], role, h=np.inf) for role, a in (("fit", slice(0, 40)), ("hold_out", slice(40, 60)))]
     units = ("deg",) * 3 + ("um",) * 3
     recording = Recording("t", device.name, "poses", channels, units, tuple(noise), tuple(parts), ())
-    return Fitter(recording, estimate(recording, SETTLING))
+    return Fitter(recording, estimate_noise(recording, SETTLING))
 
 
 def test_a_weak_actuator_and_a_wrong_reading_are_told_apart(meso):
@@ -286,7 +286,7 @@ def test_noise_with_memory_taken_as_white_widens_the_interval():
         assert len(fitter.noise.ar[0]) == 0
         fit = fitter.fit(Structure(AXIS).with_cause(DRIFT, {"rate": 1e-9}))
         ratios.append(sandwich_over_model(fit)[-1])
-        widened = deviations(fit)[-1] / np.sqrt(fit.covariance[-1, -1])
+        widened = robust_deviations(fit)[-1] / np.sqrt(fit.covariance[-1, -1])
         assert widened == (1.0 if white is None else ratios[-1])
         (found,) = profiles(fitter, fit)
         width = found.ci95[1] - found.ci95[0]
@@ -324,10 +324,10 @@ def test_a_drive_that_could_do_far_too_much_is_used_a_little():
     strong = AXIS.actuator.model_copy(update={"drive_limit": written(400.0, "V")})
     structure = Structure(AXIS.model_copy(update={"actuator": strong}))
     fitter = axis_fitter()
-    template = fitter.to_fit[0]
-    response = structure.responses(fitter.recording, {})[template.sample_time, template.linear]
+    template = fitter.fit_records[0]
+    simulator = structure.simulators(fitter.recording, {})[template.sample_time, template.linear]
     for shape in shapes(2000, 1, 1 / H, 0):
-        record, strength = admissible(shape, response, structure.start, template, 0.0)
+        record, strength = admissible(shape, simulator, structure.start, template, 0.0)
         assert strength < 0.02 and 0.3 < np.abs(record.drive).max() < 4.0
 
 

@@ -19,7 +19,7 @@ from ctrlgen.app.cli import execute
 from ctrlgen.core.to_json import plain
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, Profile
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.pipeline import diagnose_into, unfinished
 from ctrlgen.diagnosis.report.diagnosis_json import as_dict
@@ -89,7 +89,7 @@ def poses_recording(folder: Path, device) -> Path:
 
     none = np.zeros((n, 6))
     record = Record("", "fit", np.arange(n), np.inf, drives, none, False, None, none == 0)
-    pose = Response(device, (), channels, np.inf, False).outputs(record, np.zeros(0)) + 1e-8 * rng.standard_normal(
+    pose = Simulator(device, (), channels, np.inf, False).simulate(record, np.zeros(0)) + 1e-8 * rng.standard_normal(
         (n, 6)
     )
     axes = model.signals["drive"].channels
@@ -125,16 +125,16 @@ def same_prediction(diagnosis, text: str, folder: Path) -> None:
     (folder / "next.toml").write_text(text)
     device, fit, recording = ctrlgen.load_device(folder / "next.toml"), diagnosis.search.chosen.fit, diagnosis.recording
     stated = {path: number.si for path, number in device.quantities()}
-    theta = np.array([stated.pop(unknown.path) for unknown in fit.structure.unknowns])
+    theta = np.array([stated.pop(unknown.path) for unknown in fit.structure.free_parameters])
     assert stated.items() <= {path: number.si for path, number in diagnosis.device.quantities()}.items()
-    responses = fit.structure.responses(recording, diagnosis.fitter.cache)
+    simulators = fit.structure.simulators(recording, diagnosis.fitter.cache)
     for record in recording.records:
-        response = responses[record.sample_time, record.linear]
-        own = Response(device, (), recording.channels, record.sample_time, record.linear)
-        wanted = response.outputs(record, fit.theta)
+        simulator = simulators[record.sample_time, record.linear]
+        own = Simulator(device, (), recording.channels, record.sample_time, record.linear)
+        wanted = simulator.simulate(record, fit.theta)
         size = np.abs(wanted).max(axis=0)
-        assert np.all(np.abs(response.outputs(record, theta) - wanted) <= 1e-9 * size)
-        assert np.all(np.abs(own.outputs(record, np.zeros(0)) - wanted) <= 1e-6 * size)
+        assert np.all(np.abs(simulator.simulate(record, theta) - wanted) <= 1e-9 * size)
+        assert np.all(np.abs(own.simulate(record, np.zeros(0)) - wanted) <= 1e-6 * size)
 
 
 # --- diagnosis.json
@@ -187,7 +187,7 @@ def test_the_next_device_states_the_deviations_of_the_fit(found, tmp_path):
     (tmp_path / "next.toml").write_text(next_text(found, AXIS.read_text()))
     device, fit = ctrlgen.load_device(tmp_path / "next.toml"), found.search.chosen.fit
     stated = dict(device.quantities())
-    for unknown, variance in zip(fit.structure.unknowns, np.diag(fit.covariance), strict=True):
+    for unknown, variance in zip(fit.structure.free_parameters, np.diag(fit.covariance), strict=True):
         assert stated[unknown.path].sd == pytest.approx(np.sqrt(variance), rel=0.01), unknown.path
 
 

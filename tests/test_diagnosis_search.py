@@ -11,8 +11,8 @@ from test_diagnosis_causes import BACKLASH, LATE, LIMIT, fitter_of, played
 from test_diagnosis_evidence import AXIS, NOISE, H, move
 
 from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.estimation.noise_update import learn_colour, learn_more
-from ctrlgen.diagnosis.estimation.residual_tests import Adequacy
+from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise_colour
+from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import Search, Trial, freed
@@ -76,9 +76,9 @@ def test_a_law_may_as_well_be_its_special_case_where_the_fit_does_not_exclude_it
     stribeck = Hypothesis("stribeck", "stage:axis", "axis")
     rubbing = {"force": 0.01, "breakaway": breakaway, "speed": 1e-4, "reach": 2e-8}
     structure = Structure(AXIS).with_cause(stribeck, rubbing).with_cause(BACKLASH, {"gap": 6e-8})
-    J = np.eye(len(structure.unknowns)) / sd
+    J = np.eye(len(structure.free_parameters)) / sd
     fit = Fit(structure, structure.start, (), 0.0, 1500, np.zeros(0), J, 0.0)
-    assert fit.special(0) == special and fit.special(1) is None
+    assert fit.nested_case(0) == special and fit.nested_case(1) is None
 
 
 def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():
@@ -86,7 +86,7 @@ def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common(
     rubbing = {"force": 0.01, "breakaway": 1.0, "speed": 1e-4, "reach": 2e-8}
     model = fitter_of()
     fit = model.fit(Structure(AXIS).with_cause(dahl, rubbing), steps=0)
-    rubbed = replace(model.to_fit[0], observed=model.predicted(fit, model.to_fit[0]))
+    rubbed = replace(model.fit_records[0], observed=model.predict(fit, model.fit_records[0]))
     searcher = searcher_of(model)
     model.recording = replace(model.recording, records=(rubbed,))
     far, bare = {"force": 0.001, "reach": 3e-6, "smoothing": 1e-9}, Structure(AXIS)
@@ -103,7 +103,9 @@ def test_the_price_of_a_number_is_what_the_fit_knows_of_it():
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
     step = np.sqrt(np.diag(fit.covariance)) * np.array([0.5, -1.0, 2.0, 0.3])[: len(fit.theta)]
-    assert np.sum((fit.root @ step) ** 2) == pytest.approx(step @ np.linalg.solve(fit.covariance, step), rel=1e-3)
+    assert np.sum((fit.information_root @ step) ** 2) == pytest.approx(
+        step @ np.linalg.solve(fit.covariance, step), rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("at_rest, learnt", [(0.6, True), (0.0, False)])
@@ -115,15 +117,15 @@ def test_a_colour_that_the_rest_has_not_is_not_the_noises(at_rest, learnt):
 
     fitter = fitter_of()
     clean = fitter_of(after=lambda y: y, seed=4)
-    y = clean.predicted(clean.fit(Structure(AXIS)), clean.to_fit[0])
+    y = clean.predict(clean.fit(Structure(AXIS)), clean.fit_records[0])
     colours = {"rest": at_rest, "fit": 0.6, "hold_out": 0.6}
-    moved = {"rest": 0.0, "fit": y, "hold_out": fitter.held[0].observed}
+    moved = {"rest": 0.0, "fit": y, "hold_out": fitter.held_out_records[0].observed}
     records = tuple(
         replace(r, observed=moved[r.role] + coloured(len(r.time), colours[r.role])[:, None])
         for r in fitter.recording.records
     )
     fitter.recording = replace(fitter.recording, records=records)
-    noise = learn_colour(fitter, fitter.fit(Structure(AXIS)))
+    noise = update_noise_colour(fitter, fitter.fit(Structure(AXIS)))
     assert (noise is not fitter.noise) == learnt
     assert not learnt or noise.ar[0][0] == pytest.approx(0.6, abs=0.08)
 
@@ -134,9 +136,9 @@ def test_a_guessed_noise_is_corrected_downward_alone(times, learnt):
     fit = fitter.fit(Structure(AXIS))
     guessed = np.ones(1, bool)
     fitter.noise = replace(fitter.noise, sd=times * fitter.noise.sd, ar=(np.zeros(0),), guessed=guessed)
-    noise = learn_more(fitter, fit)
+    noise = update_noise(fitter, fit)
     assert (noise is not fitter.noise) == learnt
-    assert not learnt or (noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in noise.said[0])
+    assert not learnt or (noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in noise.notes[0])
 
 
 @pytest.mark.parametrize(
@@ -148,14 +150,14 @@ def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, pa
     nominal = replace(fitter.fit(Structure(AXIS)), chi2=1e7)
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
     left = fit.n + share**2 * (nominal.objective - fit.n)
-    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out(fit), 0.0)
+    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(fit), 0.0)
     bare = Trial(nominal, 1e9, 0.0)
     search = Search(bare, chosen, (bare,), ((chosen,) * rivals,), (), None)
-    assert verdict(fitter, search, Adequacy((1.2,), {}, passed)) == says
+    assert verdict(fitter, search, ResidualTests((1.2,), {}, passed)) == says
     nothing = replace(search, chosen=search.nominal, bare=(), rivals=())
     for left in (nominal.chi2, 0.5 * nominal.n):  # also where only the rest is no noise
         clean = Trial(replace(nominal, chi2=left, penalty=0.0), 0.0, 0.0)
-        said = verdict(fitter, replace(nothing, chosen=clean, nominal=clean), Adequacy((1.2,), {}, passed))
+        said = verdict(fitter, replace(nothing, chosen=clean, nominal=clean), ResidualTests((1.2,), {}, passed))
         assert said == (CONSISTENT if passed else UNEXPLAINED)
 
 
@@ -167,9 +169,9 @@ def test_a_law_that_says_how_rough_it_is_may_leave_as_much(share, says):
     bare = Trial(replace(fitter.fit(Structure(AXIS)), chi2=1e7), 1e7, 0.0)
     fit = fitter.fit(Structure(AXIS).with_cause(drift, {"rate": 1e-7}), steps=0)
     left = fit.n + share**2 * (bare.fit.objective - fit.n)
-    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out(bare.fit), 0.0)
+    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(bare.fit), 0.0)
     search = Search(bare, chosen, (bare,), ((),), (), None)
-    assert verdict(fitter, search, Adequacy((1.2,), {}, False)) == says
+    assert verdict(fitter, search, ResidualTests((1.2,), {}, False)) == says
 
 
 @pytest.mark.parametrize("mismatch, sizes", [(2e4, {2, 3}), (2e6, {2})])
@@ -224,20 +226,20 @@ def test_what_no_held_out_record_reaches_is_named_where_it_explains_nearly_all(l
     assert searcher.weigh.worth(before, after) == worth
     search = Search(before, after, (before,), ((),), (), None)
     assert unconfirmed(search) == (BACKLASH,)
-    assert verdict(searcher.fitter, search, Adequacy((1.0,), {}, True)) == PARTLY
+    assert verdict(searcher.fitter, search, ResidualTests((1.0,), {}, True)) == PARTLY
     shown = replace(search, bare=(trial(nominal.fit, 1e4, held + 50.0),))
-    assert unconfirmed(shown) == () and verdict(searcher.fitter, shown, Adequacy((1.0,), {}, True)) == EXPLAINED
+    assert unconfirmed(shown) == () and verdict(searcher.fitter, shown, ResidualTests((1.0,), {}, True)) == EXPLAINED
 
 
 def test_numbers_that_foresee_worse_than_none_are_not_the_whole_answer():
     fitter = fitter_of(played)
     nominal = fitter.fit(Structure(AXIS))
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}))
-    far = replace(fit, theta=fit.theta * np.where([u.cause is None for u in fit.structure.unknowns], 1.0, 4.0))
+    far = replace(fit, theta=fit.theta * np.where([u.cause is None for u in fit.structure.free_parameters], 1.0, 4.0))
     bare = Trial(nominal, 1e9, 0.0)
     for of, says in ((fit, EXPLAINED), (far, PARTLY)):  # as where one touch in the record to fit tells little of a stop
-        search = Search(bare, Trial(of, fitter.held_out(fit), 0.0), (bare,), ((),), (), None)
-        assert verdict(fitter, search, Adequacy((1.0,), {}, True)) == says
+        search = Search(bare, Trial(of, fitter.held_out_deviance(fit), 0.0), (bare,), ((),), (), None)
+        assert verdict(fitter, search, ResidualTests((1.0,), {}, True)) == says
 
 
 class Kinked:
@@ -302,10 +304,10 @@ def test_a_bent_valley_is_followed():
 def test_a_device_far_from_the_readings_is_fitted_from_several_starts(monkeypatch, far):
     fitter, begun = fitter_of(), []
     best = fitter.fit(Structure(AXIS))
-    stated = sum(u.sd is not None for u in best.structure.unknowns)
+    stated = sum(u.sd is not None for u in best.structure.free_parameters)
     poor = replace(best, chi2=1e5 * best.chi2 if far else 2 * best.chi2)
     monkeypatch.setattr(fitter, "fit", lambda s: begun.append(s.own) or (best if len(begun) == 4 else poor))
-    found = fitter.described(AXIS)
+    found = fitter.fit_described(AXIS)
     assert len(begun) == (1 + 2 * stated if far else 1) and stated >= 2
     assert found is (best if far else poor) and begun[0] == {} and all(len(own) == 1 for own in begun[1:])
 

@@ -12,7 +12,7 @@ from conftest import SCENARIOS
 from ctrlgen import build_model, load_device
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen
 from ctrlgen.diagnosis.selection import score_gradient as slopes_module
@@ -47,7 +47,7 @@ def hexapod():
     valid = np.ones((N, 6), bool)
     valid[300:320, 2] = False
     records = [Record(role, role, t[:, 0], H, u, np.zeros((N, 6)), False, None, valid) for role in ("fit", "hold_out")]
-    y = Response(HEXAPOD, (), channels, H, False).outputs(records[0], np.zeros(0))
+    y = Simulator(HEXAPOD, (), channels, H, False).simulate(records[0], np.zeros(0))
     sd = np.ptp(y, axis=0) / 300
     noisy = y + sd * np.random.default_rng(4).standard_normal(y.shape)
     records = [Record(r.name, r.role, r.time, H, u, noisy, False, None, valid) for r in records]
@@ -60,10 +60,10 @@ def hexapod():
 
 def brute(slopes, start):
     """S (n, n_y, columns) by the recursion over all states and all columns, whitened."""
-    r, record = slopes.response, slopes.record
-    after, _ = r.motion(record, slopes.p, start)
+    r, record = slopes.simulator, slopes.record
+    after, _ = r.simulate_states(record, slopes.p, start)
     before = np.vstack([r._start(record, slopes.p, start), after[:-1]])
-    F_S, F_p, H_S, H_p = slopes.linear.along(before, *r._inputs(record))
+    F_S, F_p, H_S, H_p = slopes.linear.evaluate_along(before, *r._inputs(record))
     step, memory, f, ends = slopes.laws.compiled(slopes.p), slopes.laws.start(record.time[0]), [], []
     for k in range(N):
         memory, term, end = step(memory, before[k], record.drive[k], 0.0, after[k])
@@ -87,12 +87,12 @@ def brute(slopes, start):
 def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypatch):
     monkeypatch.setattr(slopes_module, "BLOCK", 123)
     fit = hexapod.fit(Structure(HEXAPOD))
-    record = hexapod.to_fit[0]
+    record = hexapod.fit_records[0]
     slopes = Slopes(hexapod, fit, record, LAWS, shows_nothing)
     white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
-    found = slopes.sums(white, J, fit.starts[0])
+    found = slopes.sums(white, J, fit.initial_states[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
-    S = noise.whiten(brute(slopes, fit.starts[0]), np.ones((N, 6), bool)) * usable[:, :, None]
+    S = noise.whiten(brute(slopes, fit.initial_states[0]), np.ones((N, 6), bool)) * usable[:, :, None]
     for name, value in (
         ("US", np.einsum("nik,nij->kj", J, S)),
         ("Sr", np.einsum("nij,ni->j", S, white)),
@@ -107,14 +107,14 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
 @pytest.mark.parametrize("law", [h for h in LAWS if h.effect != PARAMETER], ids=lambda h: f"{h.effect}-{h.at}")
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))
-    record = hexapod.to_fit[0]
+    record = hexapod.fit_records[0]
     slopes = Slopes(hexapod, fit, record, [law], shows_nothing)
-    column, start = slopes.columns[-1], np.zeros(len(fit.starts[0]))
+    column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
     slope = brute(slopes, start)[:, :, -1]
     structure = Structure(HEXAPOD).with_cause(law, {**column.shape, name: off + column.size})
-    response = Response(structure.described, (f"effect[0].{name}",), hexapod.recording.channels, H, False)
-    ends = [response.outputs(record, np.array([off + share * column.size])) for share in (0.01, 0.0)]
+    simulator = Simulator(structure.device_with_causes, (f"effect[0].{name}",), hexapod.recording.channels, H, False)
+    ends = [simulator.simulate(record, np.array([off + share * column.size])) for share in (0.01, 0.0)]
     apart = (ends[0] - ends[1]) / 0.01
     assert np.linalg.norm(slope - apart) < 0.04 * np.linalg.norm(apart)
 

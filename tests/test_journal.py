@@ -10,7 +10,7 @@ import pytest
 from test_batch import SERVO, servo_poses
 
 from ctrlgen.diagnosis.estimation import fit
-from ctrlgen.diagnosis.estimation.checkpoint import Journal, key_of
+from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests, unfinished
 
 MADE_FROM = {"version": "1", "seed": 0, "files": {"a": "b"}}
@@ -66,22 +66,22 @@ def test_the_folder_one_stands_in_has_a_name_too(monkeypatch, tmp_path):
 
 def test_another_seed_or_file_begins_anew(tmp_path):
     path = tmp_path / "kept"
-    Journal(path, MADE_FROM).keep("k", np.array([0.1, -1e-300]))
-    assert np.array_equal(Journal(path, MADE_FROM).recall("k"), [0.1, -1e-300])
-    other = Journal(path, MADE_FROM | {"seed": 1})
-    assert other.known == 0
+    Checkpoint(path, MADE_FROM).keep("k", np.array([0.1, -1e-300]))
+    assert np.array_equal(Checkpoint(path, MADE_FROM).recall("k"), [0.1, -1e-300])
+    other = Checkpoint(path, MADE_FROM | {"seed": 1})
+    assert other.reused == 0
     other.keep("l", np.zeros(1))
-    assert Journal(path, MADE_FROM).known == 0  # the other one took its place
+    assert Checkpoint(path, MADE_FROM).reused == 0  # the other one took its place
 
 
 def test_a_line_that_was_not_written_to_its_end_does_not_count(tmp_path):
     path = tmp_path / "kept"
     lines = [json.dumps(MADE_FROM), json.dumps(["a", [1.0]]), '["b", [2.']
     path.write_text("\n".join(lines))
-    journal = Journal(path, MADE_FROM)
-    assert journal.known == 1 and journal.recall("b") is None
-    journal.keep("c", np.array([3.0]))
-    assert set(Journal(path, MADE_FROM).found) == {"a", "c"}
+    checkpoint = Checkpoint(path, MADE_FROM)
+    assert checkpoint.reused == 1 and checkpoint.recall("b") is None
+    checkpoint.keep("c", np.array([3.0]))
+    assert set(Checkpoint(path, MADE_FROM).found) == {"a", "c"}
 
 
 def test_a_key_tells_values_and_order():

@@ -37,10 +37,10 @@ def left(found, channel: str) -> float:
 def relative(found, channel: int = 0) -> float:
     """norm(error)/norm(reading) on the held-out records."""
     fit, fitter = found.search.chosen.fit, found.fitter
-    errors = [(r.observed - fitter.predicted(fit, r))[:, channel] for r in fitter.held]
+    errors = [(r.observed - fitter.predict(fit, r))[:, channel] for r in fitter.held_out_records]
     return float(
         np.linalg.norm(np.concatenate(errors))
-        / np.linalg.norm([y for r in fitter.held for y in r.observed[:, channel]])
+        / np.linalg.norm([y for r in fitter.held_out_records for y in r.observed[:, channel]])
     )
 
 
@@ -63,8 +63,8 @@ def test_the_meso_hexapod_is_wired_and_built_otherwise_than_printed():
     radius = causes["parameter", "mechanism:platform_radius"].parameters["platform_radius"]
     assert radius.value == pytest.approx(64.29, rel=0.01) and radius.unit == "mm"  # as Table 1's other lengths want it
     fit, fitter = found.search.chosen.fit, found.fitter
-    errors = PoseErrors(np.vstack([r.observed - fitter.predicted(fit, r) for r in fitter.held]))
-    assert sum(u.cause is not None for u in fit.structure.unknowns) <= 18  # half of the peer's
+    errors = PoseErrors(np.vstack([r.observed - fitter.predict(fit, r) for r in fitter.held_out_records]))
+    assert sum(u.cause is not None for u in fit.structure.free_parameters) <= 18  # half of the peer's
     assert np.rad2deg(errors.rotation.mean()) < 0.00095
     assert errors.translation.mean() < 2.2e-6
 

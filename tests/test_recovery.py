@@ -25,7 +25,7 @@ from battery.plant_hexapod import Faults, Hexapod
 from ctrlgen import load_device
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import estimate
+from ctrlgen.diagnosis.estimation.noise import estimate_noise
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import HALF, Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -245,11 +245,11 @@ def recover(fitter: Fitter, device: Device, effect: str, planted: Planted) -> No
     nominal = fitter.fit(Structure(device))
     best, *_ = Screen(fitter, [cause]).run(nominal).suspects
     fit = fitter.fit(Structure(device).with_cause(cause, best.start))
-    rough, held = cause.law.rough**2, sum(int(r.valid.sum()) for r in fitter.held)
+    rough, held = cause.law.rough**2, sum(int(r.valid.sum()) for r in fitter.held_out_records)
     assert fit.chi2 < noisy(fit.n) + rough * nominal.chi2 and fit.chi2 < 0.3 * nominal.chi2
-    assert fitter.held_out(fit) < noisy(held) + rough * fitter.held_out(nominal)
+    assert fitter.held_out_deviance(fit) < noisy(held) + rough * fitter.held_out_deviance(nominal)
     sd = np.sqrt(np.diag(fit.covariance))
-    found = {u.name: (fit.theta[k], sd[k]) for k, u in enumerate(fit.structure.unknowns) if u.cause == 0}
+    found = {u.name: (fit.theta[k], sd[k]) for k, u in enumerate(fit.structure.free_parameters) if u.cause == 0}
     for parameter, truth in planted.truth.items():
         value, deviation = found[parameter]
         assert abs(value - truth) < 4 * deviation + planted.within.get(parameter, 0.005) * abs(truth), parameter
@@ -257,7 +257,7 @@ def recover(fitter: Fitter, device: Device, effect: str, planted: Planted) -> No
 
 def fitter_of(device, channels, units, sds, kind, parts) -> Fitter:
     recording = Recording("t", device.name, kind, channels, units, tuple(sds), tuple(parts), ())
-    return Fitter(recording, estimate(recording, SETTLING))
+    return Fitter(recording, estimate_noise(recording, SETTLING))
 
 
 def poses_of(parts, kind) -> Fitter:

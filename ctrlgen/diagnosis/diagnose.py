@@ -14,13 +14,13 @@ from threadpoolctl import threadpool_limits
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.checkpoint import Journal
+from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
 from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.isolated_outliers import marked
-from ctrlgen.diagnosis.estimation.noise import estimate
-from ctrlgen.diagnosis.estimation.noise_update import learn_guessed
+from ctrlgen.diagnosis.estimation.isolated_outliers import mark_outliers
+from ctrlgen.diagnosis.estimation.noise import estimate_noise
+from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
 from ctrlgen.diagnosis.estimation.profile_likelihood import profiles
-from ctrlgen.diagnosis.estimation.residual_tests import judge
+from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence.supporting_analyses import evidence
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_links
@@ -44,7 +44,7 @@ def diagnose_recording(
     recording: Recording,
     seed: int = 0,
     progress: Progress | None = None,
-    journal: Journal | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Diagnosis:
     """What `device` leaves out that `recording` shows.
 
@@ -53,11 +53,11 @@ def diagnose_recording(
     """
     # one thread: the matrices are small; no warnings: a trial may leave the numbers, and is then rejected
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _diagnose(device, recording, seed, progress or (lambda _: None), journal)
+        return _diagnose(device, recording, seed, progress or (lambda _: None), checkpoint)
 
 
 def _diagnose(
-    device: Device, recording: Recording, seed: int, step: Progress, journal: Journal | None = None
+    device: Device, recording: Recording, seed: int, step: Progress, checkpoint: Checkpoint | None = None
 ) -> Diagnosis:
     recording = _relative_ambient(recording)
     missing = [role for role in ("fit", "hold_out") if not any(r.role == role for r in recording.records)]
@@ -66,13 +66,13 @@ def _diagnose(
     step("noise")
     live = alive(device, recording)
     recording = live.recording
-    noise = estimate(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
-    fitter = Fitter(recording, noise, journal)
+    noise = estimate_noise(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
+    fitter = Fitter(recording, noise, checkpoint)
     for _ in range(GUESSES if noise.guessed.any() else 0):
-        fitter.noise = learn_guessed(fitter, fitter.fit(Structure(device)))
+        fitter.noise = update_guessed_noise(fitter, fitter.fit(Structure(device)))
     noise = fitter.noise
-    described = fitter.described(device)
-    fitter.recording, spikes = marked(recording, lambda record: fitter.predicted(described, record))
+    described = fitter.fit_described(device)
+    fitter.recording, spikes = mark_outliers(recording, lambda record: fitter.predict(described, record))
     acting = set(movable(device))
     sample_times = {r.sample_time for r in recording.records}
     links = nominal_links(device)
@@ -85,7 +85,7 @@ def _diagnose(
     step(f"refit of the device as described, {len(open_)} hypotheses")
     found = Searcher(fitter, Screen(fitter, open_, seed), step).run(Structure(device))
     step("judging")
-    after = judge(fitter, found.chosen.fit)
+    after = run_residual_tests(fitter, found.chosen.fit)
     seen = (*live.findings, *read_off(fitter, found))
     said = verdict(fitter, found, after, bool(seen))
     step("evidence")
@@ -95,7 +95,7 @@ def _diagnose(
         verdict=said,
         findings=(*findings(found, sure), *seen),
         held_out=errors(fitter, found, noise.known),
-        adequacy=after,
+        residual_tests=after,
         where=beside.where,
         detectable=beside.detectable,
         next_experiment=beside.next_experiment,
@@ -103,7 +103,7 @@ def _diagnose(
         notes=(
             *recording.notes,
             *live.said,
-            *fitter.noise.said,
+            *fitter.noise.notes,
             *([spikes] if spikes else []),
             *map(RESTLESS.format, after.restless),
         ),

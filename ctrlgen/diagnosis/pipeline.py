@@ -15,7 +15,7 @@ from ctrlgen.core.files import read_toml, whole_folder, write_text
 from ctrlgen.core.to_json import plain
 from ctrlgen.devices import Device, load_device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
-from ctrlgen.diagnosis.estimation.checkpoint import Journal
+from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
 from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
 from ctrlgen.diagnosis.report.diagnosis_json import as_dict
 from ctrlgen.diagnosis.report.html_report import Provenance, page
@@ -53,7 +53,7 @@ def diagnose(
     recording: Recording | Paths,
     seed: int = 0,
     progress: Progress | None = None,
-    journal: Journal | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Diagnosis:
     """What `device` leaves out that `recording` shows; each may be an object or its file, a recording also several files.
 
@@ -65,7 +65,7 @@ def diagnose(
             progress("reading")
         paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
         recording = load_recordings(paths, build_model(device))
-    return diagnose_recording(device, recording, seed, progress, journal)
+    return diagnose_recording(device, recording, seed, progress, checkpoint)
 
 
 def diagnose_into(
@@ -86,10 +86,10 @@ def diagnose_into(
         model = build_model(load_device(device))
         step("reading")
         recording = load_recordings(list(recordings), model)
-        journal = _journal(Path(out), device, recordings, seed)
-        if journal.known:
-            step(f"going on after {journal.known} fits")
-        found = diagnose(model.device, recording, seed, step, journal)
+        checkpoint = _checkpoint(Path(out), device, recordings, seed)
+        if checkpoint.reused:
+            step(f"going on after {checkpoint.reused} fits")
+        found = diagnose(model.device, recording, seed, step, checkpoint)
         if replicates is not None:
             found.extra["bootstrap"] = replicates.of(found, seed, step)
             write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
@@ -100,7 +100,7 @@ def diagnose_into(
             write_text(draft / "next_experiment" / name, content)
         write_text(draft / "diagnosis.json", json.dumps(as_dict(found), indent=1, allow_nan=False) + "\n")
         write_text(draft / "report.html", page(found, Provenance(digests(Path(device), recordings), seed)))
-    journal.done()  # not before: what is stopped among its replicates need not fit anew
+    checkpoint.done()  # not before: what is stopped among its replicates need not fit anew
     return found
 
 
@@ -110,9 +110,11 @@ def unfinished(out: Path) -> Path:
     return out.with_name(f"{out.name}.unfinished")
 
 
-def _journal(out: Path, device: Path | str, recordings: Sequence[Path | str], seed: int) -> Journal:
+def _checkpoint(out: Path, device: Path | str, recordings: Sequence[Path | str], seed: int) -> Checkpoint:
     """Of the fits of a diagnosis into `out`."""
-    return Journal(unfinished(out), {"version": __version__, "seed": seed, "files": digests(Path(device), recordings)})
+    return Checkpoint(
+        unfinished(out), {"version": __version__, "seed": seed, "files": digests(Path(device), recordings)}
+    )
 
 
 def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:

@@ -20,10 +20,10 @@ def main() -> None:
     """Diagnoses and prints."""
     device = ctrlgen.load_device(HERE / "device.toml")
     found = ctrlgen.diagnose(device, load_recordings([HERE], build_model(device)))
-    for role, records in (("fitted", found.fitter.to_fit), ("held out", found.fitter.held)):
+    for role, records in (("fitted", found.fitter.fit_records), ("held out", found.fitter.held_out_records)):
         force = np.concatenate([r.observed for r in records])
         for name, trial in (("as described", found.search.nominal), ("corrected", found.search.chosen)):
-            error = np.concatenate([r.observed - found.fitter.predicted(trial.fit, r) for r in records])
+            error = np.concatenate([r.observed - found.fitter.predict(trial.fit, r) for r in records])
             print(f"{role:8s} {name:12s} {100 * np.linalg.norm(error) / np.linalg.norm(force):6.2f} %")
     print("the owner's: 4.1 and 3.1 % on fit, 6.0 % held out")
     for finding in found.findings:

@@ -28,12 +28,12 @@ def errors_without(found: Diagnosis, k: int | None = None) -> PoseErrors:
     s = fit.structure
     cooled = Structure(s.device, s.causes, tuple(fit.values(i) for i in range(len(s.causes))))
     other = fit if k is None else found.fitter.fit(cooled.without(k), steps=0)
-    return PoseErrors(np.vstack([r.observed - found.fitter.predicted(other, r) for r in found.fitter.held]))
+    return PoseErrors(np.vstack([r.observed - found.fitter.predict(other, r) for r in found.fitter.held_out_records]))
 
 
 def fairly(found: Diagnosis) -> PoseErrors:
     """Held-out errors of the paper's way, 36 numbers of a Jacobian, fitted to the poses that the diagnosis was fitted to."""
-    fitted, held = found.fitter.to_fit, found.fitter.held
+    fitted, held = found.fitter.fit_records, found.fitter.held_out_records
     inputs, poses = (np.vstack([getattr(r, name) for r in fitted]) for name in ("drive", "observed"))
     jacobian = calibrate_jacobian(inputs, poses).jacobian
     return PoseErrors(np.vstack([r.observed - r.drive @ jacobian.T for r in held]))
@@ -53,8 +53,10 @@ def main() -> None:
     unseen = PoseErrors(paper.errors[TWO_COMPONENTS])
     fit = found.search.chosen.fit
     nominal = found.search.nominal.fit
-    before = PoseErrors(np.vstack([r.observed - found.fitter.predicted(nominal, r) for r in found.fitter.held]))
-    free = sum(u.cause is not None for u in fit.structure.unknowns)
+    before = PoseErrors(
+        np.vstack([r.observed - found.fitter.predict(nominal, r) for r in found.fitter.held_out_records])
+    )
+    free = sum(u.cause is not None for u in fit.structure.free_parameters)
     print(f"{found.verdict}: {len(fit.structure.causes)} corrections, {free} free numbers fitted to 24 poses")
     print(f"30 poses not fitted, as described                      {means(before)}")
     print(f"30 poses not fitted, corrected                         {means(errors_without(found))}")
@@ -64,7 +66,7 @@ def main() -> None:
     print("without one correction, the others as they are:")
     rows = [(errors_without(found, k), k, cause, fit.values(k)) for k, cause in enumerate(fit.structure.causes)]
     for errors, k, cause, values in sorted(rows, key=lambda row: -row[0].translation.mean()):
-        fitted = {u.name for u in fit.structure.unknowns if u.cause == k}
+        fitted = {u.name for u in fit.structure.free_parameters if u.cause == k}
         numbers = ", ".join(f"{name} = {value:.6g}" for name, value in values.items() if name in fitted) or "no number"
         print(f"  {means(errors)}  {cause.effect} at {cause.location} (SI: {numbers})")
 

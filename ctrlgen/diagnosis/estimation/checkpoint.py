@@ -12,13 +12,13 @@ import numpy as np
 from ctrlgen.core.files import write_text
 
 
-class Journal:
+class Checkpoint:
     """Optimum by optimum, a line each, in the file `path`; begun anew unless it was `made_from` the same."""
 
     def __init__(self, path: Path, made_from: dict[str, Any]) -> None:
         self.path, self.made_from = path, made_from
         self.found = self._read(made_from)
-        self.known = len(self.found)
+        self.reused = len(self.found)
         self._begun = False
 
     def _read(self, made_from: dict[str, Any]) -> dict[str, list[float]]:

@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.checkpoint import Journal, key_of
+from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
@@ -38,13 +38,13 @@ START_SIZE = 0.3  # of a state's typical size: how far a record may start from r
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted structure. `theta` the unknowns [SI], `starts` what each record to fit starts with; `chi2` of the
+    """A fitted structure. `theta` the unknowns [SI], `initial_states` what each record to fit starts with; `chi2` of the
     readings alone, over `n` usable samples; `residual` and `J` the whitened residual and its slopes by the unknowns, then
     the starts: rows of the readings of records of `shapes` (samples, channels), then of the prior."""
 
     structure: Structure
     theta: np.ndarray
-    starts: tuple[np.ndarray, ...]
+    initial_states: tuple[np.ndarray, ...]
     chi2: float
     n: int
     residual: np.ndarray
@@ -72,7 +72,7 @@ class Fit:
         return (inverse / np.outer(scale, scale))[:k, :k]
 
     @cached_property
-    def root(self) -> np.ndarray:
+    def information_root(self) -> np.ndarray:
         """R (k, k) of the unknowns with |R dp|^2 = dp' C^-1 dp: what the readings say of them whatever the starts are."""
         k = len(self.theta)
         if self.J.shape[1] == k:
@@ -83,18 +83,18 @@ class Fit:
     def values(self, cause: int) -> dict[str, float]:
         """The parameters of one cause [SI]."""
         found = dict(self.structure.starts[cause])
-        for unknown, value in zip(self.structure.unknowns, self.theta, strict=True):
+        for unknown, value in zip(self.structure.free_parameters, self.theta, strict=True):
             if unknown.cause == cause:
                 found[unknown.name] = float(value)
         return found
 
-    def special(self, cause: int) -> str | None:
+    def nested_case(self, cause: int) -> str | None:
         """The effect that a cause may as well be, its law's `special` case inside the 95 % interval."""
         hypothesis = self.structure.causes[cause]
         if hypothesis.effect == PARAMETER or hypothesis.law.special is None:
             return None
         effect, name, value = hypothesis.law.special
-        i = next(i for i, u in enumerate(self.structure.unknowns) if u.cause == cause and u.name == name)
+        i = next(i for i, u in enumerate(self.structure.free_parameters) if u.cause == cause and u.name == name)
         sd = np.sqrt(max(self.covariance[i, i], 0.0))
         return effect if abs(self.theta[i] - value) <= CI * sd else None
 
@@ -102,17 +102,17 @@ class Fit:
 class Fitter:
     """Fits structures to one recording with one noise model; keeps compiled responses, and optima in a `journal`."""
 
-    def __init__(self, recording: Recording, noise: Noise, journal: Journal | None = None) -> None:
-        self.recording, self.noise, self.journal = recording, noise, journal
+    def __init__(self, recording: Recording, noise: Noise, checkpoint: Checkpoint | None = None) -> None:
+        self.recording, self.noise, self.checkpoint = recording, noise, checkpoint
         self.cache: dict = {}
 
     @property
-    def to_fit(self) -> list[Record]:
+    def fit_records(self) -> list[Record]:
         """The records to fit."""
         return [r for r in self.recording.records if r.role == "fit"]
 
     @property
-    def held(self) -> list[Record]:
+    def held_out_records(self) -> list[Record]:
         """The records held out."""
         return [r for r in self.recording.records if r.role == "hold_out"]
 
@@ -129,29 +129,31 @@ class Fitter:
         found = self._optimum(problem, begin, steps)
         if nested is None or found.objective <= nested.objective:
             return found
-        for i, u in enumerate(structure.unknowns):
+        for i, u in enumerate(structure.free_parameters):
             if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
                 begin[i] = u.nominal + NEAR_OFF * (begin[i] - u.nominal)
-        begin[problem.k :] = np.concatenate(nested.starts)
+        begin[problem.k :] = np.concatenate(nested.initial_states)
         stated = np.concatenate([structure.start, np.zeros(problem.n_starts)])
-        for i, u in enumerate(structure.unknowns):
+        for i, u in enumerate(structure.free_parameters):
             if u.cause is None:
                 stated[i] = u.nominal
         again = (self._optimum(problem, start, steps) for start in (begin, stated))
         return min(found, *again, key=lambda fit: fit.objective)
 
-    def described(self, device: Device) -> Fit:
+    def fit_described(self, device: Device) -> Fit:
         """The device as described; where that leaves far more than noise, begun a deviation beside each stated number too:
         what drifts, or saturates in a loop, bends too much for one start."""
         found = self.fit(Structure(device))
         if not self.noise.known.all() or found.objective < FAR_OFF**2 * found.n:
             return found
-        for u in found.structure.unknowns:
+        for u in found.structure.free_parameters:
             for start in (u.nominal - u.sd, u.nominal + u.sd) if u.sd else ():
-                found = min(found, self.fit(Structure(device, own={u.path: start})), key=lambda fit: fit.objective)
+                found = min(
+                    found, self.fit(Structure(device, nominal_starts={u.path: start})), key=lambda fit: fit.objective
+                )
         return found
 
-    def begun(self, structure: Structure) -> float:
+    def initial_objective(self, structure: Structure) -> float:
         """The objective where a fit of the structure begins."""
         problem = _Problem(self, structure)
         rows = problem.residual(problem.inner(np.concatenate([structure.start, np.zeros(problem.n_starts)])))
@@ -159,25 +161,25 @@ class Fitter:
 
     def _optimum(self, problem: _Problem, begin: np.ndarray, steps: int) -> Fit:
         """From the journal, where it has been found before."""
-        if self.journal is None:
+        if self.checkpoint is None:
             return problem.result(levenberg_marquardt(problem, problem.inner(begin), steps))
         s, noise = problem.structure, self.noise
         valid = [int(r.valid.sum()) for r in self.recording.records]
-        key = key_of(s.causes, s.starts, sorted(s.own.items()), begin, steps, noise.sd, *noise.ar, valid)
-        optimum = self.journal.recall(key)
+        key = key_of(s.causes, s.starts, sorted(s.nominal_starts.items()), begin, steps, noise.sd, *noise.ar, valid)
+        optimum = self.checkpoint.recall(key)
         if optimum is None:
             optimum = levenberg_marquardt(problem, problem.inner(begin), steps)
-            self.journal.keep(key, optimum)
+            self.checkpoint.keep(key, optimum)
         return problem.result(optimum)
 
-    def predicted(self, fit: Fit, record: Record) -> np.ndarray:
+    def predict(self, fit: Fit, record: Record) -> np.ndarray:
         """Readings (n, n_y) of a fitted structure on any record, started as the record itself says best."""
-        response = fit.structure.responses(self.recording, self.cache)[record.sample_time, record.linear]
-        start = np.zeros(len(response.initial))
+        simulator = fit.structure.simulators(self.recording, self.cache)[record.sample_time, record.linear]
+        start = np.zeros(len(simulator.free_initial_states))
         if len(start) == 0:
-            return response.outputs(record, fit.theta)
-        sizes = start_sizes(response)
-        y, slopes = response.sensitivities(record, fit.theta, start, by_free=False)  # close to linear in the start
+            return simulator.simulate(record, fit.theta)
+        sizes = start_sizes(simulator)
+        y, slopes = simulator.sensitivities(record, fit.theta, start, by_free=False)  # close to linear in the start
         white = self._white(record, y)
         J = self.noise.whiten(slopes, record.valid).reshape(len(white), len(start)) * sizes
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
@@ -185,7 +187,7 @@ class Fitter:
         with_prior = np.vstack([J, np.eye(len(start))])
         step = np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(start))]), rcond=None)[0]
         for _ in range(HALVINGS):  # but not where something has to be crossed before anything moves
-            found = response.outputs(record, fit.theta, sizes * step)
+            found = simulator.simulate(record, fit.theta, sizes * step)
             left = self._white(record, found)
             if left @ left + step @ step <= white @ white:
                 return found
@@ -195,23 +197,23 @@ class Fitter:
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         return self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
 
-    def whitened(self, fit: Fit, record: Record) -> np.ndarray:
+    def whitened_residual(self, fit: Fit, record: Record) -> np.ndarray:
         """The whitened residual (n, n_y) on any record; zero where a sample is not usable."""
-        y = self.predicted(fit, record)
+        y = self.predict(fit, record)
         left = np.where(record.valid, record.observed - y, 0.0)
         return _finite(self.noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid))
 
-    def held_out(self, fit: Fit) -> float:
+    def held_out_deviance(self, fit: Fit) -> float:
         """-2 ln of how likely the held-out records are, as the numbers are known from the records to fit.
 
         |r(p + dp)|^2 + dp' C^-1 dp + ln det(I + C J'J), see `as_known`: numbers that the records to fit leave open are not
         held against their structure, and earn it nothing. One step there says enough of a structure that does not nearly
         explain the records to fit.
         """
-        moved, price, spread = self.as_known(fit, HELD_STEPS if fit.objective < NEARLY_NOISE * fit.n else 1)
-        return self.held_squares(moved) + price + spread
+        moved, price, spread = self.refitted_to_held_out(fit, HELD_STEPS if fit.objective < NEARLY_NOISE * fit.n else 1)
+        return self.held_out_squares(moved) + price + spread
 
-    def as_known(self, fit: Fit, steps: int = 1) -> tuple[Fit, float, float]:
+    def refitted_to_held_out(self, fit: Fit, steps: int = 1) -> tuple[Fit, float, float]:
         """The fit with its numbers p moved to where the held-out records are most likely, as p is known from the records to
         fit, by at most so many steps of Gauss and Newton; the price dp' C^-1 dp; ln det(I + C J'J). C the covariance of p,
         r and J the whitened residual and its slopes there. The fit itself, at no price, where no step helps.
@@ -222,9 +224,9 @@ class Fitter:
             return fit, 0.0, 0.0
         unit = np.where(sd > 0, sd, 1.0)
         C = fit.covariance / np.outer(unit, unit) * np.outer(sd > 0, sd > 0)
-        R, best = fit.root * sd, (fit, 0.0, 0.0)
-        low, high = (np.array([getattr(u, end) for u in fit.structure.unknowns]) for end in ("low", "high"))
-        least = self.held_squares(fit)
+        R, best = fit.information_root * sd, (fit, 0.0, 0.0)
+        low, high = (np.array([getattr(u, end) for u in fit.structure.free_parameters]) for end in ("low", "high"))
+        least = self.held_out_squares(fit)
         for k in range(steps):
             b, H = self._held_slopes(best[0], sd)
             spread = np.eye(len(sd)) + C @ H
@@ -238,7 +240,7 @@ class Fitter:
             for halved in range(HALVINGS if steps > 1 else 1):
                 moved = replace(fit, theta=np.clip(begin + step / 2**halved, low, high))
                 price = float(np.sum((R @ ((moved.theta - fit.theta) / unit)) ** 2))
-                total = self.held_squares(moved) + price
+                total = self.held_out_squares(moved) + price
                 if total < least:
                     best, least = (moved, price, best[2]), total
                     break
@@ -249,26 +251,26 @@ class Fitter:
     def _held_slopes(self, fit: Fit, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """J'r and J'J of the held-out records, J by the numbers in units of `sd`."""
         b, H = np.zeros(len(sd)), np.zeros((len(sd), len(sd)))
-        for record in self.held:
-            response = fit.structure.responses(self.recording, self.cache)[record.sample_time, record.linear]
-            J = self.noise.whiten(response.sensitivities(record, fit.theta)[1][:, :, : len(sd)], record.valid) * sd
+        for record in self.held_out_records:
+            simulator = fit.structure.simulators(self.recording, self.cache)[record.sample_time, record.linear]
+            J = self.noise.whiten(simulator.sensitivities(record, fit.theta)[1][:, :, : len(sd)], record.valid) * sd
             J = J.reshape(-1, len(sd))
-            b, H = b + J.T @ self.whitened(fit, record).ravel(), H + J.T @ J
+            b, H = b + J.T @ self.whitened_residual(fit, record).ravel(), H + J.T @ J
         return b, H
 
-    def held_squares(self, fit: Fit) -> float:
+    def held_out_squares(self, fit: Fit) -> float:
         """What a fit leaves of the held-out records, whitened."""
-        return sum(float(np.sum(self.whitened(fit, r) ** 2)) for r in self.held)
+        return sum(float(np.sum(self.whitened_residual(fit, r) ** 2)) for r in self.held_out_records)
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), np.clip(values, -WORST, WORST), WORST)
 
 
-def start_sizes(response: Response) -> np.ndarray:
+def start_sizes(simulator: Simulator) -> np.ndarray:
     """How far a record may start from rest, by state [SI]."""
-    m = response.model
-    return START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(response.initial)]
+    m = simulator.model
+    return START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(simulator.free_initial_states)]
 
 
 class _Problem:
@@ -279,18 +281,18 @@ class _Problem:
 
     def __init__(self, fitter: Fitter, structure: Structure) -> None:
         self.fitter, self.structure = fitter, structure
-        self.responses = structure.responses(fitter.recording, fitter.cache)
-        self.records = fitter.to_fit
-        self.sizes = [start_sizes(self.responses[r.sample_time, r.linear]) for r in self.records]
+        self.simulators = structure.simulators(fitter.recording, fitter.cache)
+        self.records = fitter.fit_records
+        self.sizes = [start_sizes(self.simulators[r.sample_time, r.linear]) for r in self.records]
         self.n_starts = sum(map(len, self.sizes))
-        self.k = len(structure.unknowns)
-        self.scale = np.concatenate([[u.size for u in structure.unknowns], *self.sizes]).astype(float)
-        self.prior = [(i, u) for i, u in enumerate(structure.unknowns) if u.sd]
+        self.k = len(structure.free_parameters)
+        self.scale = np.concatenate([[u.size for u in structure.free_parameters], *self.sizes]).astype(float)
+        self.prior = [(i, u) for i, u in enumerate(structure.free_parameters) if u.sd]
         self.at: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.log = np.array(
             [
                 u.cause is not None and not u.amplitude and (u.unit == "s" or u.unit.endswith("/s")) and u.low > 0
-                for u in structure.unknowns
+                for u in structure.free_parameters
             ]
             + [False] * self.n_starts,
             dtype=bool,
@@ -316,20 +318,20 @@ class _Problem:
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low = np.concatenate(
-            [[u.low for u in self.structure.unknowns], np.full(self.n_starts, -1e3) * self.scale[self.k :]]
+            [[u.low for u in self.structure.free_parameters], np.full(self.n_starts, -1e3) * self.scale[self.k :]]
         )
         high = np.concatenate(
-            [[u.high for u in self.structure.unknowns], np.full(self.n_starts, 1e3) * self.scale[self.k :]]
+            [[u.high for u in self.structure.free_parameters], np.full(self.n_starts, 1e3) * self.scale[self.k :]]
         )
         return self.inner(low), self.inner(high)
 
-    def _records(self, values: np.ndarray) -> Iterator[tuple[Record, Response, np.ndarray, slice]]:
+    def _records(self, values: np.ndarray) -> Iterator[tuple[Record, Simulator, np.ndarray, slice]]:
         """Each record with its response, what it starts with, and the places of that in the `values`."""
         first = self.k
         for record, sizes in zip(self.records, self.sizes, strict=True):
             own = slice(first, first + len(sizes))
             first += len(sizes)
-            yield record, self.responses[record.sample_time, record.linear], values[own], own
+            yield record, self.simulators[record.sample_time, record.linear], values[own], own
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         left = np.where(record.valid, record.observed - y, 0.0)
@@ -345,7 +347,7 @@ class _Problem:
         """The residual alone: a fraction of the work that its slopes take."""
         values = self.outer(scaled)
         motions = self._records(values)
-        rows = [self._white(record, one.outputs(record, values[: self.k], start)) for record, one, start, _ in motions]
+        rows = [self._white(record, one.simulate(record, values[: self.k], start)) for record, one, start, _ in motions]
         return self._joined(rows, scaled)
 
     def evaluate(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -355,8 +357,8 @@ class _Problem:
         values, k = self.outer(scaled), self.k
         by_inner = self.by_inner(values)
         rows, slopes = [], []
-        for record, response, start, own in self._records(values):
-            y, Y = response.sensitivities(record, values[:k], start)
+        for record, simulator, start, own in self._records(values):
+            y, Y = simulator.sensitivities(record, values[:k], start)
             rows.append(self._white(record, y))
             J = np.zeros((len(rows[-1]), len(scaled)))
             W = self.fitter.noise.whiten(np.clip(np.nan_to_num(Y), -FAR, FAR), record.valid)

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import casadi as ca
 
-from ctrlgen.diagnosis.estimation.sample_equations import Equations
+from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations
 from ctrlgen.model.integrators import Sticking
 
 POINTS = 4  # of an explicit step
@@ -21,7 +21,9 @@ Step = Callable[
 ]  # T, seed, (y, u, u at the end, held, ambient, c) -> y, T
 
 
-def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
+def forward_sensitivities(
+    q: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX]
+) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
     """S and T one sample on, the readings (n_y,) and their derivatives (m, n_y); `seed` (m, n_c) is dc/dp,
     `given` those of `q`."""
     by = [q.given[0], q.given[4]] if seed.nnz() else q.given[:1]
@@ -29,7 +31,7 @@ def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca
     def slope(*slopes: ca.MX) -> ca.MX:
         return sum((V @ slope for V, slope in zip((T, seed), slopes, strict=False)))
 
-    if not several(q):
+    if not takes_several_steps(q):
         one = ca.Function("one", q.given, [q.following, q.y, *_slopes([q.following, q.y], by)])
         following, y, *slopes = one(*given)
         return following, slope(*slopes[: len(by)]), y, slope(*slopes[len(by) :])
@@ -45,7 +47,7 @@ def carried(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca
     return after, T, y, Y
 
 
-def several(q: Equations) -> bool:
+def takes_several_steps(q: SampleEquations) -> bool:
     """Whether a sample takes more than one explicit step, or implicit ones: not to be differentiated whole."""
     return q.steps is not None and (isinstance(q.steps, Sticking) or q.steps.count > 1)
 
@@ -55,7 +57,7 @@ def _slopes(values: list[ca.SX], by: list[ca.SX]) -> list[ca.SX]:
     return [ca.sparsify(ca.jacobian(value, symbols)).T for value in values for symbols in by]
 
 
-def _steps(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX) -> tuple[ca.MX, ca.MX]:
+def _steps(q: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX) -> tuple[ca.MX, ca.MX]:
     """y and T after all steps of a sample; `seed` by what keeps its value meanwhile: `held`, then the constants."""
     y, u, u_next, e, c = given
     free = seed.size2() > held.numel()
@@ -65,7 +67,7 @@ def _steps(q: Equations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX)
     return y, T
 
 
-def _implicitly(q: Equations, free: bool) -> Step:
+def _implicitly(q: SampleEquations, free: bool) -> Step:
     """A step through points Y = base + M n with n = N(Y): dn = (1 - N_Y M)^-1 (N_Y dbase + N_c dc)."""
     steps, along = q.steps, _along(q, free)
     E_c, E, P, W, V = (M.T for M in (steps.E_c, steps.E, steps.P, steps.W, steps.V))
@@ -83,7 +85,7 @@ def _implicitly(q: Equations, free: bool) -> Step:
     return on
 
 
-def _explicitly(q: Equations, free: bool) -> Step:
+def _explicitly(q: SampleEquations, free: bool) -> Step:
     """A step from point to point."""
     steps = q.steps
     along = _along(q, free)
@@ -106,7 +108,7 @@ def _explicitly(q: Equations, free: bool) -> Step:
     return on
 
 
-def _along(q: Equations, free: bool) -> ca.Function:
+def _along(q: SampleEquations, free: bool) -> ca.Function:
     """(y, u, u at the end, held, ambient, c) -> y one step on, then the transposed slopes of N at its points by y,
     then those by what keeps its value through a sample: held and, where they are `free`, the constants."""
     N, arguments, kept = _rest(q, free)
@@ -117,7 +119,7 @@ def _along(q: Equations, free: bool) -> ca.Function:
     return ca.Function("along", arguments, [after, *by_y, *by_kept], {"cse": True})
 
 
-def _rest(q: Equations, free: bool) -> tuple[ca.Function, list[ca.SX], ca.SX]:
+def _rest(q: SampleEquations, free: bool) -> tuple[ca.Function, list[ca.SX], ca.SX]:
     """N (y, u, held, ambient, c); symbols y, u, u at the end, held, ambient, c; those of what keeps its value."""
     y, u, _, e, c = q.given
     own = [q.model.held, e, c]

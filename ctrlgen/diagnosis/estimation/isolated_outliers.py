@@ -16,7 +16,7 @@ WIDEST_SPIKE = 2  # samples
 BESIDE = 0.3  # of a spike: what its neighbours have at most
 
 
-def marked(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> tuple[Recording, str]:
+def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> tuple[Recording, str]:
     """A series with what stands alone, for one or two samples, in what `predicted` leaves over as not valid; how many.
 
     A mechanism cannot jump there and back within two samples, so this takes no physics away.
@@ -29,14 +29,14 @@ def marked(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> t
             records.append(record)
             continue
         left = np.where(record.valid, record.observed - predicted(record), 0.0)
-        spikes = record.valid & alone(np.nan_to_num(left))
+        spikes = record.valid & isolated_outliers(np.nan_to_num(left))
         count += int(spikes.sum())
         records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
     said = f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
     return replace(recording, records=tuple(records)), said
 
 
-def alone(left: np.ndarray) -> np.ndarray:
+def isolated_outliers(left: np.ndarray) -> np.ndarray:
     """Samples (n, n_y) more than `SPIKE` robust deviations from the median of their neighbours; never over one percent, nor wide ones."""
     rough = left - median_filter(left, size=(7, 1), mode="nearest")
     near = SPIKE * np.maximum(

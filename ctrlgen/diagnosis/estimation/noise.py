@@ -42,7 +42,7 @@ class Noise:
     sd: np.ndarray
     ar: tuple[np.ndarray, ...]
     known: np.ndarray
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
     count: np.ndarray
     guessed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
@@ -51,11 +51,11 @@ class Noise:
         white, usable = np.zeros_like(values), self.usable(valid)
         for i, a in enumerate(self.ar):
             clean = np.where(valid[:, i].reshape(-1, *(1,) * (values.ndim - 2)), values[:, i], 0.0)
-            white[len(a) :, i] = self.filtered(clean, i)
+            white[len(a) :, i] = self.whiten_channel(clean, i)
             white[~usable[:, i], i] = 0.0
         return white
 
-    def filtered(self, values: np.ndarray, i: int) -> np.ndarray:
+    def whiten_channel(self, values: np.ndarray, i: int) -> np.ndarray:
         """`values` (n, ...) of channel i as unit white noise, from the first sample on whose memory is there, (n - order, ...)."""
         sd, a = self.sd[i], self.ar[i]
         n, order = len(values), len(a)
@@ -76,17 +76,17 @@ class Noise:
     @property
     def floor(self) -> np.ndarray:
         """Standard deviation of the noise itself, colour included."""
-        return np.array([coloured(sd, a) for sd, a in zip(self.sd, self.ar, strict=True)])
+        return np.array([stationary_deviation(sd, a) for sd, a in zip(self.sd, self.ar, strict=True)])
 
 
-def coloured(sd: float, a: np.ndarray) -> float:
+def stationary_deviation(sd: float, a: np.ndarray) -> float:
     """Standard deviation of autoregressive noise with innovations `sd` and coefficients `a`."""
     impulse = np.zeros(4096)
     impulse[0] = 1.0
     return float(sd * np.sqrt(np.sum(lfilter([1.0], np.concatenate([[1.0], -a]), impulse) ** 2)))
 
 
-def estimate(recording: Recording, settling: float) -> Noise:
+def estimate_noise(recording: Recording, settling: float) -> Noise:
     """The noise of each observed channel. `settling` [s]: how long the device itself goes on after a change of drive."""
     rows = [_channel(recording, i, settling) for i in range(len(recording.channels))]
     sd, ar, known, said, count, guessed = zip(*rows, strict=True)
@@ -121,7 +121,7 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         parts = _quiet([without_lines(_flat(part, degree)) for part in parts])
         if parts:
             sd, a = _with_rounding(*autoregression(parts), rounding)
-            n, times = sum(map(len, parts)), coloured(sd, a) / sd
+            n, times = sum(map(len, parts)), stationary_deviation(sd, a) / sd
             said = f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}"
             if times > SLOW:
                 said += f"; it is {times:.0f} times what one sample adds: what moves so slowly may be the device, not its sensor"
@@ -186,7 +186,7 @@ def _quiet(parts: list[np.ndarray]) -> list[np.ndarray]:
 
 def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
     """Noise seen at rest and readings in steps: at rest a coarse step hides the noise, on the move it is noise itself."""
-    floor = coloured(sd, a)
+    floor = stationary_deviation(sd, a)
     return (float(np.hypot(rounding, floor)), np.zeros(0)) if rounding > floor else (sd, a)
 
 
@@ -194,7 +194,7 @@ def _robust(values: np.ndarray) -> float:
     return float(1.4826 * np.median(np.abs(values - np.median(values))))
 
 
-def period(drive: np.ndarray) -> int | None:
+def drive_period(drive: np.ndarray) -> int | None:
     """The number of samples after which the drive (n, n_u) repeats exactly, at least twice; None where it does not."""
     n, span = len(drive), np.ptp(drive, axis=0).max(initial=0.0)
     if span == 0 or n < 100:
@@ -213,7 +213,7 @@ def period(drive: np.ndarray) -> int | None:
 
 def _repeats(record: Record, i: int) -> list[np.ndarray]:
     """Differences of neighbouring periods, the first left out for its transient, with the noise's own size."""
-    P = period(record.drive) if record.period is None else round(record.period / record.sample_time)
+    P = drive_period(record.drive) if record.period is None else round(record.period / record.sample_time)
     if P is None or len(record.time) < 3 * P:
         return []
     y = np.where(record.valid[:, i], record.observed[:, i], np.nan)

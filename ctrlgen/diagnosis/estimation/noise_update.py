@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.noise import LAGS, Noise, autoregression, ljung_box, without_lines
-from ctrlgen.diagnosis.estimation.residual_noise import quiet_noise
+from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
 from ctrlgen.recordings.recording import Record
 
 LITTLE = 1.3  # times the noise: what leaves more is not noise
@@ -17,12 +17,12 @@ SIGMAS = 2.6  # standard deviations of its first estimate by which noise may be 
 OTHER = 1e-4  # p below which what is left at rest has another colour
 
 
-def learn_guessed(fitter: Fitter, fit: Fit) -> Noise:
+def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
     """Where the noise was guessed: from what `fit` leaves at the frequencies at which the readings move least."""
     noise, channels = fitter.noise, fitter.recording.channels
-    sd, ar, count, said = noise.sd.copy(), list(noise.ar), noise.count.copy(), list(noise.said)
+    sd, ar, count, said = noise.sd.copy(), list(noise.ar), noise.count.copy(), list(noise.notes)
     for i in np.flatnonzero(noise.guessed):
-        parts = [p for r in fitter.to_fit if (p := _quiet(fitter, fit, r, i)) is not None]
+        parts = [p for r in fitter.fit_records if (p := _quiet(fitter, fit, r, i)) is not None]
         if not parts:
             continue
         weights = [c for *_, c in parts]
@@ -39,32 +39,32 @@ def learn_guessed(fitter: Fitter, fit: Fit) -> Noise:
 
 def _quiet(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
     """On the longest stretch of valid samples of channel i."""
-    y = fitter.predicted(fit, record)[:, i]
+    y = fitter.predict(fit, record)[:, i]
     good = np.flatnonzero(np.diff(np.concatenate([[False], record.valid[:, i] & np.isfinite(y), [False]])))
     if not len(good):
         return None
     a, b = max(good.reshape(-1, 2), key=lambda run: run[1] - run[0])
-    return quiet_noise((record.observed[:, i] - y)[a:b], y[a:b])
+    return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b])
 
 
-def learn_more(fitter: Fitter, fit: Fit) -> Noise:
+def update_noise(fitter: Fitter, fit: Fit) -> Noise:
     """What a fit with causes tells of the noise: of one that was guessed, where it is smaller now, as physics left out only
     adds to it; else its colour. The same noise where nothing is learnt."""
     noise = fitter.noise
     if not noise.guessed.any():
-        return learn_colour(fitter, fit)
-    found = learn_guessed(fitter, fit)
+        return update_noise_colour(fitter, fit)
+    found = update_guessed_noise(fitter, fit)
     smaller = found.floor < noise.floor
     if not smaller.any():
         return noise
     pairs = {name: (getattr(found, name), getattr(noise, name)) for name in ("sd", "count")}
     rows = {
-        name: tuple(getattr(found if s else noise, name)[i] for i, s in enumerate(smaller)) for name in ("ar", "said")
+        name: tuple(getattr(found if s else noise, name)[i] for i, s in enumerate(smaller)) for name in ("ar", "notes")
     }
     return replace(noise, **{name: np.where(smaller, a, b) for name, (a, b) in pairs.items()}, **rows)
 
 
-def learn_colour(fitter: Fitter, fit: Fit) -> Noise:
+def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:
     """Where the noise was known from fewer samples than there are to fit: the colour of what `fit` leaves, if it leaves
     little, and no colour that the rest has not; the same noise where none is learnt. Its size is not let grow beyond what
     the first estimate allows.
@@ -73,8 +73,8 @@ def learn_colour(fitter: Fitter, fit: Fit) -> Noise:
     sd, ar, floor = noise.sd.copy(), list(noise.ar), noise.floor
     learnt = False
     rests = [r for r in fitter.recording.records if r.role == "rest"]
-    for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.to_fit)):
-        parts = [_left(fitter, fit, r, i) for r in fitter.to_fit]
+    for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.fit_records)):
+        parts = [_left(fitter, fit, r, i) for r in fitter.fit_records]
         left = np.sqrt(np.mean(np.concatenate(parts) ** 2))
         if left >= LITTLE * floor[i]:
             continue
@@ -86,7 +86,7 @@ def learn_colour(fitter: Fitter, fit: Fit) -> Noise:
 
 
 def _left(fitter: Fitter, fit: Fit, record: Record, i: int) -> np.ndarray:
-    return (record.observed - fitter.predicted(fit, record))[record.valid[:, i], i]
+    return (record.observed - fitter.predict(fit, record))[record.valid[:, i], i]
 
 
 def _of_that_colour(rest: np.ndarray, a: np.ndarray) -> bool:
@@ -97,12 +97,12 @@ def _of_that_colour(rest: np.ndarray, a: np.ndarray) -> bool:
     return ljung_box(without_lines(white)) > OTHER
 
 
-def learn_size(fitter: Fitter, fit: Fit) -> Noise:
+def update_noise_size(fitter: Fitter, fit: Fit) -> Noise:
     """Where nothing but the misfit tells the noise: what `fit` leaves over, alike for all channels of one unit."""
     recording, noise = fitter.recording, fitter.noise
     squares, count = np.zeros(len(recording.channels)), np.zeros(len(recording.channels))
-    for record in fitter.to_fit:
-        y = fitter.predicted(fit, record)
+    for record in fitter.fit_records:
+        y = fitter.predict(fit, record)
         squares += np.sum(np.where(record.valid, record.observed - y, 0.0) ** 2, axis=0)
         count += record.valid.sum(axis=0)
     sd = noise.sd.copy()

@@ -12,11 +12,11 @@ from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
 from ctrlgen.recordings.recording import Record
 
 
-def uncertainty(fitter: Fitter, fit: Fit) -> np.ndarray:
+def prediction_uncertainty(fitter: Fitter, fit: Fit) -> np.ndarray:
     """Root mean square (n_y,) [SI] of dy over the samples held out; infinite where the slopes leave the numbers."""
     squares = np.zeros(len(fitter.recording.channels))
     count = np.zeros_like(squares)
-    for record in fitter.held if len(fit.theta) else ():  # nothing is fitted, nothing is unsure
+    for record in fitter.held_out_records if len(fit.theta) else ():  # nothing is fitted, nothing is unsure
         Y = _following(fitter, fit, record)
         variance = np.einsum("nij,jk,nik->ni", Y, fit.covariance, Y)
         squares += np.sum(np.where(record.valid, np.maximum(variance, 0.0), 0.0), axis=0)
@@ -27,12 +27,12 @@ def uncertainty(fitter: Fitter, fit: Fit) -> np.ndarray:
 
 def _following(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray:
     """How the readings (n, n_y, k) of a record change with the numbers, the record's start following."""
-    response = fit.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
-    k, n_i = len(fit.theta), len(response.initial)
-    slopes = response.sensitivities(record, fit.theta, np.zeros(n_i))[1]
+    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+    k, n_i = len(fit.theta), len(simulator.free_initial_states)
+    slopes = simulator.sensitivities(record, fit.theta, np.zeros(n_i))[1]
     if not np.isfinite(slopes).all():
         return np.full((*slopes.shape[:2], k), np.inf)
-    Y, Y_s = slopes[:, :, :k], slopes[:, :, k:] * start_sizes(response)
+    Y, Y_s = slopes[:, :, :k], slopes[:, :, k:] * start_sizes(simulator)
     white = fitter.noise.whiten(np.concatenate([Y, Y_s], axis=2), record.valid).reshape(-1, k + n_i)
     WY, WY_s = white[:, :k], white[:, k:]
     return Y - Y_s @ np.linalg.solve(WY_s.T @ WY_s + np.eye(n_i), WY_s.T @ WY)

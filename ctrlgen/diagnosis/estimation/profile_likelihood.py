@@ -49,15 +49,17 @@ class Profile:
 
 def profiles(fitter: Fitter, fit: Fit) -> tuple[Profile, ...]:
     """Of every number of every cause, in the order of the unknowns."""
-    if all(u.cause is None for u in fit.structure.unknowns):
+    if all(u.cause is None for u in fit.structure.free_parameters):
         return ()
     surface = _Surface(fitter, fit)
     ratio = sandwich_over_model(fit)
-    return tuple(_profile(surface, fit, i, ratio) for i, u in enumerate(fit.structure.unknowns) if u.cause is not None)
+    return tuple(
+        _profile(surface, fit, i, ratio) for i, u in enumerate(fit.structure.free_parameters) if u.cause is not None
+    )
 
 
 def _profile(surface: _Surface, fit: Fit, i: int, ratio: np.ndarray | None) -> Profile:
-    unknown = fit.structure.unknowns[i]
+    unknown = fit.structure.free_parameters[i]
     cause = fit.structure.causes[unknown.cause]
     value, sd = float(fit.theta[i]), float(np.sqrt(max(fit.covariance[i, i], 0.0)))
     low, high = (_Side(surface, i, value, sd, bound) for bound in (unknown.low, unknown.high))
@@ -125,7 +127,7 @@ class _Surface:
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
         self.problem = _Problem(fitter, fit.structure)
-        self.values = np.concatenate([fit.theta, *fit.starts])
+        self.values = np.concatenate([fit.theta, *fit.initial_states])
         self.at = self.problem.inner(self.values)
         self.low, self.high = self.problem.bounds
         J = fit.J * self.problem.by_inner(self.values)

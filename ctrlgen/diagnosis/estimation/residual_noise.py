@@ -22,7 +22,7 @@ LOBE = 2.0  # independent bins are so much fewer: the window's main lobe
 FIRST = 4  # bins: below, the window sees the mean
 
 
-def quiet_noise(left: np.ndarray, motion: np.ndarray) -> tuple[float, np.ndarray, float] | None:
+def noise_from_residual(left: np.ndarray, motion: np.ndarray) -> tuple[float, np.ndarray, float] | None:
     """Innovation deviation, coefficients and how many samples that is worth, from what is `left` over of a record and the
     `motion` predicted, both (n,); None where it is too short, or where physics left out goes through all frequencies."""
     n = len(left)

@@ -28,7 +28,7 @@ SMALL_SAMPLE = 0.001  # p of so large an error by chance, above which the gate's
 
 
 @dataclass(frozen=True)
-class Adequacy:
+class ResidualTests:
     """`ratio` of held-out error to what is expected, per channel; the smallest p of each test; `restless` channels, which
     do at rest what no noise does; `passed` all of it."""
 
@@ -43,14 +43,14 @@ class Adequacy:
         return max(self.ratio, default=float("nan"))
 
 
-def judge(fitter: Fitter, fit: Fit) -> Adequacy:
+def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
     """Ratio per channel, Ljung-Box (memory), McLeod-Li (size that comes and goes), correlation with the drive."""
     n_y = len(fitter.recording.channels)
-    moved, price, _ = fitter.as_known(fit, STEPS)
+    moved, price, _ = fitter.refitted_to_held_out(fit, STEPS)
     squares, expected = np.full(n_y, price / n_y), np.zeros(n_y)
     p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
-    for record in fitter.held:
-        white = fitter.whitened(moved, record)
+    for record in fitter.held_out_records:
+        white = fitter.whitened_residual(moved, record)
         usable = fitter.noise.usable(record.valid)
         squares += np.sum(white**2, axis=0)
         expected += usable.sum(axis=0)
@@ -73,7 +73,7 @@ def judge(fitter: Fitter, fit: Fit) -> Adequacy:
     above |= np.sqrt(fit.chi2 / free) > RATIO * max(doubt) and smallest["fitted"] < SMALL_SAMPLE
     restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
     passed = bool(np.isfinite(ratio).all()) and not (above or rejected or restless)
-    return Adequacy(ratio, smallest, passed, restless)
+    return ResidualTests(ratio, smallest, passed, restless)
 
 
 def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
@@ -81,7 +81,7 @@ def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
     for record in fitter.recording.records:
         if record.role != "rest" or fitter.recording.kind != "series":
             continue
-        e = fitter.whitened(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
+        e = fitter.whitened_residual(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
         read = record.observed[record.valid[:, i], i]
         step = quantisation_step(read)
         if len(e) < 5 * LAGS or np.ptp(read) == 0 or step > ROUNDED * fitter.noise.floor[i]:

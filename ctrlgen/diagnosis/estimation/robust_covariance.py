@@ -15,7 +15,7 @@ FEWEST_BLOCKS = 3  # times the free numbers: fewer blocks say nothing
 DISAGREES = 1.25  # sandwich over model deviation, above which the noise model is not believed: 40 blocks know 11 %
 
 
-def deviations(fit: Fit) -> np.ndarray:
+def robust_deviations(fit: Fit) -> np.ndarray:
     """Standard deviation [SI] of each unknown: by curvature, or by the sandwich where that disagrees upwards."""
     if not len(fit.theta):
         return np.zeros(0)

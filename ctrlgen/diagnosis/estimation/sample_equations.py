@@ -20,7 +20,7 @@ WORTH = 500  # operations on parameters alone, from which on they are done once 
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class SampleEquations:
     """`constants` p -> c, dc/dp; S at the next sample (`following`) and the readings y in terms of `given`: S, u, u at the
     next sample, ambient, c. With inertia `model` moves in terms of c, too, by `steps`, the drive `linear` or held."""
 
@@ -33,7 +33,7 @@ class Equations:
     given: list[ca.SX]
 
 
-def equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> Equations:
+def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> SampleEquations:
     """Of `model` with readings `y`, settled where `sample_time` is infinite."""
     moving = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
     after = None if model.inertial else _after(model, sample_time, linear)
@@ -59,7 +59,7 @@ def equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> Equat
     following, y = ca.cse([following, y])  # before they are differentiated: afterwards it takes ten times as long
     given = [ca.vertcat(model.x, model.z), model.u, after.u_next, model.ambient_symbol, c]
     steps = steps_of(model, sample_time) if model.inertial else None
-    return Equations(constants, model, steps, linear, following, y, given)
+    return SampleEquations(constants, model, steps, linear, following, y, given)
 
 
 def _after(model: Model, sample_time: float, linear: bool) -> Sample:

@@ -15,8 +15,8 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.forward_sensitivities import carried, several
-from ctrlgen.diagnosis.estimation.sample_equations import Equations, equations
+from ctrlgen.diagnosis.estimation.forward_sensitivities import forward_sensitivities, takes_several_steps
+from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations, build_sample_equations
 from ctrlgen.model.discretisation import balanced
 from ctrlgen.model.model import Model, build_model
 from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
@@ -25,7 +25,7 @@ from ctrlgen.recordings.recording import Record
 START_NEWTON_STEPS = 12  # from home to the first displacement; later ones start from the sample before
 
 
-class Response:
+class Simulator:
     """The readings `channels` of `device` with the parameters `free`, for records of one sample time."""
 
     def __init__(
@@ -35,12 +35,12 @@ class Response:
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
         self.model: Model = build_model(device, free, self.ambient, look_back)
-        self._carried: dict[bool, Recursion] = {}
+        self._with_sensitivities: dict[bool, Recursion] = {}
         self._by_pattern: dict[tuple, ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
 
     @cached_property
-    def initial(self) -> tuple[int, ...]:
+    def free_initial_states(self) -> tuple[int, ...]:
         """Places in S of what a record may start with: actuators' states and, with inertia, velocity and displacement."""
         m = self.model
         if not m.inertial:
@@ -57,15 +57,15 @@ class Response:
         return ca.vertcat(*rows)
 
     @cached_property
-    def _equations(self) -> Equations:
-        return equations(self.model, self._observed, self.sample_time, self.linear)
+    def _equations(self) -> SampleEquations:
+        return build_sample_equations(self.model, self._observed, self.sample_time, self.linear)
 
-    def linearised(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
+    def linearise(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
         """Along any motion, for the `chosen` m of the free numbers, at `p`."""
         c, by_p = self._equations.constants(p)
         given = self._symbols[:4]
         by_f = by_p[:, list(chosen)]
-        slopes = self._stepped(by_f.sparsity())(*given, c, by_f) if several(self._equations) else None
+        slopes = self._stepped(by_f.sparsity())(*given, c, by_f) if takes_several_steps(self._equations) else None
         if slopes is None:
             F_S, F_c, H_S, H_c = self._sloped(*given, c)
             slopes = [F_S, F_c @ by_f, H_S, H_c @ by_f]
@@ -86,12 +86,12 @@ class Response:
             m = pattern.size2()
             T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))  # dense: steps fill it
             seed = ca.vertcat(ca.MX(n_s, pattern.size1()), by_f.T)
-            _, T, _, Y = carried(self._equations, T, seed, self._symbols)
+            _, T, _, Y = forward_sensitivities(self._equations, T, seed, self._symbols)
             slopes = [part.T for values in (T, Y) for part in (values[:n_s, :], values[n_s:, :])]
             self._by_pattern[key] = ca.Function("stepped", [*self._symbols, by_f], slopes)
         return self._by_pattern[key]
 
-    def begin(self, record: Record, p: np.ndarray) -> np.ndarray:
+    def initial_state(self, record: Record, p: np.ndarray) -> np.ndarray:
         """S before the first sample: actuators at rest; the stage at home, or in balance where it has no inertia."""
         m = self.model
         x = m.rest.copy()
@@ -106,11 +106,13 @@ class Response:
     def _ambients(record: Record) -> np.ndarray:
         return np.zeros(len(record.time)) if record.ambient is None else record.ambient
 
-    def outputs(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
+    def simulate(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
         """Readings (n, n_y), SI; `start` is added to what a record may start with."""
-        return self.motion(record, p, start)[1]
+        return self.simulate_states(record, p, start)[1]
 
-    def motion(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def simulate_states(
+        self, record: Record, p: np.ndarray, start: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y), SI."""
         c = np.tile(self._equations.constants(p)[0].full().T, (len(record.time), 1))
         return self._moving.run(self._start(record, p, start), *self._inputs(record), c)
@@ -120,9 +122,9 @@ class Response:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings (n, n_y) and their derivatives (n, n_y, m) by `free`, where wanted, then by what the record starts with."""
         c, by_p = self._equations.constants(p)
-        k, n_i, n_y, n = len(self.free) * by_free, len(self.initial), len(self.channels), len(record.time)
+        k, n_i, n_y, n = len(self.free) * by_free, len(self.free_initial_states), len(self.channels), len(record.time)
         T_0 = np.zeros((k + n_i, self.n_s))
-        T_0[k + np.arange(n_i), list(self.initial)] = 1.0
+        T_0[k + np.arange(n_i), list(self.free_initial_states)] = 1.0
         begin = np.concatenate([self._start(record, p, start), T_0.ravel(order="F")])
         slow = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(by_p.nonzeros())))
         values = self._carrying(by_free).run(begin, *self._inputs(record), *slow)[1]
@@ -136,18 +138,18 @@ class Response:
 
     def _carrying(self, by_free: bool) -> Recursion:
         """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
-        if by_free not in self._carried:
-            n_i, pattern = len(self.initial), self._equations.constants.sparsity_out(1)
+        if by_free not in self._with_sensitivities:
+            n_i, pattern = len(self.free_initial_states), self._equations.constants.sparsity_out(1)
             by_p = ca.MX.sym("by_p", pattern.nnz())
             seed = ca.MX(n_i, pattern.size1())
             if by_free:
                 seed = ca.vertcat(ca.MX(pattern, by_p).T, seed)
             state, others = ca.MX.sym("state", self.n_s * (1 + seed.shape[0])), self._symbols[1:]
             S, T = state[: self.n_s], ca.reshape(state[self.n_s :], seed.shape[0], self.n_s)
-            after, T, y, Y = carried(self._equations, T, seed, [S, *others])
+            after, T, y, Y = forward_sensitivities(self._equations, T, seed, [S, *others])
             values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((after, T), (y, Y))]
-            self._carried[by_free] = Recursion(ca.Function("one", [state, *others, by_p], values))
-        return self._carried[by_free]
+            self._with_sensitivities[by_free] = Recursion(ca.Function("one", [state, *others, by_p], values))
+        return self._with_sensitivities[by_free]
 
     @cached_property
     def _symbols(self) -> list[ca.MX]:
@@ -156,9 +158,9 @@ class Response:
         return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
 
     def _start(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        S = self.begin(record, p)
+        S = self.initial_state(record, p)
         if start is not None:
-            S[list(self.initial)] += start
+            S[list(self.free_initial_states)] += start
         return S
 
     def _inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -179,7 +181,7 @@ class Linearised:
         self._one = ca.Function("dense", given, [ca.densify(value) for value in one(*given)])
         self._mapped: dict[int, ca.Function] = {}
 
-    def along(self, S: np.ndarray, *inputs: np.ndarray) -> list[np.ndarray]:
+    def evaluate_along(self, S: np.ndarray, *inputs: np.ndarray) -> list[np.ndarray]:
         """Each at n samples, (n, ., .); all arguments (n, .)."""
         n = len(S)
         if n not in self._mapped:

@@ -13,7 +13,7 @@ import numpy as np
 from ctrlgen.core.units import Quantity, written_unit
 from ctrlgen.devices import Device
 from ctrlgen.devices.section import Section
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.hypotheses import (
     PARAMETER,
     Hypothesis,
@@ -31,7 +31,7 @@ FAR = 100.0  # standard deviations that a number may be off: the price of being 
 
 
 @dataclass(frozen=True)
-class Unknown:
+class FreeParameter:
     """One free number [SI]: `sd` is its stated deviation from `nominal`, None where nothing is known beforehand.
 
     `cause` is the place of its hypothesis in the structure, None for the device's own uncertain numbers.
@@ -57,13 +57,13 @@ class Unknown:
 class Structure:
     """`device` as described, with `causes` and their starting values ({parameter: SI}, one mapping a cause).
 
-    `own`: where a fit begins of the device's uncertain numbers, by path [SI]; those not given begin as stated.
+    `nominal_starts`: where a fit begins of the device's uncertain numbers, by path [SI]; those not given begin as stated.
     """
 
     device: Device
     causes: tuple[Hypothesis, ...] = ()
     starts: tuple[dict[str, float], ...] = ()
-    own: dict[str, float] = field(default_factory=dict)
+    nominal_starts: dict[str, float] = field(default_factory=dict)
 
     def with_cause(self, cause: Hypothesis, start: dict[str, float]) -> Structure:
         """The same with one cause more."""
@@ -74,7 +74,7 @@ class Structure:
         keep = [k for k in range(len(self.causes)) if k != index]
         return replace(self, causes=tuple(self.causes[k] for k in keep), starts=tuple(self.starts[k] for k in keep))
 
-    def begun(self, index: int, start: dict[str, float]) -> Structure:
+    def restarted(self, index: int, start: dict[str, float]) -> Structure:
         """The same with the fit of one cause begun elsewhere."""
         return replace(self, starts=(*self.starts[:index], start, *self.starts[index + 1 :]))
 
@@ -83,22 +83,22 @@ class Structure:
         """Of its causes."""
         return sum(c.law.rarity for c in self.causes if c.effect != PARAMETER)
 
-    def usual(self, unknown: Unknown) -> tuple[float, float] | None:
+    def usual(self, unknown: FreeParameter) -> tuple[float, float] | None:
         """The range [SI] outside of which an amplitude means something else than its effect's name says."""
         cause = self.causes[unknown.cause]
         p = None if cause.effect == PARAMETER else cause.law.amplitude()
         if p is None or p.usual is None:
             return None
-        return tuple(self.place(cause).si(end, p) for end in p.usual)
+        return tuple(self.channel_of(cause).si(end, p) for end in p.usual)
 
-    def place(self, cause: Hypothesis) -> Where:
+    def channel_of(self, cause: Hypothesis) -> Where:
         """The channel at which a cause acts; the first one where it acts at all of them."""
         where = channels(nominal_links(self.device), cause.law.place)
         here = where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
         return here if cause.of is None else here.beside(next(w for w in where if w.channel == cause.of))
 
     @cached_property
-    def described(self) -> Device:
+    def device_with_causes(self) -> Device:
         """The device with the causes' effects at their starting values."""
         added, values = [], {}
         for cause, start in zip(self.causes, self.starts, strict=True):
@@ -107,7 +107,7 @@ class Structure:
                 low, high = _reach(number)
                 values[cause.path] = min(max(start["value"], low), high)  # a stage of negative size cannot be built
                 continue
-            where = self.place(cause)
+            where = self.channel_of(cause)
             law = cause.law
             numbers_ = {
                 p.name: written(_inside(_settled(start[p.name], p, where), p, where), where.unit_of(p))
@@ -117,7 +117,7 @@ class Structure:
         return changed(self.device, values).model_copy(update={"effect": (*self.device.effect, *added)})
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def free_parameters(self) -> tuple[FreeParameter, ...]:
         """The device's uncertain numbers, then every parameter of every cause."""
         causes = {c.path for c in self.causes if c.effect == PARAMETER}
         acting = _movable(self.device)
@@ -126,13 +126,13 @@ class Structure:
         for path, sd in nuisances(self.device).items():
             if path in acting and path not in causes:
                 q = sections[path][1]
-                rows.append(Unknown(path, written_unit(q.text), q.si, *_around(q.si, FAR * sd), sd, sd))
+                rows.append(FreeParameter(path, written_unit(q.text), q.si, *_around(q.si, FAR * sd), sd, sd))
         k = len(self.device.effect)
         for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
             if cause.effect == PARAMETER:
                 q = sections[cause.path][1]
                 rows.append(
-                    Unknown(
+                    FreeParameter(
                         cause.path,
                         written_unit(q.text),
                         q.si,
@@ -144,7 +144,7 @@ class Structure:
                     )
                 )
                 continue
-            where, law = self.place(cause), cause.law
+            where, law = self.channel_of(cause), cause.law
             for p in law.params:
                 if p.expected:  # it is so or it is not: nothing to fit
                     continue
@@ -156,7 +156,7 @@ class Structure:
                     else abs(start[p.name]) or high - low
                 )
                 rows.append(
-                    Unknown(
+                    FreeParameter(
                         f"effect[{k}].{p.name}",
                         where.unit_of(p),
                         off,
@@ -175,22 +175,24 @@ class Structure:
     def start(self) -> np.ndarray:
         """Where a fit begins, one SI number an unknown."""
         values = []
-        for unknown in self.unknowns:
+        for unknown in self.free_parameters:
             if unknown.cause is None:
-                values.append(min(max(self.own.get(unknown.path, unknown.nominal), unknown.low), unknown.high))
+                values.append(
+                    min(max(self.nominal_starts.get(unknown.path, unknown.nominal), unknown.low), unknown.high)
+                )
             else:
                 values.append(min(max(self.starts[unknown.cause][unknown.name], unknown.low), unknown.high))
         return np.array(values)
 
-    def responses(self, recording: Recording, cache: dict) -> dict[tuple[float, bool], Response]:
+    def simulators(self, recording: Recording, cache: dict) -> dict[tuple[float, bool], Simulator]:
         """One response for every sample time and drive convention in the recording."""
         kinds = {(r.sample_time, r.linear) for r in recording.records}
-        free = tuple(u.path for u in self.unknowns)
+        free = tuple(u.path for u in self.free_parameters)
         found = {}
         for h, linear in kinds:
             key = (self.causes, h, linear, tuple(cause.effect for cause in self.causes))
             if key not in cache:
-                cache[key] = Response(self.described, free, recording.channels, h, linear)
+                cache[key] = Simulator(self.device_with_causes, free, recording.channels, h, linear)
             found[h, linear] = cache[key]
         return found
 

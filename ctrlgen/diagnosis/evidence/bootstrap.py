@@ -21,7 +21,7 @@ from ctrlgen.core.parallel import Failure, run_all, sendable
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.structure import Structure, Unknown
+from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
 from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, Estimate
 from ctrlgen.recordings.recording import Record, Recording
 
@@ -55,9 +55,9 @@ class _Drawn(Structure):
     stated: tuple[float, ...] = ()
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def free_parameters(self) -> tuple[FreeParameter, ...]:
         """As of the structure, with other nominal numbers, where those have a deviation."""
-        base = Structure(self.device, self.causes, self.starts).unknowns
+        base = Structure(self.device, self.causes, self.starts).free_parameters
         return tuple(
             replace(u, nominal=nominal) if u.sd else u for u, nominal in zip(base, self.stated, strict=True)
         )  # fmt: skip
@@ -90,7 +90,7 @@ class Replicate:
         s = self.structure
         stated = tuple(
             float(np.clip(value + u.sd * rng.standard_normal(), u.low, u.high)) if u.sd else u.nominal
-            for u, value in zip(s.unknowns, self.theta, strict=True)
+            for u, value in zip(s.free_parameters, self.theta, strict=True)
         )
         return fitter.fit(_Drawn(s.device, s.causes, s.starts, stated=stated), self.theta).theta
 
@@ -139,8 +139,8 @@ def bootstrap(
     A device whose functions cannot be sent to another process (lambdas of a user's device) is refitted here.
     """
     fit, fitter = diagnosis.search.chosen.fit, diagnosis.fitter
-    recording = replace(fitter.recording, records=tuple(fitter.to_fit))
-    predicted = tuple(fitter.predicted(fit, r) for r in recording.records)
+    recording = replace(fitter.recording, records=tuple(fitter.fit_records))
+    predicted = tuple(fitter.predict(fit, r) for r in recording.records)
     blocks = tuple(block_length(r, y) for r, y in zip(recording.records, predicted, strict=True))
     work = Replicate(fit.structure, fit.theta, recording, fitter.noise, predicted, blocks, os.urandom(8).hex())
     if scheduler is None and not sendable(work):
@@ -160,7 +160,7 @@ def _summary(
 ) -> Bootstrap:
     """Percentiles by path; the shares in which a finding vanished."""
     values, vanished = {}, {}
-    for i, unknown in enumerate(structure.unknowns):
+    for i, unknown in enumerate(structure.free_parameters):
         if not len(drawn):
             break
         ends = np.percentile(drawn[:, i], ENDS)

@@ -65,13 +65,13 @@ def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
         if h.effect == PARAMETER:
             unit, weight = written_unit(nominal[h.path].text), 1 / max(abs(nominal[h.path].si), 1e-300)
         else:
-            where = fit.structure.place(h)
+            where = fit.structure.channel_of(h)
             unit, weight = where.unit_of(h.law.amplitude()), 1 / abs(where.si(_span(h), h.law.amplitude()))
         kinds.setdefault(h.effect, {})[h] = (float(difference(sd, unit)), sd * weight, unit)
     beyond = [h for places in kinds.values() for h, (_, weight, _) in places.items() if screened.threshold * weight > 1]
     kinds = {kind: left for kind, p in kinds.items() if (left := {h: row for h, row in p.items() if h not in beyond})}
     smallest = {kind: _smallest(kind, places, screened, need) for kind, places in sorted(kinds.items())}
-    free = {u.path for u in fit.structure.unknowns}
+    free = {u.path for u in fit.structure.free_parameters}
     hidden = tuple(
         Hidden(h.effect, h.location, _behind(fit, k)) for h, k in screened.hidden.items() if h.path not in free
     )
@@ -102,7 +102,7 @@ def _smallest(
 
 def _behind(fit: Fit, column: int) -> str:
     """The free number in words."""
-    unknowns = fit.structure.unknowns
+    unknowns = fit.structure.free_parameters
     if column < 0:
         return "nothing: it does not reach these readings"
     if column >= len(unknowns):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
 from ctrlgen.recordings.recording import Record
 
@@ -86,12 +86,12 @@ def _together(values: np.ndarray, n_u: int) -> np.ndarray:
 
 
 def admissible(
-    shape: Shape, response: Response, p: np.ndarray, template: Record, first: float
+    shape: Shape, simulator: Simulator, p: np.ndarray, template: Record, first: float
 ) -> tuple[Record, float] | None:
     """`shape` as a record from time `first` [s] as strong as every limit of the device allows, and its strength; None
     where even the weakest breaks one. `template` gives clock, convention and, where the device states none, the range.
     """
-    low, high = response.model.u_bounds
+    low, high = simulator.model.u_bounds
     low = np.where(np.isfinite(low), low, template.drive.min(axis=0))
     high = np.where(np.isfinite(high), high, template.drive.max(axis=0))
     n = len(shape.values)
@@ -108,20 +108,20 @@ def admissible(
             np.zeros((n, template.observed.shape[1])), template.linear, None,
             np.ones((n, template.observed.shape[1]), bool),
         )  # fmt: skip
-        if _kept(response, p, record):
+        if _kept(simulator, p, record):
             best, first_left = (record, STRENGTHS[middle]), middle + 1
         else:
             last_left = middle - 1
     return best
 
 
-def _kept(response: Response, p: np.ndarray, record: Record) -> bool:
+def _kept(simulator: Simulator, p: np.ndarray, record: Record) -> bool:
     """Whether the predicted motion breaks no limit."""
-    m = response.model
-    after = motion(response, record, p, None)[1]
+    m = simulator.model
+    after = motion(simulator, record, p, None)[1]
     if not np.all(np.isfinite(after)):
         return False
-    given = [ca.vertcat(m.x, m.z), m.u, m.p, response.ambient]
+    given = [ca.vertcat(m.x, m.z), m.u, m.p, simulator.ambient]
     expr = ca.vertcat(*(ca.substitute(limit.expr, m.heat, m.heat_of_drive) for limit in m.limits))
     n = len(after)
     f = ca.Function("limits", given, [expr]).map(n)

@@ -84,16 +84,16 @@ def _open(fitter: Fitter, search: Search, explained: bool) -> tuple[list[tuple[F
 
 def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:
     """The drive of the family that best separates two fits."""
-    template = max(fitter.to_fit, key=lambda r: len(r.time))
+    template = max(fitter.fit_records, key=lambda r: len(r.time))
     settled = not np.isfinite(template.sample_time)
     n, n_u = min(len(template.time), MOST_POSES if settled else MOST_SAMPLES), template.drive.shape[1]
     family = poses(n, n_u, seed) if settled else shapes(n, n_u, 1 / template.sample_time, seed)
     first = 0.0 if settled else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
-    response = a.structure.responses(fitter.recording, fitter.cache)[template.sample_time, template.linear]
+    simulator = a.structure.simulators(fitter.recording, fitter.cache)[template.sample_time, template.linear]
     now = [_Sums.present(fitter, *pair) for pair in ((a, b), (b, a))]
     rows = []
     for shape in family:
-        given = admissible(shape, response, a.theta, template, first)
+        given = admissible(shape, simulator, a.theta, template, first)
         if given is None:
             continue
         record, strength = given
@@ -134,19 +134,19 @@ class _Sums:
     @classmethod
     def present(cls, fitter: Fitter, truth: Fit, refitted: Fit) -> _Sums:
         """On the records to fit; the rows of the prior hold the refitted one's numbers."""
-        n = sum(r.valid.size for r in fitter.to_fit)
+        n = sum(r.valid.size for r in fitter.fit_records)
         delta = np.zeros(len(refitted.residual))
         delta[:n] = refitted.residual[:n] - truth.residual[:n]
         return cls._of(-refitted.J, delta, len(refitted.theta))
 
     def plus(self, fitter: Fitter, truth: Fit, refitted: Fit, record: Record) -> _Sums:
         """With one record more."""
-        response = refitted.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
-        y, slopes = response.sensitivities(record, refitted.theta)
-        other = truth.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
-        delta = fitter.noise.whiten(other.outputs(record, truth.theta) - y, record.valid).ravel()
+        simulator = refitted.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+        y, slopes = simulator.sensitivities(record, refitted.theta)
+        other = truth.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+        delta = fitter.noise.whiten(other.simulate(record, truth.theta) - y, record.valid).ravel()
         J = fitter.noise.whiten(slopes, record.valid).reshape(len(delta), -1)
-        sizes = start_sizes(response)
+        sizes = start_sizes(simulator)
         prior = np.hstack([np.zeros((len(sizes), len(refitted.theta))), np.diag(1 / sizes)])
         new = _Sums._of(np.vstack([J, prior]), np.concatenate([delta, np.zeros(len(sizes))]), len(refitted.theta))
         return _Sums(self.N + new.N, self.g + new.g, self.s + new.s)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment
 from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
 from ctrlgen.model.model import Model
@@ -24,9 +24,9 @@ def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dic
     A device in which masses move has no scenario: the solver knows devices that stand in balance.
     """
     record = chosen.record
-    response = fit.structure.responses(fitter.recording, fitter.cache)[record.sample_time, record.linear]
-    found = {DRIVE: _drive(response, chosen), RECORDING: _recording(fitter, response, chosen)}
-    return found | (_scenario(response, fit, chosen, device_file) if _solved(response.model) else {})
+    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+    found = {DRIVE: _drive(simulator, chosen), RECORDING: _recording(fitter, simulator, chosen)}
+    return found | (_scenario(simulator, fit, chosen, device_file) if _solved(simulator.model) else {})
 
 
 def _solved(m: Model) -> bool:
@@ -39,8 +39,8 @@ def _csv(header: list[str], columns: np.ndarray) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _drive(response: Response, chosen: Experiment) -> str:
-    signal, record = response.model.signals["drive"], chosen.record
+def _drive(simulator: Simulator, chosen: Experiment) -> str:
+    signal, record = simulator.model.signals["drive"], chosen.record
     units = zip(record.drive.T, signal.units, strict=True)
     columns = [difference(u, unit) for u, unit in units]
     header = [f"{c} [{u}]" for c, u in zip(signal.channels, signal.units, strict=True)]
@@ -50,9 +50,9 @@ def _drive(response: Response, chosen: Experiment) -> str:
     return _csv(["time [s]", *header], np.column_stack([time, *columns]))
 
 
-def _recording(fitter: Fitter, response: Response, chosen: Experiment) -> str:
+def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
     """A recording.toml that names the drive's columns and leaves the readings' to the reader."""
-    recording, record, signal = fitter.recording, chosen.record, response.model.signals["drive"]
+    recording, record, signal = fitter.recording, chosen.record, simulator.model.signals["drive"]
     n = len(record.drive)
     cut = int(FITTED * n)
     lines = [
@@ -77,10 +77,10 @@ def _recording(fitter: Fitter, response: Response, chosen: Experiment) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _scenario(response: Response, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
+def _scenario(simulator: Simulator, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
     """The predicted displacements as a command; the solver finds the drives again."""
-    m, record = response.model, chosen.record
-    after = motion(response, record, fit.theta, None)[1]
+    m, record = simulator.model, chosen.record
+    after = motion(simulator, record, fit.theta, None)[1]
     f = ca.Function("z", [ca.vertcat(m.x, m.z)], [m.z]).map(len(after))
     signal = m.signals["displacement"]
     z = f(after.T).full().T

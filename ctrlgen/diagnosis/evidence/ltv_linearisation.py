@@ -15,7 +15,7 @@ import numpy as np
 
 from ctrlgen.devices import Links
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
 from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_links
 from ctrlgen.effects import Place
@@ -89,38 +89,38 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
     """The linearisation of `fit` along `record`."""
     links = nominal_links(fit.structure.device)
     place = acts_at(links)
-    response, p, chosen = _probed(fitter, fit, record, place)
+    simulator, p, chosen = _probed(fitter, fit, record, place)
     start = _start(fitter, fit, record)
-    before, after, y = motion(response, record, p, start)
+    before, after, y = motion(simulator, record, p, start)
     if start is None:
-        y = fitter.predicted(fit, record)
-    F_S, F_f, H_S, H_f = _linearised(response, record, p, chosen, before)
+        y = fitter.predict(fit, record)
+    F_S, F_f, H_S, H_f = _linearised(simulator, record, p, chosen, before)
     at = before if np.isfinite(record.sample_time) else after
-    m = response.model
-    z = at[:, response.n_x :]
+    m = simulator.model
+    z = at[:, simulator.n_x :]
     noise = fitter.noise
     residual = np.where(record.valid, record.observed - y, 0.0)
-    probes = m.device.effect[len(fit.structure.described.effect) :]
+    probes = m.device.effect[len(fit.structure.device_with_causes.effect) :]
     placed = [probe for probe in probes if probe.place is place]
-    sd = np.zeros(response.n_s)
-    sd[list(response.initial)] = start_sizes(response)
+    sd = np.zeros(simulator.n_s)
+    sd[list(simulator.free_initial_states)] = start_sizes(simulator)
     return Along(
         record, place, tuple(probe.at for probe in placed),
         tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), links.travel_unit,
         residual,
-        noise.whiten(residual, record.valid), noise.usable(record.valid), z, _velocity(response, record, at, z),
+        noise.whiten(residual, record.valid), noise.usable(record.valid), z, _velocity(simulator, record, at, z),
         F_S, F_f, H_S, H_f, sd, np.concatenate([m.x_scale, m.z_scale]),
     )  # fmt: skip
 
 
-def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Response, np.ndarray, list[int]]:
+def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Simulator, np.ndarray, list[int]]:
     """The response with probes, its parameters, and which of them are the probes at `place`."""
-    known = [unknown.path for unknown in fit.structure.unknowns]
-    device, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
+    known = [unknown.path for unknown in fit.structure.free_parameters]
+    device, probes = with_probes(fit.structure.device_with_causes, nominal_links(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
     key = ("along", fit.structure.causes, record.sample_time, record.linear)
     if key not in fitter.cache:
-        fitter.cache[key] = Response(
+        fitter.cache[key] = Simulator(
             device, [*known, *paths], fitter.recording.channels, record.sample_time, record.linear
         )
     p = np.concatenate([fit.theta, np.zeros(len(paths))])
@@ -129,28 +129,28 @@ def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Res
 
 def _start(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray | None:
     """What a record to fit was found to start with; others are linearised along the motion from rest."""
-    places = [k for k, r in enumerate(fitter.to_fit) if r is record]
-    return fit.starts[places[0]] if places and fit.starts else None
+    places = [k for k, r in enumerate(fitter.fit_records) if r is record]
+    return fit.initial_states[places[0]] if places and fit.initial_states else None
 
 
 def motion(
-    r: Response, record: Record, p: np.ndarray, start: np.ndarray | None
+    r: Simulator, record: Record, p: np.ndarray, start: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """S before and after each sample, (n, n_s), and the readings (n, n_y)."""
-    after, y = r.motion(record, p, start)
+    after, y = r.simulate_states(record, p, start)
     return np.vstack([r._start(record, p, start), after[:-1]]), after, y
 
 
 def _linearised(
-    r: Response, record: Record, p: np.ndarray, chosen: list[int], before: np.ndarray
+    r: Simulator, record: Record, p: np.ndarray, chosen: list[int], before: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """F_S, F_f, H_S, H_f along the motion."""
-    linear, inputs = r.linearised(p, chosen), (before, *r._inputs(record))
-    parts = [linear.along(*(x[a : a + BLOCK] for x in inputs)) for a in range(0, len(before), BLOCK)]
+    linear, inputs = r.linearise(p, chosen), (before, *r._inputs(record))
+    parts = [linear.evaluate_along(*(x[a : a + BLOCK] for x in inputs)) for a in range(0, len(before), BLOCK)]
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
 
 
-def _velocity(r: Response, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _velocity(r: Simulator, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Of the axes, (n, n_axes) [SI]; between settled poses the step from the pose before."""
     n_v = r.model.v.numel()
     if n_v:

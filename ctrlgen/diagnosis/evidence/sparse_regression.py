@@ -96,8 +96,8 @@ def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n:
 
 def _held(fitter: Fitter, fit: Fit, held: Along, term: np.ndarray, delta: np.ndarray) -> tuple[float, float]:
     """Excess squares of one held-out record without the term and with it, the start fitted anew."""
-    response = fit.structure.responses(fitter.recording, fitter.cache)[held.record.sample_time, held.record.linear]
-    slopes = response.sensitivities(held.record, fit.theta)[1]
+    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[held.record.sample_time, held.record.linear]
+    slopes = simulator.sensitivities(held.record, fit.theta)[1]
     Y = np.nan_to_num(fitter.noise.whiten(slopes, held.record.valid)).reshape(
         held.record.valid.size, -1 if slopes.size else 0
     )

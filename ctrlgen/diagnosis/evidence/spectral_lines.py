@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.estimation.noise import period
+from ctrlgen.diagnosis.estimation.noise import drive_period
 from ctrlgen.recordings.recording import Record
 
 EXCITED = 1e-3  # of the drive's largest line: below, a line counts as not excited
@@ -41,7 +41,7 @@ class Lines:
 
 def lines(record: Record, i: int, channel: str, unit: str) -> Lines | None:
     """The lines of reading `i`; None where the drive does not repeat three times or readings are missing."""
-    P = period(record.drive)
+    P = drive_period(record.drive)
     if P is None or len(record.time) < 3 * P:
         return None
     whole = len(record.time) // P

@@ -35,7 +35,7 @@ def evidence(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> 
     """Everything beside the findings. `explained`: the chosen structure leaves nothing over."""
     recording = fitter.recording
     nominal, chosen = search.nominal.fit, search.chosen.fit
-    records = [*fitter.to_fit, *fitter.held]
+    records = [*fitter.fit_records, *fitter.held_out_records]
 
     def place(fit: Fit, lefts: list) -> dict[str, Any]:
         return plain(where(lefts, recording.channels, recording.units, seed))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen._version import __version__
 from ctrlgen.core.units import show
-from ctrlgen.diagnosis.estimation.robust_covariance import deviations
+from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers, written
 from ctrlgen.diagnosis.report.diagnosis_json import as_dict
 from ctrlgen.diagnosis.report.narrative import (
@@ -101,7 +101,7 @@ def _row(f: Finding) -> dict[str, Any]:
 
 def _tested(diagnosis: Diagnosis) -> str:
     """What the adequacy gate says of the rest."""
-    gate = diagnosis.adequacy
+    gate = diagnosis.residual_tests
     if any(e.noise_floor is None for e in diagnosis.held_out.values()):
         return "The noise is not known, so these errors cannot be judged against it."
     tests = ", ".join(
@@ -116,7 +116,7 @@ def _changed(diagnosis: Diagnosis) -> list[dict[str, str]]:
     fit = diagnosis.search.chosen.fit
     known = {path: q for path, _, q in numbers(diagnosis.device)}
     rows = []
-    for unknown, value, sd in zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True):
+    for unknown, value, sd in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
         own = cause is None or cause.effect == PARAMETER
         if own and abs(value - unknown.nominal) > NEGLIGIBLE * sd:

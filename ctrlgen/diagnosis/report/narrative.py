@@ -149,7 +149,7 @@ def sentence(diagnosis: Diagnosis) -> str:
             f"{head}: nothing that this recording can show is missing from the device file ({diagnosis.device.title})"
         )
         said += f"{_blind(diagnosis)}."
-    elif (far := excluded(diagnosis.search.chosen.fit)) and diagnosis.adequacy.passed:
+    elif (far := excluded(diagnosis.search.chosen.fit)) and diagnosis.residual_tests.passed:
         said = f"{head}: {_beyond(diagnosis, far)}{f'; what helps is {named(found)}' if found else ''}."
     elif not found:
         said = f"{head}: the recording differs from {diagnosis.device.title}, and no cause I know explains it."

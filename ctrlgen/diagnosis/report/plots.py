@@ -54,12 +54,12 @@ class Residuals:
 
     def __init__(self, diagnosis: Diagnosis) -> None:
         self.diagnosis, self.recording, fitter = diagnosis, diagnosis.recording, diagnosis.fitter
-        self.records: list[Record] = fitter.held
+        self.records: list[Record] = fitter.held_out_records
         self.settled = self.recording.kind == "poses"
         search = diagnosis.search
         self.scales = [from_si(1.0, unit) - from_si(0.0, unit) for unit in self.recording.units]
         self.before, self.after = (
-            [np.where(r.valid, r.observed - fitter.predicted(trial.fit, r), np.nan) * self.scales for r in self.records]
+            [np.where(r.valid, r.observed - fitter.predict(trial.fit, r), np.nan) * self.scales for r in self.records]
             for trial in (search.nominal, search.chosen)
         )
         self.changed = bool(diagnosis.findings)

@@ -19,8 +19,8 @@ from tomlkit.items import AoT, Item, Table
 from ctrlgen._version import __version__
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
-from ctrlgen.diagnosis.estimation.robust_covariance import deviations
-from ctrlgen.diagnosis.estimation.structure import Unknown
+from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
+from ctrlgen.diagnosis.estimation.structure import FreeParameter
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
 from ctrlgen.diagnosis.report.narrative import HARD_SPACE, channel_sentence, hard, sentence
 from ctrlgen.diagnosis.selection.diagnosis import UNEXPLAINED, Diagnosis
@@ -39,7 +39,7 @@ def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
 def next_text(diagnosis: Diagnosis, original: str) -> str:
     """The text of the device file `original` with the findings in it."""
     fit = diagnosis.search.chosen.fit
-    found = list(zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True))
+    found = list(zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True))
     document = tomlkit.parse(original)
     changed = _change_numbers(document, diagnosis, found)
     effects = _effects(diagnosis, found)
@@ -53,7 +53,9 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
     return text + "".join(_table(table) for table in effects)
 
 
-def _change_numbers(document: Any, diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]) -> list[str]:
+def _change_numbers(
+    document: Any, diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]
+) -> list[str]:
     """Puts the device's own numbers that moved into the document; their paths."""
     known = {path: number for path, _, number in numbers(diagnosis.device)}
     causes, changed = diagnosis.search.chosen.fit.structure.causes, []
@@ -96,7 +98,7 @@ def _toml(value: str | dict[str, Any]) -> str:
     return tomlkit.string(value).as_string()
 
 
-def _effects(diagnosis: Diagnosis, found: Sequence[tuple[Unknown, float, float]]) -> list[dict[str, Any]]:
+def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
     """One table an effect that was found; numbers as {value, sd} where the record holds them."""
     fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in found}, []
     for k, effect in enumerate(diagnosis.corrected.effect):
@@ -123,7 +125,7 @@ def _written(si: float, unit: str, digits: int = DIGITS) -> str:
     return f"{from_si(si, unit):.{digits}g} {'' if unit == '1' else unit}".strip()
 
 
-def _within(si: float, unknown: Unknown) -> str:
+def _within(si: float, unknown: FreeParameter) -> str:
     """A number of an effect as text that a reader of the file finds inside the law's bounds, in spite of rounding."""
     for digits in (DIGITS, 17):
         shown = f"{from_si(si, unknown.unit):.{digits}g}"

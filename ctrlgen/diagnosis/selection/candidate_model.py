@@ -60,7 +60,7 @@ def freed(fit: Fit) -> float:
 def cooled(fit: Fit) -> Structure:
     """The structure with its causes and the device's own numbers starting where the fit ended."""
     s = fit.structure
-    own = {u.path: float(v) for u, v in zip(s.unknowns, fit.theta, strict=True) if u.cause is None}
+    own = {u.path: float(v) for u, v in zip(s.free_parameters, fit.theta, strict=True) if u.cause is None}
     return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))), own)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, Seen, nominal_links
 from ctrlgen.effects import Effect, Place
@@ -46,19 +46,21 @@ def peaks(fitter: Fitter, fit: Fit) -> Peaks:
     """How far the signals at every place go in the records to fit."""
     found: Peaks = {}
     links = nominal_links(fit.structure.device)
-    responses = fit.structure.responses(fitter.recording, fitter.cache)
+    simulators = fit.structure.simulators(fitter.recording, fitter.cache)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
     places = [(place, i) for place in reached for i in range(len(channels(links, place)))]
-    for record, start in zip(fitter.to_fit, fit.starts, strict=True):
-        response = responses[record.sample_time, record.linear]
-        m, n = response.model, len(record.time)
+    for record, start in zip(fitter.fit_records, fit.initial_states, strict=True):
+        simulator = simulators[record.sample_time, record.linear]
+        m, n = simulator.model, len(record.time)
         seen = [m.seen(place, i, None, {}) for place, i in places]
         still = ca.SX.zeros(1)
         given = [(s.value, s.displacement, still if s.velocity is None else s.velocity) for s in seen]
         rows = m.closed(ca.vertcat(*(value for values in given for value in values)))
-        f = ca.Function("signals", [ca.vertcat(m.x, m.z), m.u, response.ambient, m.p], [rows])
-        S = response.motion(record, fit.theta, start if len(start) else None)[0]
-        values = f.map(n)(S.T, record.drive.T, response._ambients(record)[None, :], np.tile(fit.theta[:, None], (1, n)))
+        f = ca.Function("signals", [ca.vertcat(m.x, m.z), m.u, simulator.ambient, m.p], [rows])
+        S = simulator.simulate_states(record, fit.theta, start if len(start) else None)[0]
+        values = f.map(n)(
+            S.T, record.drive.T, simulator._ambients(record)[None, :], np.tile(fit.theta[:, None], (1, n))
+        )
         most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
         for where, row in zip(places, most, strict=True):
             old = found.get(where, {})
@@ -85,10 +87,10 @@ class Laws:
     """The terms of `hypotheses` on the motions of `response`, and one column for every choice of shape."""
 
     def __init__(
-        self, response: Response, structure: Structure, hypotheses: list[Hypothesis],
+        self, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
         probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], Seen],
     ) -> None:  # fmt: skip
-        self.response = response
+        self.simulator = simulator
         self.terms: list[_Term] = []
         self._known: dict[tuple, int] = {}
         self.columns = [c for h in hypotheses for c in self._of(h, structure, probes, seen)]
@@ -100,7 +102,7 @@ class Laws:
         probes: dict[tuple[Place, int], int],
         seen: Callable[[Place, int], Seen],
     ) -> Iterator[Column]:
-        law, where = h.law, structure.place(h)
+        law, where = h.law, structure.channel_of(h)
         names = [w.channel for w in channels(nominal_links(structure.device), law.place)]
         partner = names.index(h.of) if h.of else None
         at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
@@ -128,7 +130,7 @@ class Laws:
             states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
-            s = self.response.model.seen(law.place, i, partner, states, law.stage)
+            s = self.simulator.model.seen(law.place, i, partner, states, law.stage)
             new = law.update(s, p)
             s.__dict__.update(new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
@@ -146,13 +148,13 @@ class Laws:
     def start(self, time: float) -> np.ndarray:
         """The laws' states before the first sample, at `time` [s]: zero, but for clocks."""
         clocks = [clock for term in self.terms for clock in term.clocks]
-        return np.where(clocks, time if np.isfinite(self.response.sample_time) else 0.0, 0.0)
+        return np.where(clocks, time if np.isfinite(self.simulator.sample_time) else 0.0, 0.0)
 
     @cached_property
     def driven(self) -> list[int]:
         """The terms that jump with a drive which is held from sample to sample."""
-        m = self.response.model
-        if self.response.linear or not np.isfinite(self.response.sample_time):
+        m = self.simulator.model
+        if self.simulator.linear or not np.isfinite(self.simulator.sample_time):
             return []
         jumping = ca.vertcat(m.u, m.held, m.heat)
         return [k for k, term in enumerate(self.terms) if ca.depends_on(ca.jacobian(term.value, term.a), jumping)]
@@ -163,7 +165,7 @@ class Laws:
 
         A settled pose is read with the memories that it has settled to.
         """
-        m = self.response.model
+        m = self.simulator.model
         memory = ca.vertcat(ca.SX(0, 1), *(s for term in self.terms for s in term.states))
         after = m.closed(ca.vertcat(ca.SX(0, 1), *(value for term in self.terms for value in self._after(term))))
         found = end = ca.SX(0, 1)
@@ -176,9 +178,9 @@ class Laws:
             if self.driven:  # the drive stays as the sample began
                 (end,) = ca.substitute([open_[self.driven]], [memory, S], [after, S_next])
                 end = m.closed(end)
-        if not np.isfinite(self.response.sample_time):
+        if not np.isfinite(self.simulator.sample_time):
             found = ca.substitute(found, memory, after)
-        given = [memory, S, m.u, self.response.ambient, S_next]
+        given = [memory, S, m.u, self.simulator.ambient, S_next]
         general = ca.Function("general", [*given, m.p], [after, found, end])
         return ca.Function("laws", given, [ca.densify(value) for value in general(*given, p)], {"cse": True})
 
@@ -186,7 +188,7 @@ class Laws:
         """The states of one law after a sample: linear ones exactly, stepped ones by their update."""
         if not term.states:
             return []
-        h = self.response.sample_time
+        h = self.simulator.sample_time
         settled = not np.isfinite(h)
         h = SETTLED_LAG if settled else h
         memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)

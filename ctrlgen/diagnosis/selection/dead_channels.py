@@ -48,8 +48,8 @@ def alive(device: Device, recording: Recording) -> Alive:
         ]
         raise InputError(recording.title, faults)
     structure = Structure(device)
-    responses = structure.responses(recording, {})
-    foreseen = [responses[r.sample_time, r.linear].outputs(r, structure.start) for r in moving]
+    simulators = structure.simulators(recording, {})
+    foreseen = [simulators[r.sample_time, r.linear].simulate(r, structure.start) for r in moving]
     places = {f"reading.{w.channel}": w for w in channels(nominal_links(device), Place.SENSOR)}
     findings, said = [], []
     for i, level in dead.items():

@@ -12,10 +12,10 @@ from scipy import stats
 from ctrlgen.core.units import difference, from_si, to_si
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import CI, Fit, Fitter
-from ctrlgen.diagnosis.estimation.prediction_uncertainty import uncertainty
+from ctrlgen.diagnosis.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.diagnosis.estimation.profile_likelihood import Profile
-from ctrlgen.diagnosis.estimation.residual_tests import Adequacy
-from ctrlgen.diagnosis.estimation.robust_covariance import deviations
+from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
+from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, written
 from ctrlgen.diagnosis.selection.candidate_model import CONFIRMED, Search
@@ -72,7 +72,7 @@ class Diagnosis:
     verdict: str
     findings: tuple[Finding, ...]
     held_out: dict[str, ChannelError]
-    adequacy: Adequacy
+    residual_tests: ResidualTests
     where: dict[str, Any]
     detectable: dict[str, Any]
     next_experiment: dict[str, Any] | None
@@ -102,7 +102,9 @@ class Diagnosis:
     def corrected(self) -> Device:
         """The device with all that was found in it, as device.next.toml describes it; what was read off stands last."""
         fit = self.search.chosen.fit
-        own = {u.path: float(v) for u, v in zip(fit.structure.unknowns, fit.theta, strict=True) if u.cause is None}
+        own = {
+            u.path: float(v) for u, v in zip(fit.structure.free_parameters, fit.theta, strict=True) if u.cause is None
+        }
         starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
         device = changed(Structure(fit.structure.device, fit.structure.causes, starts).described, own)
         beside = [f for f in self.findings if f.cause not in fit.structure.causes]
@@ -115,7 +117,7 @@ class Diagnosis:
         return device.model_copy(update={"effect": (*device.effect, *read)})
 
 
-def verdict(fitter: Fitter, search: Search, after: Adequacy, seen: bool = False) -> str:
+def verdict(fitter: Fitter, search: Search, after: ResidualTests, seen: bool = False) -> str:
     """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
 
     Partly: causes are found, but they leave a little more than noise, or no held-out record shows one of them, or nothing
@@ -140,7 +142,7 @@ def excluded(fit: Fit) -> dict[str, float]:
     where all of them together are as far off as chance puts them."""
     off = {
         u.path: float((value - u.nominal) / u.sd)
-        for u, value in zip(fit.structure.unknowns, fit.theta, strict=True)
+        for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)
         if u.sd
     }
     if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > IMPOSSIBLE:
@@ -163,7 +165,7 @@ def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
 def loose(fitter: Fitter, search: Search) -> bool:
     """Whether the held-out records are foreseen worse than before, beyond chance, though the causes may be right: by the
     numbers as fitted, not as far as those are known."""
-    worse = fitter.held_squares(search.chosen.fit) - fitter.held_squares(search.nominal.fit)
+    worse = fitter.held_out_squares(search.chosen.fit) - fitter.held_out_squares(search.nominal.fit)
     return worse > CHANCE * np.sqrt(2 * _n_held(fitter))
 
 
@@ -190,18 +192,20 @@ def remaining(fitter: Fitter, search: Search) -> float:
 
 def _n_held(fitter: Fitter) -> int:
     """Usable samples of the held-out records."""
-    return sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+    return sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)
 
 
 def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:
     """Held-out root mean square of each channel, nominal and chosen."""
     found = {}
-    floor, unsure = fitter.noise.floor, uncertainty(fitter, search.chosen.fit)
+    floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
         rms = []
         for trial in (search.nominal, search.chosen):
-            squares = [((r.observed - fitter.predicted(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held]
+            squares = [
+                ((r.observed - fitter.predict(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held_out_records
+            ]
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         noise = float(floor[i] * scale) if known[i] else None
         beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
@@ -213,7 +217,7 @@ def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
     """Every unknown of a fit, in its reader's unit. An amplitude is known no better than its law's form is right, and no
     number better than its profile says."""
     found, profiled = {}, {p.path: p for p in profiles}
-    for unknown, value, s in zip(fit.structure.unknowns, fit.theta, deviations(fit), strict=True):
+    for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
         if unknown.amplitude and cause.effect != PARAMETER:
             s = np.hypot(s, cause.law.rough * (value - unknown.nominal))
@@ -234,7 +238,7 @@ def findings(search: Search, profiles: tuple[Profile, ...] = ()) -> tuple[Findin
         number = cause.path.rpartition(".")[2]
         parameters = {
             number if cause.effect == PARAMETER else unknown.name: estimates[unknown.path]
-            for unknown in fit.structure.unknowns
+            for unknown in fit.structure.free_parameters
             if unknown.cause == k
         }
         for p in () if cause.effect == PARAMETER else cause.law.params:

@@ -32,13 +32,13 @@ class Weighing:
 
     def __init__(self, fitter: Fitter, trial: Callable[..., Trial]) -> None:
         self.fitter, self.trial = fitter, trial
-        self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.to_fit)
-        self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held)
+        self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.fit_records)
+        self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)
 
     def judged(self, fit: Fit, cause: Hypothesis | None) -> Trial:
         """A fit with what the held-out records and the price of its numbers say."""
-        structure, held = fit.structure, self.fitter.held_out(fit)
-        price = sum(u.cause is not None for u in structure.unknowns) * np.log(max(self.n_fit, 2))
+        structure, held = fit.structure, self.fitter.held_out_deviance(fit)
+        price = sum(u.cause is not None for u in structure.free_parameters) * np.log(max(self.n_fit, 2))
         price += 2 * structure.rarity
         return Trial(fit, held, fit.objective + price + held, cause)
 
@@ -61,14 +61,14 @@ class Weighing:
         first = better[0]
         for t in better:
             first = t if self.ahead(t, first) > 0 else first
-        numbers = len(first.fit.structure.unknowns)
-        alike = [t for t in better if self.ahead(first, t) <= 0 and len(t.fit.structure.unknowns) <= numbers]
+        numbers = len(first.fit.structure.free_parameters)
+        alike = [t for t in better if self.ahead(first, t) <= 0 and len(t.fit.structure.free_parameters) <= numbers]
         return min(alike, key=lambda t: (t.fit.structure.rarity, t.total), default=first)
 
     @staticmethod
     def hides(fit: Fit) -> bool:
         """Whether the device's own numbers stand so far off that they may hide a cause, at a price."""
-        return fit.penalty > DEAR + 2 * len(fit.structure.unknowns)
+        return fit.penalty > DEAR + 2 * len(fit.structure.free_parameters)
 
     def need(self, current: Trial, screened: Screened) -> float:
         """The z^2 that a cause must show: of its own size in the readings, or of the price at which the device hides it."""
@@ -84,7 +84,7 @@ class Weighing:
         for k, cause in enumerate(structure.causes):
             if cause.effect != PARAMETER and cause not in accepted and not cause.law.holds(trial.fit.values(k)):
                 return False
-        for unknown, value in zip(structure.unknowns, trial.fit.theta, strict=True):
+        for unknown, value in zip(structure.free_parameters, trial.fit.theta, strict=True):
             if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
                 continue
             usual = structure.usual(unknown)
@@ -106,7 +106,7 @@ class Weighing:
         z^2 of 10 in both no more often than one of 17 in the first and of 2 in the other.
         """
         gained, confirmed = before.fit.objective - after.fit.objective, before.held - after.held
-        added = len(after.fit.structure.unknowns) - len(before.fit.structure.unknowns)
+        added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
         needed = 12.0 + added * np.log(max(self.n_fit, 2))
         if before.fit.penalty - after.fit.penalty > 0.5 * gained:  # the device hid it at a price: it shows nowhere else
             return gained > needed and confirmed > -4.0
@@ -126,9 +126,11 @@ class Weighing:
         records to fit and of those held out (geometric mean); more, where k may be nothing (the 95 % interval of its
         amplitude reaches off)."""
         fit = current.fit
-        own = [i for i, u in enumerate(fit.structure.unknowns) if u.cause == k and u.amplitude]
+        own = [i for i, u in enumerate(fit.structure.free_parameters) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-        vague = bool(own) and all(abs(fit.theta[i] - fit.structure.unknowns[i].nominal) < CI * sd[i] for i in own)
+        vague = bool(own) and all(
+            abs(fit.theta[i] - fit.structure.free_parameters[i].nominal) < CI * sd[i] for i in own
+        )
         lost = max(bare.held - current.held, 0.0) * max(bare.fit.objective - current.fit.objective, 0.0)
         return self._may_be_form(lost, bare, VAGUE if vague else 1.0)  # beside k another may take a cause's place
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.simulator import Response
+from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
 from ctrlgen.diagnosis.selection.candidate_terms import Column, Laws
@@ -56,28 +56,28 @@ class Slopes:
         seen: Callable[[Place, int], Seen],
     ) -> None:
         self.fitter, self.record = fitter, record
-        probed, probes = with_probes(fit.structure.described, nominal_links(fit.structure.device))
-        known = [u.path for u in fit.structure.unknowns]
+        probed, probes = with_probes(fit.structure.device_with_causes, nominal_links(fit.structure.device))
+        known = [u.path for u in fit.structure.free_parameters]
         numbers = [h for h in hypotheses if h.effect == PARAMETER]
         number_paths = [h.path for h in numbers if h.path not in known]
         free = [*known, *number_paths, *probes.values()]
         key = ("screen", fit.structure.causes, tuple(free), record.sample_time, record.linear)
         if key not in fitter.cache:
-            fitter.cache[key] = Response(probed, free, fitter.recording.channels, record.sample_time, record.linear)
-        self.response: Response = fitter.cache[key]
-        self.p = self.response.model.p_nominal.copy()
+            fitter.cache[key] = Simulator(probed, free, fitter.recording.channels, record.sample_time, record.linear)
+        self.simulator: Simulator = fitter.cache[key]
+        self.p = self.simulator.model.p_nominal.copy()
         self.p[: len(known)] = fit.theta
         self.p[len(known) + len(number_paths) :] = 0.0
         entered = {where: free.index(path) for where, path in probes.items()}
         others = [h for h in hypotheses if h.effect != PARAMETER]
-        self.laws = Laws(self.response, fit.structure, others, entered, seen)
+        self.laws = Laws(self.simulator, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]
         self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
         self.columns = list(self.laws.columns)
         for k, (h, i) in enumerate(zip(numbers, places, strict=True)):
             term, size = len(self.laws.terms) + k, float(self.sizes[k])
             self.columns.append(Column(h, {"value": self.p[i]}, (i,), (term,), size, 0, (-500.0, 500.0)))
-        self.linear = self.response.linearised(self.p, range(len(free)))
+        self.linear = self.simulator.linearise(self.p, range(len(free)))
         self.spread = Spread(self.linear.patterns, self.columns)
 
     def sums(self, white: np.ndarray, U: np.ndarray, start: np.ndarray | None) -> Sums:
@@ -93,7 +93,7 @@ class Slopes:
                 if len(noise.ar[i]):
                     Y = np.vstack([tails[i], Y])
                     tails[i] = Y[len(Y) - len(tails[i]) :]
-                S = noise.filtered(Y, i)
+                S = noise.whiten_channel(Y, i)
                 S[~usable[a:b, i]] = 0.0
                 if not np.isfinite(S.sum()):
                     S = np.nan_to_num(S)
@@ -112,9 +112,9 @@ class Slopes:
         Every block is evaluated with the sample after it, whose terms act together with its last ones; those of a held drive
         act together with what they become before it changes.
         """
-        r, record, n = self.response, self.record, len(self.record.time)
+        r, record, n = self.simulator, self.record, len(self.record.time)
         series = np.isfinite(r.sample_time)
-        after, _ = r.motion(record, self.p, start)
+        after, _ = r.simulate_states(record, self.p, start)
         before = np.vstack([r._start(record, self.p, start), after[:-1]])
         inputs = (before, *r._inputs(record))
         seen = (before if series else after, record.drive, inputs[3], after)
@@ -133,5 +133,5 @@ class Slopes:
             found[:, lost] = 0.0  # memories that have left the numbers say nothing
             f, following = found[:k], found[1 : k + 1].copy() if series else found[:k]
             following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])
-            linear = self.linear.along(*(x[here[:size]] for x in inputs))
+            linear = self.linear.evaluate_along(*(x[here[:size]] for x in inputs))
             yield a, a + k, self.spread.readings([block[:k] for block in linear], f, following)

@@ -70,7 +70,9 @@ class Screen:
         columns: list[Column] = []
         U, back = _directions(fit.J)
         first, seen = 0, self._seen(fit)
-        for record, start in zip(self.fitter.to_fit, fit.starts or [None] * len(self.fitter.to_fit), strict=True):
+        for record, start in zip(
+            self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
+        ):
             slopes = Slopes(self.fitter, fit, record, open_, seen)
             columns = slopes.columns
             n = record.valid.size
@@ -101,7 +103,7 @@ class Screen:
 
     def _moments(self) -> tuple[tuple[float, ...], float]:
         """The middles of equal parts of the time that the records to fit take, and the length of a part, on their clock."""
-        series, records = self.fitter.recording.kind == "series", self.fitter.to_fit
+        series, records = self.fitter.recording.kind == "series", self.fitter.fit_records
         ends = [(r.time[0], r.time[-1]) if series else (0.0, float(len(r.time))) for r in records] or [(0.0, 1.0)]
         begin, end = min(a for a, _ in ends), max(b for _, b in ends)
         part = (end - begin) / PARTS
@@ -109,7 +111,7 @@ class Screen:
 
     def _lines(self, fit: Fit) -> tuple[float, ...]:
         """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
-        records = self.fitter.to_fit
+        records = self.fitter.fit_records
         if self.fitter.recording.kind == "poses" or not records:
             return ()
         k = int(np.argmax([r.valid.size for r in records]))
@@ -124,11 +126,11 @@ class Screen:
     def _along_path(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
         """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does, and the
         places at which it jumps most."""
-        records = self.fitter.to_fit
+        records = self.fitter.fit_records
         if self.fitter.recording.kind == "poses" or not records:
             return {}
         record = max(records, key=lambda r: r.valid.size)
-        foreseen, behind = (self.fitter.predicted(each, record) for each in (fit, _read_truly(fit)))
+        foreseen, behind = (self.fitter.predict(each, record) for each in (fit, _read_truly(fit)))
         left = record.observed - foreseen
         names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
@@ -197,7 +199,7 @@ class Screen:
 def _read_truly(fit: Fit) -> Fit:
     """The fit with every cause at a sensor off: fringes count what is there, not what they have made of it."""
     theta = fit.theta.copy()
-    for k, u in enumerate(fit.structure.unknowns):
+    for k, u in enumerate(fit.structure.free_parameters):
         cause = None if u.cause is None else fit.structure.causes[u.cause]
         if u.amplitude and cause.effect != PARAMETER and cause.law.place is Place.SENSOR:
             theta[k] = u.nominal

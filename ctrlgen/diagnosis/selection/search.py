@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.noise_update import learn_more, learn_size
+from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise_size
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import Round, Search, Trial, cooled, freed, warm
@@ -54,7 +54,7 @@ class Searcher:
         fitted before and begins no better than that ended."""
         key = frozenset(structure.causes)
         known, done = self.known.get(key, (None, 0))
-        if known is not None and done >= steps and known.fit.objective <= self.fitter.begun(structure):
+        if known is not None and done >= steps and known.fit.objective <= self.fitter.initial_objective(structure):
             return replace(known, cause=cause)
         fit = self.fitter.fit(structure, steps=steps, nested=nested)
         if known is not None and known.fit.objective <= fit.objective:
@@ -66,14 +66,14 @@ class Searcher:
 
     def run(self, structure: Structure) -> Search:
         """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
-        described = self.fitter.described(structure.device)
+        described = self.fitter.fit_described(structure.device)
         current, rounds = self._measured(self.trial(cooled(described), steps=40)), []
         self.mismatch = current.fit.objective - self.weigh.n_fit
         for _ in range(LEARNINGS):
             current = self._rounds(current, rounds)
             before = self.fitter.noise
             if self.fitter.recording.kind == "series":
-                self.fitter.noise = learn_more(self.fitter, current.fit)
+                self.fitter.noise = update_noise(self.fitter, current.fit)
             if self.fitter.noise is before:
                 break
             self.known.clear()
@@ -137,8 +137,8 @@ class Searcher:
             size = cause.law.amplitude().name if starts else ""
             starts = [*starts, *({**start, size: structure.starts[k][size]} for start in starts)]
             if starts:
-                starts = [structure.begun(k, start) for start in starts]
-                again = self.fitter.fit(min(starts, key=self.fitter.begun), steps=TRIAL_STEPS)
+                starts = [structure.restarted(k, start) for start in starts]
+                again = self.fitter.fit(min(starts, key=self.fitter.initial_objective), steps=TRIAL_STEPS)
                 if again.objective < trial.fit.objective:
                     trial = self._polished(self.weigh.judged(again, trial.cause))
         return trial
@@ -160,7 +160,7 @@ class Searcher:
             return trial
         for _ in range(LEARNINGS):  # the numbers move as the noise that holds them shrinks
             before = self.fitter.noise.sd
-            self.fitter.noise = learn_size(self.fitter, trial.fit)
+            self.fitter.noise = update_noise_size(self.fitter, trial.fit)
             self.known.clear()
             self.screens.clear()
             trial = self.trial(cooled(trial.fit), trial.cause, steps=40)
@@ -191,7 +191,7 @@ class Searcher:
     def _as_stated(self, current: Trial) -> tuple[Trial, ...]:
         """What is suspected of the device with its own numbers as stated: a fit that bends them so far sees what they hide
         no more."""
-        stated = self.fitter.fit(replace(cooled(current.fit), own={}), steps=0)
+        stated = self.fitter.fit(replace(cooled(current.fit), nominal_starts={}), steps=0)
         return self._try(stated, self._conspicuous(current, self.screen.run(stated)))
 
     def _attempt(self, structure: Structure, cause: Hypothesis, nested: Fit | None = None) -> list[Trial]:
@@ -233,7 +233,7 @@ class Searcher:
         causes = len(current.fit.structure.causes)
         for k in range(before if causes == before + 1 else causes):
             for rival in self._replacements(current, k):
-                plainer = len(rival.fit.structure.unknowns) < len(current.fit.structure.unknowns)
+                plainer = len(rival.fit.structure.free_parameters) < len(current.fit.structure.free_parameters)
                 ahead = current.total - rival.total if plainer else self.weigh.ahead(rival, current)
                 if ahead > RIVAL and self.weigh.meant(rival, current.fit.structure.causes):
                     current = rival
@@ -268,7 +268,7 @@ class Searcher:
             return structure
         common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
         kin = (others.with_cause(suspect.hypothesis, s | common) for s in (suspect.start, *suspect.others))
-        return min((structure, *kin), key=self.fitter.begun)
+        return min((structure, *kin), key=self.fitter.initial_objective)
 
     def _screened(self, trial: Trial) -> Screened:
         key = frozenset(trial.fit.structure.causes)
@@ -287,7 +287,7 @@ class Searcher:
 
     def _rivals(self, current: Trial, k: int) -> tuple[Trial, ...]:
         """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude."""
-        there, special = current.fit.structure.causes, current.fit.special(k)
+        there, special = current.fit.structure.causes, current.fit.nested_case(k)
         alike = [t for t in self._replacements(current, k) if not _same(t.cause, there[k])]
         alike = [t for t in alike if t.total < current.total + RIVAL or (special and t.cause.effect == special)]
         return tuple(t for t in alike if self.weigh.meant(t, there))
