@@ -306,7 +306,7 @@ def test_a_device_far_from_the_readings_is_fitted_from_several_starts(monkeypatc
     best = fitter.fit(Structure(AXIS))
     stated = sum(u.sd is not None for u in best.structure.free_parameters)
     poor = replace(best, chi2=1e5 * best.chi2 if far else 2 * best.chi2)
-    monkeypatch.setattr(fitter, "fit", lambda s: begun.append(s.own) or (best if len(begun) == 4 else poor))
+    monkeypatch.setattr(fitter, "fit", lambda s: begun.append(s.nominal_starts) or (best if len(begun) == 4 else poor))
     found = fitter.fit_described(AXIS)
     assert len(begun) == (1 + 2 * stated if far else 1) and stated >= 2
     assert found is (best if far else poor) and begun[0] == {} and all(len(own) == 1 for own in begun[1:])

@@ -34,7 +34,7 @@ def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
             f"{channels[i]}: from what the fit leaves at the frequencies at which the "
             f"readings move least, autoregressive of order {order}; record some rest to know it"
         )
-    return replace(noise, sd=sd, ar=tuple(ar), count=count, said=tuple(said))
+    return replace(noise, sd=sd, ar=tuple(ar), count=count, notes=tuple(said))
 
 
 def _quiet(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:

@@ -106,7 +106,7 @@ class Diagnosis:
             u.path: float(v) for u, v in zip(fit.structure.free_parameters, fit.theta, strict=True) if u.cause is None
         }
         starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
-        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).described, own)
+        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).device_with_causes, own)
         beside = [f for f in self.findings if f.cause not in fit.structure.causes]
         read = [
             f.cause.law(
