@@ -1,6 +1,7 @@
 """One sample of a model, symbolic: from x, z under the drive to x, z at the next sample.
 
-A stage in balance: x by its exact lag, z by Newton's method on 0 = g(x, z, u). A stage with inertia: exponential
+A stage in balance: x by its exact lag, under a drive held (zero-order hold) or linear between samples (first-order hold), z by
+Newton's method on 0 = g(x, z, u). A stage with inertia: exponential
 steps, exact for the nominal linear part.
 """
 
@@ -41,10 +42,25 @@ def next_sample(model: Model, sample_time: float, linear: bool = False, newton_s
     if not np.isfinite(sample_time):
         x, z = _settle(model, u_next, newton_steps)
         return Sample(u_next, x, z)
-    x = model.step(sample_time)
-    if linear:
-        x = ca.substitute(x, model.u, (model.u + u_next) / 2)
+    x = _ramped(model, sample_time, u_next, newton_steps) if linear else model.step(sample_time)
     return Sample(u_next, x, balanced(model, x, u_next, newton_steps))
+
+
+def _ramped(model: Model, sample_time: float, u_next: ca.SX, newton_steps: int) -> ca.SX:
+    """x after a sample in which the drive goes linearly to `u_next`, and the displacement that balances it goes along."""
+    A, rates = ca.jacobian(model.rates, model.x), [model.rates]
+    carried = ca.depends_on(model.rates, model.z)
+    bending = ca.vertcat(model.rates, model.balance) if carried else model.rates
+    bent = any(ca.which_depends(bending, ca.vertcat(model.u, model.z), 2, True))
+    if carried:
+        slope = ca.solve(ca.jacobian(model.balance, model.z), ca.jacobian(model.balance, model.x))
+        A -= ca.mtimes(ca.jacobian(model.rates, model.z), slope)
+    for share in (0.5, 1.0) if bent else (1.0,):
+        u = model.u + share * (u_next - model.u)
+        z = balanced(model, model.x, u, newton_steps) if carried else model.z
+        here = ca.vertcat(model.z, model.u), ca.vertcat(z, u)
+        rates.append(ca.substitute(model.rates, *here))
+    return model.ramp(sample_time, A, rates)
 
 
 def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = 4) -> ca.SX:

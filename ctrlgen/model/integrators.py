@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
-import scipy
 
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.phi_functions import phis
 
 SUBSTEP = 0.8  # step times the fastest nominal eigenvalue; what is not linear is then right to 1e-3 of itself
 FASTEST = 5.0  # eigenvalue times sample time beyond which a lag is over within a sample, and exact
@@ -41,7 +41,7 @@ class Steps:
         self.A = _sparse(A)
         rest = self._rest(model)
         self.acting = [i for i in range(len(A)) if not rest[i].is_zero()]
-        self.phis = _phis(A * self.h)
+        self.phis = phis(A * self.h, 3)
         self.E = _sparse(self.phis[0])
 
     def rest(self, model: Model) -> ca.SX:
@@ -73,7 +73,7 @@ class Exponential(Steps):
     def __init__(self, model: Model, sample_time: float) -> None:
         super().__init__(model, sample_time, home_slope(model), SUBSTEP)
         h, whole = self.h, self.phis
-        half, phi, *_ = _phis(self.A.full() * h / 2)
+        half, phi, *_ = phis(self.A.full() * h / 2, 3)
         Q = h / 2 * phi
         self.half, self.Q, self.R = _sparse(half), self._acting(Q), self._acting(half @ Q - Q)
         middle = h * (2 * whole[2] - 4 * whole[3])
@@ -113,7 +113,7 @@ class Sticking(Steps):
         A[self.bristles, :] = A[:, self.bristles] = 0.0  # they bend and slip far faster than anything else
         super().__init__(model, sample_time, A, REVERSING)
         h, c, (_, phi_1, phi_2, _) = self.h, self.NODE, self.phis
-        E_c, phi_c, *_ = _phis(self.A.full() * c * h)
+        E_c, phi_c, *_ = phis(self.A.full() * c * h, 3)
         self.E_c, self.P = _sparse(E_c), self._acting(c * h * phi_c)
         self.W = self._acting(h * (phi_1 - phi_2) / (1 - c))
         self.V = self._acting(h * (phi_2 - c * phi_1) / (1 - c))
@@ -210,13 +210,3 @@ def substeps(A: np.ndarray, sample_time: float, longest: float) -> int:
     """Steps a sample, each at most `longest` of the time in which the fastest nominal motion changes by itself."""
     fastest = np.abs(np.linalg.eigvals(A)).max(initial=0.0)
     return int(np.clip(np.ceil(sample_time * min(fastest, FASTEST / sample_time) / longest), 1, MOST_SUBSTEPS))
-
-
-def _phis(M: np.ndarray) -> list[np.ndarray]:
-    """e^M, phi_1, phi_2, phi_3 with phi_k(M) = sum_j M^j/(j + k)!: the first row of blocks of one larger exponential."""
-    n = len(M)
-    large = np.zeros((4 * n, 4 * n))
-    large[:n, :n] = M
-    for k in range(3):
-        large[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
-    return np.split(scipy.linalg.expm(large)[:n], 4, axis=1)

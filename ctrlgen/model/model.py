@@ -23,8 +23,10 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
 from ctrlgen.devices import Device, Limit, Signal
 from ctrlgen.model.assembly import Chain
+from ctrlgen.numerics.phi_functions import driven, driven_lags, held_gain
 
 LONGEST_STEP = 1024.0  # times the fastest of coupled states' rates
+LONGEST_RAMP = 2.0**20  # the same where the displacement couples the lags: 20 doublings leave 1e-10 of rounding
 
 
 @dataclass(frozen=True)
@@ -159,24 +161,46 @@ class Model:
             after[i] = value
         return after
 
+    def ramp(self, sample_time: float, A: ca.SX, rates: Sequence[ca.SX]) -> ca.SX:
+        """x after one `sample_time` h [s] in which the drive goes linearly from u to the next sample's, A = df/dx.
+
+        `rates` f of the present x under the drive at the beginning, the middle and the end of the sample, or, where f is
+        linear in the drive, at the beginning and the end: x + h (phi_1(hA) f_0 + phi_2(hA) f' + phi_3(hA) f''), f' and f''
+        those of the parabola through them. Exact for rates linear in x and quadratic in u. Raises InputError as `step` does.
+        """
+        begin, end = rates[0], rates[-1]
+        values = [begin, end - begin]
+        if len(rates) == 3:
+            values = [begin, 4 * rates[1] - 3 * begin - end, 4 * (begin - 2 * rates[1] + end)]
+        if _alone(A):
+            after = self.x + driven_lags(ca.diag(A), values, sample_time)
+        else:
+            after = self.x + driven(A, values, sample_time, self._doublings(A, sample_time, LONGEST_RAMP))
+        for i, value in self.stepped.items():
+            after[i] = value
+        return after
+
     def _lag(self, sample_time: float, rates: ca.SX) -> ca.SX:
         A = ca.jacobian(rates, self.x)
         h = sample_time
-        if (A.sparsity() + ca.Sparsity.diag(A.size1())).is_diag():
+        if _alone(A):
             rate = ca.diag(A)
-            gain = ca.vertcat(*(_phi_1(rate[i], h) for i in range(self.x.numel())))
+            gain = ca.vertcat(*(held_gain(rate[i], h) for i in range(self.x.numel())))
             return self.x + gain * rates
+        return self.x + driven(A, [rates], h, self._doublings(A, h))
+
+    def _doublings(self, A: ca.SX, h: float, longest: float = LONGEST_STEP) -> int:
+        """How often the sample time must be halved before |h A| is at most 1."""
         norm = float(
             ca.norm_inf(
                 ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal)
                 * (self.x_scale[None, :] / self.x_scale[:, None])
             )
         )
-        if h * norm > LONGEST_STEP:
-            longest = f"use {LONGEST_STEP / norm:.2g} s or less"
-            what = f"{h:g} s is too long for the fastest coupled state; {longest}"
+        if h * norm > longest:
+            what = f"{h:g} s is too long for the fastest coupled state; use {longest / norm:.2g} s or less"
             raise InputError(self.name, [Fault("sample time", what)])
-        return self.x + _coupled_step(A, rates, h, max(0, ceil(log2(h * norm))) if norm else 0)
+        return max(0, ceil(log2(h * norm))) if norm else 0
 
     @cached_property
     def x_bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -211,28 +235,9 @@ class Model:
         ]  # fmt: skip
 
 
-def _coupled_step(A: ca.SX, rates: ca.SX, h: float, doublings: int) -> ca.SX:
-    """h phi_1(h A) rates: the series for h/2^doublings, then phi_1(2 M) = (1 + e^M) phi_1(M)/2."""
-    if not doublings:
-        term = total = h * rates
-        for order in range(2, 13):
-            term = h / order * ca.mtimes(A, term)
-            total += term
-        return total
-    M, one = h / 2**doublings * A, ca.SX.eye(A.size1())
-    term = phi = one
-    for order in range(2, 13):
-        term = ca.mtimes(M, term) / order
-        phi += term
-    whole = one + ca.mtimes(M, phi)
-    for _ in range(doublings):
-        phi, whole = (phi + ca.mtimes(whole, phi)) / 2, ca.mtimes(whole, whole)
-    return h * ca.mtimes(phi, rates)
-
-
-def _phi_1(rate: ca.SX, h: float) -> ca.SX:
-    """(e^(rate h) - 1)/rate, or h where the rate is identically zero."""
-    return h if rate.is_zero() else (ca.exp(rate * h) - 1) / rate
+def _alone(A: ca.SX) -> bool:
+    """Whether no state acts on another."""
+    return (A.sparsity() + ca.Sparsity.diag(A.size1())).is_diag()
 
 
 def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:

@@ -12,7 +12,6 @@ from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
@@ -20,6 +19,7 @@ from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, Seen, nominal_links
 from ctrlgen.effects import Effect, Place
 from ctrlgen.model.assembly import channels
+from ctrlgen.numerics.phi_functions import phis
 
 Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
 REACHED = ("channel", "travel", "travel/s")
@@ -194,7 +194,7 @@ class Laws:
         memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)
         A = ca.jacobian(rates, memory)
         if not ca.symvar(A):
-            step = h * ca.DM(_phi_1(h * ca.DM(A).full())) @ rates
+            step = h * ca.DM(phis(h * ca.DM(A).full(), 1)[1]) @ rates
         elif A.sparsity().is_diag():
             own = h * ca.diag(A)
             step = h * rates * ca.if_else(ca.fabs(own) > SMALL, ca.expm1(own) / own, 1 + own / 2)
@@ -206,11 +206,3 @@ class Laws:
                 term.states, term.stepped, term.clocks, ca.vertsplit(step), strict=True
             )
         ]
-
-
-def _phi_1(M: np.ndarray) -> np.ndarray:
-    """M^-1 (e^M - 1), also where M is singular: the upper right block of exp [[M, 1], [0, 0]]."""
-    n = len(M)
-    if n == 1:
-        return np.expm1(M) / M if M[0, 0] else np.ones((1, 1))
-    return expm(np.block([[M, np.eye(n)], [np.zeros((n, 2 * n))]]))[:n, n:]
