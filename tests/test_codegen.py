@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import importlib.util
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import casadi as ca
@@ -16,7 +18,9 @@ from conftest import ROOT, SCENARIOS
 from ctrlgen import Controller, CtrlgenError, build_model, load_scenario
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
-from ctrlgen.firmware.folder import generate
+from ctrlgen.firmware.fmu import write_fmus
+from ctrlgen.firmware.folder import generate, write_harness
+from ctrlgen.firmware.plant import plant_of, write_plant
 from ctrlgen.firmware.toolchains import FLAGS
 
 GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"
@@ -96,7 +100,7 @@ def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compi
     others.append(folder.runner(real))
     build(compiler, [online, *others], tmp_path / "good", f"-I{folder.path}")
     good = subprocess.run([tmp_path / "good"], capture_output=True, text=True)
-    assert good.returncode == 0 and "82 of 82 vectors agree" in good.stdout
+    assert good.returncode == 0 and "103 of 103 vectors agree" in good.stdout
     broken = tmp_path / f"{folder.online[real]}.c"
     text = online.read_text()
     factor = real.literal(1.00001 if real is Real.DOUBLE else 1.0003)  # float: above four roundings of the temperature
@@ -105,6 +109,28 @@ def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compi
     broken.write_text(wrong)
     build(compiler, [broken, *others], tmp_path / "bad", f"-I{folder.path}")
     assert subprocess.run([tmp_path / "bad"], capture_output=True).returncode == 1
+
+
+@pytest.mark.parametrize("option", ["-ffast-math", "-Ofast", "-ffinite-math-only"])
+def test_every_generated_source_refuses_arithmetic_without_nan(folder, circle, compiler, tmp_path, option):
+    """A header may be included from code that is compiled so: it holds declarations only."""
+    write_harness(folder, circle.scenario, circle.model, Real.FLOAT, tmp_path / "harness.c")
+    write_plant(circle.scenario, plant_of(circle.scenario), Real.FLOAT, tmp_path)
+    for fmi in (2, 3):
+        write_fmus(circle.scenario, tmp_path / f"fmi{fmi}", fmi)
+        for unit in list((tmp_path / f"fmi{fmi}").glob("*.fmu")):
+            shutil.unpack_archive(unit, tmp_path / f"fmi{fmi}" / unit.stem, "zip")
+    sources = [*folder.path.rglob("*.c"), *tmp_path.rglob("*.c")]
+    compilers = [[compiler]]
+    if importlib.util.find_spec("ziglang") and option != "-Ofast":  # which zig takes for -O3
+        compilers.append([sys.executable, "-m", "ziglang", "cc"])  # clang
+    for source in sources:
+        for words in compilers:
+            command = [*words, "-std=c99", f"-I{folder.path}", "-c", str(source), "-o", str(tmp_path / "o.o")]
+            assert subprocess.run(command, capture_output=True).returncode == 0, source.name
+            refused = subprocess.run([*command, option], capture_output=True, text=True)
+            assert refused.returncode != 0 and "they remove the checks for NaN" in refused.stderr, source.name
+    assert len(sources) == 8 + 2 + 1 + 1 + 8
 
 
 def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):

@@ -187,10 +187,19 @@ def test_the_same_input_gives_the_same_bytes_of_everything(packages, circle, tmp
     [
         ("online", r"5\.5e-05f", "5.6e-05f"),  # the stroke, wherever it stands
         ("online", r"int status = 0;", "int status = 64;"),
+        (  # NaN is neither above nor below a limit
+            "online",
+            r"!\(\(target\[i\] <= TARGET_LIMIT\[i\]\) && \(target\[i\] >= -TARGET_LIMIT\[i\]\)\)",
+            "(target[i] > TARGET_LIMIT[i]) || (target[i] < -TARGET_LIMIT[i])",
+        ),
+        ("online", r"drive\[i\] = U_SAFE\[i\];", "drive[i] = U_SAFE[i] + 1.0f;"),
+        ("player", r"!\(\(time >= 0\.0f\) && \(time < duration\)\)", "(time < 0.0f) || (time >= duration)"),
         ("player", r"(CONTROL\[\d+\]\[6\] = \{\n        \{ 0\.0\d)(\d)", r"\g<1>0"),
     ],
 )
-def test_the_selftest_finds_a_wrong_constant(packages, compiler, tmp_path, piece, pattern, replacement):
+def test_the_selftest_finds_a_wrong_constant_and_a_missing_check(
+    packages, compiler, tmp_path, piece, pattern, replacement
+):
     c = packages["circle20"]
     folder = tmp_path / "c"
     shutil.copytree(c.path, folder)

@@ -127,7 +127,7 @@ def _context(
         "target": c["rows"][0]["target"],
         "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
         "memory": _memory(c, [contexts[real].get("chosen") for real in Real]),
-        "vectors": len(c["rows"]) + len(c["played"]),
+        "vectors": len(c["rows"]) + c["unusable"] + len(c["played"]) + c["played_unusable"],
         "tolerance": {real.suffix: contexts[real]["tolerance"] for real in Real},
         "figures": list(figures),
         "inputs": list(zip(inputs, scenario.digest.values(), strict=True)),

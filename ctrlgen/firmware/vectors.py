@@ -14,6 +14,7 @@ from ctrlgen.model.feedforward import Controller, ControllerStatus
 
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits
 PLAYED = 17  # samples of the player
+UNUSABLE = 3  # NaN, infinity, minus infinity: each in every channel of the target, and as the time of the player
 
 
 def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
@@ -45,18 +46,19 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
             off = kernel(*before, *(value * (1 + rounding) for value in reached)) - kernel(*before, *reached)
             tolerance = max(tolerance, float(np.max(np.abs(off.full()))))
     tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
-    return {"rows": rows, "tolerance": tolerance}
+    return {"rows": rows, "tolerance": tolerance, "unusable": UNUSABLE * command.shape[1]}
 
 
 def played_vectors(compression: Compression | None, samples: int) -> dict[str, Any]:
     """Samples of what the player answers, the first and the last among them; 16 roundings of the largest, since a target may
     fuse multiplications with additions."""
     if compression is None:
-        return {"played": [], "played_tolerance": 0.0}
+        return {"played": [], "played_tolerance": 0.0, "played_unusable": 0}
     indices = np.unique(np.linspace(0, samples - 1, PLAYED).round().astype(int))
     drives = compression.drives(indices)
     rounding = 16 * compression.real.epsilon * float(np.max(np.abs(drives)))
     return {
         "played": [{"index": int(k), "drive": drive} for k, drive in zip(indices, drives, strict=True)],
+        "played_unusable": UNUSABLE,
         "played_tolerance": max(rounding, float(np.finfo(np.float32).tiny)),
     }
