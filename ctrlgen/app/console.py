@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -55,7 +56,7 @@ def print_solution(outcome: pipeline.Outcome) -> None:
         )
         row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
         table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
-    out.print(table)
+    show_table(table)
     if outcome.expected:
         good = sum(e.passed for e in outcome.expected)
         out.print(f"expected: {good} of {len(outcome.expected)} values in range")
@@ -90,7 +91,7 @@ def print_comparison(outcome: pipeline.Outcome) -> None:
             f"{row['limit']:.2g}{unit}",
             verdict,
         )
-    out.print(table)
+    show_table(table)
     good = sum(row.passed for row in comparison.rows)
     out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
 
@@ -115,12 +116,12 @@ def print_build(build: Build) -> None:
             sizes = (f"{size} B" for size in (run.stack, run.code, run.tables))
             verdict = "[green]equal bits[/green]" if run.passed else "[red]FAILED[/red]"
             table.add_row(f"{run.core} {run.real.value}, {run.compiler.split()[0]}", *counts, *sizes, verdict)
-        out.print(table)
+        show_table(table)
     colours = {"passed": "green", "failed": "red", "not run": "yellow"}
     table = table_of(("check", "left"), ("", "left"))
     for check in build.checks:
         table.add_row(escape(check.tool), f"[{colours[check.state]}]{check.state}[/{colours[check.state]}]")
-    out.print(table)
+    show_table(table)
     for what, remedy in build.not_run:
         out.print(f"not run: {what}: {remedy}", style="yellow", markup=False, soft_wrap=True)
     for line in build.failures:
@@ -128,11 +129,23 @@ def print_build(build: Build) -> None:
 
 
 def table_of(*columns: tuple[str, Literal["left", "right"]]) -> Table:
-    """A plain table with a last column for remarks."""
+    """A plain table with a last column for remarks; words wrap at spaces, numbers (on the right) never."""
     table = Table(box=None, pad_edge=False, header_style="dim")
     for name, justify in (*columns, ("", "left")):
-        table.add_column(name, justify=justify, no_wrap=True)
+        table.add_column(name, justify=justify, no_wrap=justify == "right")
     return table
+
+
+def show_table(table: Table) -> None:
+    """Prints `table` with every character of it; beyond the terminal's width where its numbers and longest words need that."""
+    unlimited = out.options.update_width(1 << 20)
+    for column in table.columns:
+        sizes = [Measurement.get(out, unlimited, cell) for cell in (column.header, *column.cells)]
+        column.min_width = max(size.maximum if column.no_wrap else size.minimum for size in sizes)
+    needed = sum((column.min_width or 0) + 1 for column in table.columns) - 1  # a space between columns
+    if needed > out.width:
+        table.width = needed
+    out.print(table, crop=False)
 
 
 def print_recording(recording: Recording) -> None:
@@ -142,7 +155,7 @@ def print_recording(recording: Recording) -> None:
     for record in recording.records:
         marked = int((~record.valid).sum())
         table.add_row(escape(record.name), record.role, str(len(record.time)), f"{marked} of {record.valid.size}")
-    out.print(table)
+    show_table(table)
     for note in recording.notes:
         out.print(f"note: {note}", markup=False, soft_wrap=True)
 
@@ -160,14 +173,14 @@ def print_diagnosis(found: Diagnosis) -> None:
             for k, (name, text) in enumerate(rows):
                 first = (finding.effect, finding.location) if k == 0 else ("", "")
                 table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
-        out.print(table)
+        show_table(table)
     table = table_of(
         ("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"), ("unsure", "right")
     )
     for channel, e in found.held_out.items():
         values = (e.rms_before, e.rms_after, e.noise_floor, e.uncertainty)
         table.add_row(channel, *("not known" if v is None else f"{number(v)} {e.unit}" for v in values))
-    out.print(table)
+    show_table(table)
     for note in gathered(found.notes):
         out.print(f"note: {note}", markup=False, soft_wrap=True)
     for step in next_steps(found):
@@ -184,8 +197,6 @@ def print_reproduced(rows: Sequence[PrintedNumber]) -> None:
         ReproductionStatus.NOT_COMPUTABLE: "yellow",
     }
     table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
-    for words in (table.columns[1], table.columns[-1]):
-        words.no_wrap = False  # long words break; the numbers never make way for them
     for row in rows:
         ours = "" if row.ours is None else f"{row.ours:.6g}"
         status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
@@ -197,7 +208,7 @@ def print_reproduced(rows: Sequence[PrintedNumber]) -> None:
             status,
             escape(row.reason),
         )
-    out.print(table)
+    show_table(table)
 
 
 def print_bootstrap(found: Bootstrap) -> None:
@@ -208,7 +219,7 @@ def print_bootstrap(found: Bootstrap) -> None:
     table = table_of(("number", "left"), ("95 % of the replicates", "left"))
     for path, estimate in found.values.items():
         table.add_row(escape(path), interval(estimate))
-    out.print(table)
+    show_table(table)
     for name, share in found.vanished.items():
         out.print(f"{name} vanished in {share:.0%} of them", markup=False, soft_wrap=True)
     for reason in found.failed:
@@ -227,7 +238,7 @@ def print_batch(rows: Sequence[BatchRow]) -> None:
             continue
         known = ["not known" if v is None else f"{number(v)} {row.unit}" for v in (row.before, row.after, row.noise)]
         table.add_row(escape(row.name), row.verdict, escape(row.findings) or "-", *known)
-    out.print(table)
+    show_table(table)
     for row in rows:
         if row.error:
             out.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
@@ -299,7 +310,7 @@ def print_workspace(found: pipeline.WorkspaceSummary) -> None:
         table.add_row(
             escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
         )
-    out.print(table)
+    show_table(table)
     for what, ball in (("translations", found.translations), ("all channels", found.everything)):
         out.print(
             f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",

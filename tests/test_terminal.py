@@ -1,0 +1,41 @@
+"""Tables in a terminal and in a log: everything stands there, whatever the width."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from ctrlgen.app import console as terminal
+
+COLUMNS = (("what was found", "left"), ("place", "left"), ("value", "right"), ("bound", "right"))
+ROWS = (
+    ("parameter of the mechanism", "mechanism:platform_angles[0]", "-1.234567e-05 N*s/um", "22 degC", "or coupling at stage:2y"),
+    ("asymmetric_viscous, the friction of one direction", "stage:axis", "23.45 nm", "550 MPa", "<- tightest"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [20, 60, 80, 110, 300])
+def test_a_table_loses_no_text_and_breaks_no_number_at_any_width(monkeypatch, capsys, width):
+    monkeypatch.setattr(terminal.out, "_width", width)
+    table = terminal.table_of(*COLUMNS)
+    for row in ROWS:
+        table.add_row(*row)
+    terminal.show_table(table)
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    for row in ROWS:
+        assert row[2] in printed and row[3] in printed  # a number and its unit on one line
+        for word in " ".join(row).split():
+            assert word in printed, word
+    if width == 300:
+        assert len(printed.splitlines()) == 1 + len(ROWS)
+
+
+def test_a_table_in_a_log_wraps_at_its_width(capsys):
+    table = terminal.table_of(("what", "left"))
+    table.add_row("many words in a row " * 20)
+    terminal.show_table(table)
+    printed = capsys.readouterr().out
+    assert len(re.findall("words", printed)) == 20
+    assert max(map(len, printed.splitlines())) <= 110
