@@ -8,12 +8,12 @@ from typing import Any
 import jinja2
 
 from ctrlgen.core.files import write_text
+from ctrlgen.core.shipped_files import shipped
 
 
 def codegen_folder() -> Path:
-    """Templates and harness: `codegen/` of the repository, or its copy in an installed package."""
-    beside = Path(__file__).resolve().parents[2] / "codegen"
-    return beside if beside.is_dir() else Path(__file__).resolve().parents[1] / "_codegen"
+    """Templates and harness."""
+    return shipped("codegen")
 
 
 def render(template: str, context: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ from ctrlgen.core.files import write_text
 from ctrlgen.model.model import build_model
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import STYLE, draw_path, draw_signal, draw_stage_force, svg
-from ctrlgen.reproduce import hinge_errors, s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
+from ctrlgen.reproduce import s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
 from ctrlgen.reproduce.row import PrintedNumber
 from ctrlgen.reproduce.s0_data import SCENARIOS
 from ctrlgen.trajectory.scenario import load_scenario
@@ -47,6 +47,8 @@ def _s3_figures() -> dict[str, str]:
     """Figs. 3-5, the hinge equations against finite elements; none where scikit-fem is not installed."""
     if find_spec("skfem") is None:
         return {}
+    from ctrlgen.reproduce import hinge_errors
+
     data = hinge_errors.hinge_errors()
     return {
         f"{name}, {hinge_errors.LABELS[key]}": hinge_errors.draw_hinge_errors(data, key)

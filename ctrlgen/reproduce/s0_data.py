@@ -12,6 +12,7 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
+from ctrlgen.core.shipped_files import shipped
 from ctrlgen.core.units import parse
 from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import MesoHexapod
@@ -19,7 +20,7 @@ from ctrlgen.physics import meso_hexapod
 from ctrlgen.recordings.pose_errors import CHANNELS
 from ctrlgen.trajectory.paths import Frame, read_poses
 
-SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+SCENARIOS = shipped("scenarios")
 FRAME = Frame(CHANNELS, ("rad",) * 3 + ("um",) * 3)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import cast
 
 import numpy as np
 
+from ctrlgen.core.shipped_files import shipped
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mems_hexapod import MemsHexapod, matrices
 from ctrlgen.model.feedforward import Controller
@@ -15,7 +15,7 @@ from ctrlgen.physics import hexapod, xy_stage
 from ctrlgen.reproduce.row import PrintedNumber, half_unit
 from ctrlgen.trajectory.workspace import Workspace
 
-DEVICE = Path(__file__).resolve().parents[2] / "scenarios" / "devices" / "mems_hexapod.toml"
+DEVICE = shipped("scenarios") / "devices" / "mems_hexapod.toml"
 
 # Printed in N and um; (row, column) counted from 1.
 K_TB = {

@@ -18,6 +18,7 @@ AT_THE_THIN_END = (
     "0.15 %, as a coarser mesh gives, would account for the print, whose mesh is not known"
 )
 SAMPLES = "depends on the t/R at which the print was sampled, which it does not say; ours: 0.05 to 0.8 by 0.025"
+NEEDS_FEM = "needs finite elements: pip install 'ctrlgen[reference]'"
 UNPRINTED = "the empirical equations of S3 ref. [16] are printed in neither source"
 
 
@@ -28,7 +29,7 @@ def rows() -> list[PrintedNumber]:
 
         data, missing = hinge_errors(), ""
     except ImportError:
-        data, missing = None, "needs scikit-fem; install ctrlgen[reference]"
+        data, missing = None, NEEDS_FEM
     found = []
     for equation in table.EQUATIONS:
         if equation.errors is None:

@@ -9,20 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
-from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.shipped_files import shipped
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import load_device
 from ctrlgen.devices.rrr_stage import RrrStage, stage
 from ctrlgen.reproduce.row import half_unit
 from ctrlgen.reproduce.s3_tables import CASES, SIGN_LOST_4, TABLE_4, entries, unit
 
-DEVICES = Path(__file__).parents[2] / "scenarios" / "devices"
+DEVICES = shipped("scenarios") / "devices"
 LENGTHS = ("l1", "l2", "l3", "l4", "l5", "l6")
 STARTS = (1.0, 0.4, 2.5)  # factors on each freed length: a digit may be wrong
 STEPS = 60

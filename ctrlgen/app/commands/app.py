@@ -11,7 +11,8 @@ app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
     help="Describe a flexure nanopositioner once; solve its trajectories, generate its C and prove that the C is right, and "
     "say which physics a recording shows that the description leaves out.\n\n"
-    "Start with:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
+    "Start with:  [bold]ctrlgen example circle20 --to scenarios[/bold]\n\n"
+    "then:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
 )  # fmt: skip
 
 ScenarioPath = Annotated[

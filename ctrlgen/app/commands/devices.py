@@ -10,7 +10,7 @@ import typer
 
 from ctrlgen.app import pipeline
 from ctrlgen.app.commands.app import DevicePath, OutFolder, app
-from ctrlgen.app.console import out, print_recording, print_reproduced, print_workspace, progress
+from ctrlgen.app.console import err, out, print_recording, print_reproduced, print_workspace, progress
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show
@@ -136,6 +136,7 @@ def reproduce(
     """
     from ctrlgen.reproduce import all as everything  # scientific work of seconds; other commands need none of it
     from ctrlgen.reproduce.row import ReproductionStatus
+    from ctrlgen.reproduce.s3_hinges import NEEDS_FEM
 
     chosen = [name.upper() for name in source or everything.SOURCES]
     unknown = [name for name in chosen if name not in everything.SOURCES]
@@ -160,3 +161,5 @@ def reproduce(
     for name in chosen:
         numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in ReproductionStatus)
         out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)
+    if lacking := sum(row.reason == NEEDS_FEM for row in rows):
+        err.print(f"{lacking} rows of S3: {NEEDS_FEM}", style="yellow", markup=False, soft_wrap=True)
