@@ -46,8 +46,8 @@ def test_no_command_at_all_shows_the_help():
 def test_help_names_every_command_and_a_first_step():
     done = ctrlgen("--help")
     assert all(re.search(rf"\b{command}\b", done.stdout) for command in COMMANDS)
-    first, then = re.findall(r"ctrlgen (example|run) (.+)", done.stdout)[:2]
-    assert first == ("example", "circle20 --to scenarios") and then[1].startswith("scenarios/circle20 ")
+    first, then = re.findall(r"ctrlgen (example|run) (\S+ --\S+ \S+)", done.stdout)[:2]
+    assert first == ("example", "circle20 --to scenarios") and then == ("run", "scenarios/circle20 --out out/circle20")
 
 
 def test_a_misspelt_command_or_option_is_answered_with_the_right_one():

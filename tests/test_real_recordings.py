@@ -5,6 +5,11 @@ The data that may not be copied lie in ../shared/recordings; without them their 
 
 from __future__ import annotations
 
+import hashlib
+import pathlib
+import re
+import tomllib
+
 import numpy as np
 import pytest
 from conftest import ROOT
@@ -48,8 +53,62 @@ def test_absent_data_are_named(tmp_path):
     text = (SCENARIOS / "emps" / "recording.toml").read_text()
     (tmp_path / "recording.toml").write_text(text)
     model = build_model(ctrlgen.load_device(SCENARIOS / "emps" / "device.toml"))
-    with pytest.raises(InputError, match=r"DATA_EMPS.mat does not exist"):
+    with pytest.raises(InputError) as error:
         load_recordings([tmp_path / "recording.toml"], model)
+    for said in (
+        "DATA_EMPS.mat is not here",
+        "Janot",
+        "nonlinearbenchmark.org",
+        "SHA-256 6cf6814ae14618",
+        "Put it at /",
+    ):
+        assert said in str(error.value), said
+
+
+ELSEWHERE = [path for path in sorted(SCENARIOS.glob("*/*.toml")) if "[sha256]" in path.read_text()]
+
+
+@pytest.mark.parametrize("path", ELSEWHERE, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_a_readme_names_source_files_and_hashes_of_data_that_are_not_here(path):
+    readme, table = (path.parent / "README.md").read_text(), tomllib.loads(path.read_text())
+    assert table["source"].split(",")[0].split(".")[-1].strip() in readme
+    for name, digest in table["sha256"].items():
+        assert f"| `{name}` | `{digest}` |" in readme
+    assert {pathlib.Path(record["file"]).name for record in table["record"]} == set(table["sha256"])
+    for file in {record["file"] for record in table["record"]}:
+        if (found := path.parent / file).is_file():
+            assert hashlib.sha256(found.read_bytes()).hexdigest() == table["sha256"][found.name]
+
+
+def test_data_that_lie_outside_the_repository_are_named_with_their_hash():
+    outside = {p for p in SCENARIOS.glob("*/*.toml") if 'file = "../../../' in p.read_text()}
+    assert outside == set(ELSEWHERE) and len(outside) == 5
+
+
+def test_another_file_under_the_stated_name_is_refused(tmp_path):
+    """The rows and the units were chosen for the stated one."""
+    text = (SCENARIOS / "rotary_axis" / "run_a.toml").read_text()
+    (tmp_path / "run_a.toml").write_text(text.replace("../../../shared/recordings/rotary_axis/", ""))
+    rows = "".join(f"{0.01 * k:.2f},{k % 7},{k % 7}\n" for k in range(4535))
+    (tmp_path / "run_a.csv").write_text("time_s,commanded_deg,measured_deg\n" + rows)
+    model = build_model(ctrlgen.load_device(SCENARIOS / "rotary_axis" / "device.toml"))
+    with pytest.raises(InputError) as error:
+        load_recordings([tmp_path / "run_a.toml"], model)
+    own = hashlib.sha256((tmp_path / "run_a.csv").read_bytes()).hexdigest()
+    assert f"is another file, SHA-256 {own}. Wanted:" in str(error.value) and "SHA-256 dac2e786fef4" in str(error.value)
+    meant = (tmp_path / "run_a.toml").read_text()
+    (tmp_path / "run_a.toml").write_text(re.sub(r'(?<="run_a.csv" = ")\w+', own, meant))
+    assert load_recordings([tmp_path / "run_a.toml"], model).records
+
+
+def test_a_hash_of_no_file_of_the_recording_is_a_fault(tmp_path):
+    text = (SCENARIOS / "rotary_axis" / "run_a.toml").read_text()
+    (tmp_path / "run_a.toml").write_text(text + f'"run_d.csv" = "{"0" * 64}"\n')
+    model = build_model(ctrlgen.load_device(SCENARIOS / "rotary_axis" / "device.toml"))
+    with pytest.raises(
+        InputError, match=r"sha256\.'run_d\.csv': is no file of this recording; its files are run_a\.csv"
+    ):
+        load_recordings([tmp_path / "run_a.toml"], model)
 
 
 @pytest.mark.long

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -257,13 +258,30 @@ class _Reader:
         except ValueError:  # the check of the file has said so
             return None
 
+    def _table(self, path: Path) -> Table:
+        """A file's columns. Raises InputError: one that is stated not to be kept here says where it is published."""
+        stated = self.written.sha256.get(path.name)
+        if stated is None:
+            return read_table(path)
+        source = f"{self.written.source or 'its source is not stated'}; file {path.name}, SHA-256 {stated}"
+        if not path.is_file():
+            what = f"is not here; the recording does not bring it along. Source: {source}. Put it at {path.resolve()}"
+            raise InputError(path, [Fault(path.name, what)])
+        found = hashlib.sha256(path.read_bytes()).hexdigest()
+        if (
+            found != stated
+        ):  # rows, units and filters were chosen for that file: with another one they would mean something else
+            what = f"is another file, SHA-256 {found}. Wanted: {source}. If you mean this one, state its SHA-256 in [sha256]"
+            raise InputError(path, [Fault(path.name, what)])
+        return read_table(path)
+
     def _column(self, where: str, column: Column) -> np.ndarray | None:
         """A column in SI (n,); None, with a fault, where it cannot be read."""
         file = column.file or self.record.file
         try:
             if file not in self.tables:
                 self.tables[file] = None
-                self.tables[file] = read_table(self.folder / file)
+                self.tables[file] = self._table(self.folder / file)
         except InputError as error:
             place = f"{self.where}.file" if column.file is None else f"{where}.file"
             self.faults += [Fault(place, f"{file} {fault.what}") for fault in error.faults]

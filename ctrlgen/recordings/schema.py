@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -75,6 +76,9 @@ class RecordTable(Section):
 class RecordingFile(Section):
     """recording.toml as written; `columns` are every record's, which may override single ones.
 
+    `source`: who measured it and where it is published. `sha256` of files by their names without folders: of those that are
+    not kept beside this file, so that whoever needs one knows which.
+
     Of a series, `low_pass` is a cut-off that all columns and `derivatives` get alike, without phase, and `keep_every`
     the rows that are kept after it.
     """
@@ -82,6 +86,7 @@ class RecordingFile(Section):
     title: str
     device: str
     source: str = ""
+    sha256: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]] = {}
     kind: Literal["series", "poses"]
     low_pass: quantity("Hz", positive=True) | None = None
     keep_every: Annotated[int, Field(ge=1)] = 1
@@ -139,6 +144,12 @@ class _Check:
             self._check_channels(f"record[{k}]", written.columns_of(record))
             self._check_rows(k, record)
         self._check_filter()
+        files = {r.file for r in written.record} | {
+            c.file for r in written.record for c in r.columns.values() if c.file
+        }
+        names = {Path(file).name for file in files | {c.file for c in written.columns.values() if c.file}}
+        for name in sorted(set(written.sha256) - names):
+            self._fault(f"sha256.{name!r}", f"is no file of this recording; its files are {', '.join(sorted(names))}")
 
     def _fault(self, where: str, what: str) -> None:
         fault = Fault(where, what)
