@@ -258,7 +258,7 @@ class _Reader:
         except ValueError:  # the check of the file has said so
             return None
 
-    def _table(self, path: Path) -> Table:
+    def _table(self, path: Path) -> MeasurementTable:
         """A file's columns. Raises InputError: one that is stated not to be kept here says where it is published."""
         stated = self.written.sha256.get(path.name)
         if stated is None:
