@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from ctrlgen.diagnosis.estimation import sample_equations
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import hypotheses, nominal_links
+from ctrlgen.diagnosis.settings import SIMULATION
 from ctrlgen.model import integrators
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
@@ -81,7 +84,7 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
     assert np.all(np.abs(found - wanted).max(axis=(0, 1)) < 1e-10 * size)
 
 
-@pytest.mark.parametrize("worth", [sample_equations.WORTH, -1], ids=["parameters", "constants"])
+@pytest.mark.parametrize("worth", [SIMULATION.parametric_operations, -1], ids=["parameters", "constants"])
 @pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.long)], ids=["held", "linear"])
 @pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.long), 3])
 @pytest.mark.parametrize("text, size", [(AXIS, 1.0), (AXIS + LOOP, 4e-5)], ids=["open", "loop"])
@@ -91,7 +94,7 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
     monkeypatch.setattr(
         integrators, "SOLVING", 14
     )  # to the end: where N is solved for, slopes of steps on the way are others
-    monkeypatch.setattr(sample_equations, "WORTH", worth)
+    monkeypatch.setattr(sample_equations, "SIMULATION", replace(SIMULATION, parametric_operations=worth))
     r, p = simulator(text, effects, linear, tmp_path)
     assert isinstance(r._equations.steps, integrators.Sticking) == ("coulomb" in effects)
     assert r._equations.model.held.numel() == ("loop" in text)

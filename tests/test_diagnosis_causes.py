@@ -18,7 +18,7 @@ from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
 from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import HALF, Hypothesis
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import Trial
 from ctrlgen.diagnosis.selection.direct_detection import read_off
 from ctrlgen.diagnosis.selection.line_resolvability import resolved
@@ -26,6 +26,7 @@ from ctrlgen.diagnosis.selection.model_selection import Weighing
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
+from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
@@ -336,7 +337,7 @@ def test_the_moment_of_an_event_is_the_middle_of_its_rise(moment, rise):
         return fine(u, 0.02 * np.clip((t - moment) / rise + 0.5, 0, 1) * (len(u) > 1000))[::FINE]
 
     fitter = fitter_of(pushed)
-    event = Hypothesis("force_step", "disturbance:axis", "axis", highest=HALF / H)
+    event = Hypothesis("force_step", "disturbance:axis", "axis", highest=CANDIDATE_TERMS.highest_frequency / H)
     start = Screen(fitter, [event]).run(fitter.fit(Structure(AXIS))).suspects[0].start
     fit = fitter.fit(Structure(AXIS).with_cause(event, start))
     k = next(i for i, u in enumerate(fit.structure.free_parameters) if u.name == "moment")
@@ -471,7 +472,7 @@ def test_fringes_that_the_records_cannot_part_are_one():
 @pytest.mark.parametrize("share, meant", [(0.9, True), (1.1, False)])
 def test_a_fringe_that_turns_the_reading_back_is_none(share, meant):
     """Beyond A = Lambda/2 pi what repeats is no error of a reading: the aliases of a line in time look so."""
-    fringe = Hypothesis("cyclic", "sensor:axis", "axis", highest=HALF / H)
+    fringe = Hypothesis("cyclic", "sensor:axis", "axis", highest=CANDIDATE_TERMS.highest_frequency / H)
     period = 2e-6
     fitter = fitter_of(after=lambda y: y + share * period / (2 * np.pi) * np.sin(2 * np.pi * y / period + 0.5))
     start = {"amplitude": 0.9 * share * period / (2 * np.pi), "period": period, "phase": 0.5}

@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.selection import score_gradient as slopes_module
 from ctrlgen.diagnosis.selection.ltv_propagation import Spread
 from ctrlgen.diagnosis.selection.score_gradient import Slopes
 from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.recordings.recording import Record, Recording
 
 H, N = 1e-3, 700
@@ -85,7 +86,7 @@ def brute(slopes, start):
 
 
 def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypatch):
-    monkeypatch.setattr(slopes_module, "BLOCK", 123)
+    monkeypatch.setattr(slopes_module, "CANDIDATE_TERMS", replace(CANDIDATE_TERMS, block=123))
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
     slopes = Slopes(hexapod, fit, record, LAWS, shows_nothing)

@@ -13,6 +13,7 @@ PACKAGE = ROOT / "ctrlgen"
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
 FOUNDATION = "core numerics"
 PHYSICS = f"{FOUNDATION} physics effects devices model"
+DIAGNOSIS = f"{PHYSICS} recordings diagnosis.settings diagnosis.hypotheses diagnosis.estimation"
 STAGES = f"{PHYSICS} trajectory recordings firmware verification reporting"
 MAY_IMPORT = {  # package -> packages; every module may import its own package and the program's version
     "core": "", "numerics": "",
@@ -21,12 +22,13 @@ MAY_IMPORT = {  # package -> packages; every module may import its own package a
     "trajectory": PHYSICS, "recordings": PHYSICS,
     "firmware": f"{PHYSICS} trajectory", "verification": f"{PHYSICS} trajectory firmware",
     "reporting": f"{PHYSICS} trajectory firmware verification",
-    "diagnosis.hypotheses": PHYSICS,
-    "diagnosis.estimation": f"{PHYSICS} recordings diagnosis.hypotheses",
-    "diagnosis.selection": f"{PHYSICS} recordings diagnosis.hypotheses diagnosis.estimation",
-    "diagnosis.evidence": f"{PHYSICS} recordings diagnosis.hypotheses diagnosis.estimation diagnosis.selection",
-    "diagnosis.report": f"{PHYSICS} recordings reporting diagnosis.hypotheses diagnosis.estimation diagnosis.selection",
-    "diagnosis": f"{PHYSICS} recordings diagnosis.hypotheses diagnosis.estimation diagnosis.selection diagnosis.evidence diagnosis.report",
+    "diagnosis.settings": "",
+    "diagnosis.hypotheses": f"{PHYSICS} diagnosis.settings",
+    "diagnosis.estimation": f"{PHYSICS} recordings diagnosis.settings diagnosis.hypotheses",
+    "diagnosis.selection": f"{DIAGNOSIS}",
+    "diagnosis.evidence": f"{DIAGNOSIS} diagnosis.selection",
+    "diagnosis.report": f"{DIAGNOSIS} reporting diagnosis.selection",
+    "diagnosis": f"{DIAGNOSIS} diagnosis.selection diagnosis.evidence diagnosis.report",
     "reproduce": STAGES,
     "app": f"{STAGES} reproduce diagnosis diagnosis.selection diagnosis.evidence diagnosis.report",
 }  # fmt: skip

@@ -27,8 +27,9 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import estimate_noise
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import HALF, Hypothesis
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect
 from ctrlgen.recordings.recording import Recording
 
@@ -240,7 +241,7 @@ def noisy(n: int) -> float:
 def recover(fitter: Fitter, device: Device, effect: str, planted: Planted) -> None:
     """Screened where it acts and fitted from there: the numbers planted, and what is left is noise, fitted and held out, but
     for the form of the law, of which its effect says how far nature's may be."""
-    highest = HALF / H if fitter.recording.kind == "series" else np.inf
+    highest = CANDIDATE_TERMS.highest_frequency / H if fitter.recording.kind == "series" else np.inf
     cause = Hypothesis(effect, planted.at, planted.at.partition(":")[2], planted.of, highest=highest)
     nominal = fitter.fit(Structure(device))
     best, *_ = Screen(fitter, [cause]).run(nominal).suspects

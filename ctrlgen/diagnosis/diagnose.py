@@ -29,14 +29,13 @@ from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, errors, findings, v
 from ctrlgen.diagnosis.selection.direct_detection import read_off
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.settings import NOISE_UPDATE, SIMULATION
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.model.model import build_model, movable
 from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
-GUESSES = 2  # of the noise, each with the device fitted under the one before
 RESTLESS = "{}: what is left at rest is no noise, it jumps or remembers; something acts there that is not described"
-SOME_TIME = 1e-3  # s: effects that look back by samples do not change how long a device settles
 
 
 def diagnose_recording(
@@ -66,9 +65,9 @@ def _diagnose(
     step("noise")
     live = alive(device, recording)
     recording = live.recording
-    noise = estimate_noise(recording, settling_time(build_model(device, sample_time=SOME_TIME)))
+    noise = estimate_noise(recording, settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time)))
     fitter = Fitter(recording, noise, checkpoint)
-    for _ in range(GUESSES if noise.guessed.any() else 0):
+    for _ in range(NOISE_UPDATE.guessed_refits if noise.guessed.any() else 0):
         fitter.noise = update_guessed_noise(fitter, fitter.fit(Structure(device)))
     noise = fitter.noise
     described = fitter.fit_described(device)

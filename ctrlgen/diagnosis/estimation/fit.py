@@ -18,22 +18,9 @@ from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER
+from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT, STATISTICS
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record, Recording
-
-STEPS = 40
-CI = 1.959964  # standard deviations of a 95 % interval
-WORST = 1e8  # whitened residual of a simulation that has left the numbers
-FAR = 1e30  # SI: a reading of a simulation that has left the numbers
-FAR_OFF = 100.0  # times the noise, root mean square: so large a mismatch may be for want of a good start
-NEAR_OFF = 0.01  # of its suspected amplitude: where a cause begins again that began too far away
-LONGEST_STEP = 1.5  # of a logarithm
-MET = 4.0  # standard deviations of the noise's own squares
-NEARLY_NOISE = 2.0  # times its squares: what leaves less says enough for the held-out records to decide the rest
-HELD_STEPS = 4  # of numbers that only those decide
-HALVINGS = 6  # of a step that does not keep what its slopes promise
-SETTLED = 0.1  # squares: numbers that gain less have arrived
-START_SIZE = 0.3  # of a state's typical size: how far a record may start from rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +47,7 @@ class Fit:
     @property
     def is_noise(self) -> bool:
         """Whether it leaves no more than noise."""
-        return self.objective < self.n + MET * np.sqrt(2 * self.n)
+        return self.objective < self.n + STATISTICS.chance_excess * np.sqrt(2 * self.n)
 
     @cached_property
     def covariance(self) -> np.ndarray:
@@ -96,7 +83,7 @@ class Fit:
         effect, name, value = hypothesis.law.special
         i = next(i for i, u in enumerate(self.structure.free_parameters) if u.cause == cause and u.name == name)
         sd = np.sqrt(max(self.covariance[i, i], 0.0))
-        return effect if abs(self.theta[i] - value) <= CI * sd else None
+        return effect if abs(self.theta[i] - value) <= STATISTICS.z_95 * sd else None
 
 
 class Fitter:
@@ -117,7 +104,11 @@ class Fitter:
         return [r for r in self.recording.records if r.role == "hold_out"]
 
     def fit(
-        self, structure: Structure, theta: np.ndarray | None = None, steps: int = STEPS, nested: Fit | None = None
+        self,
+        structure: Structure,
+        theta: np.ndarray | None = None,
+        steps: int = FIT.max_steps,
+        nested: Fit | None = None,
     ) -> Fit:
         """The optimum from `theta`, or from the structure's own start.
 
@@ -131,7 +122,7 @@ class Fitter:
             return found
         for i, u in enumerate(structure.free_parameters):
             if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
-                begin[i] = u.nominal + NEAR_OFF * (begin[i] - u.nominal)
+                begin[i] = u.nominal + FIT.restart_amplitude * (begin[i] - u.nominal)
         begin[problem.k :] = np.concatenate(nested.initial_states)
         stated = np.concatenate([structure.start, np.zeros(problem.n_starts)])
         for i, u in enumerate(structure.free_parameters):
@@ -144,7 +135,7 @@ class Fitter:
         """The device as described; where that leaves far more than noise, begun a deviation beside each stated number too:
         what drifts, or saturates in a loop, bends too much for one start."""
         found = self.fit(Structure(device))
-        if not self.noise.known.all() or found.objective < FAR_OFF**2 * found.n:
+        if not self.noise.known.all() or found.objective < FIT.poor_start_rms**2 * found.n:
             return found
         for u in found.structure.free_parameters:
             for start in (u.nominal - u.sd, u.nominal + u.sd) if u.sd else ():
@@ -186,7 +177,7 @@ class Fitter:
             return y
         with_prior = np.vstack([J, np.eye(len(start))])
         step = np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(start))]), rcond=None)[0]
-        for _ in range(HALVINGS):  # but not where something has to be crossed before anything moves
+        for _ in range(HELD_OUT_REFIT.halvings):  # but not where something has to be crossed before anything moves
             found = simulator.simulate(record, fit.theta, sizes * step)
             left = self._white(record, found)
             if left @ left + step @ step <= white @ white:
@@ -201,7 +192,11 @@ class Fitter:
         """The whitened residual (n, n_y) on any record; zero where a sample is not usable."""
         y = self.predict(fit, record)
         left = np.where(record.valid, record.observed - y, 0.0)
-        return _finite(self.noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid))
+        return _finite(
+            self.noise.whiten(
+                np.clip(np.nan_to_num(left, nan=FIT.reading_limit), -FIT.reading_limit, FIT.reading_limit), record.valid
+            )
+        )
 
     def held_out_deviance(self, fit: Fit) -> float:
         """-2 ln of how likely the held-out records are, as the numbers are known from the records to fit.
@@ -210,7 +205,9 @@ class Fitter:
         held against their structure, and earn it nothing. One step there says enough of a structure that does not nearly
         explain the records to fit.
         """
-        moved, price, spread = self.refitted_to_held_out(fit, HELD_STEPS if fit.objective < NEARLY_NOISE * fit.n else 1)
+        moved, price, spread = self.refitted_to_held_out(
+            fit, HELD_OUT_REFIT.max_steps if fit.objective < HELD_OUT_REFIT.nearly_noise * fit.n else 1
+        )
         return self.held_out_squares(moved) + price + spread
 
     def refitted_to_held_out(self, fit: Fit, steps: int = 1) -> tuple[Fit, float, float]:
@@ -237,14 +234,14 @@ class Fitter:
             begin = best[0].theta
             step = sd * np.linalg.solve(spread, C @ b - (begin - fit.theta) / unit)
             before = least
-            for halved in range(HALVINGS if steps > 1 else 1):
+            for halved in range(HELD_OUT_REFIT.halvings if steps > 1 else 1):
                 moved = replace(fit, theta=np.clip(begin + step / 2**halved, low, high))
                 price = float(np.sum((R @ ((moved.theta - fit.theta) / unit)) ** 2))
                 total = self.held_out_squares(moved) + price
                 if total < least:
                     best, least = (moved, price, best[2]), total
                     break
-            if not least < before - SETTLED:
+            if not least < before - HELD_OUT_REFIT.settled:
                 break
         return best
 
@@ -264,13 +261,13 @@ class Fitter:
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(values), np.clip(values, -WORST, WORST), WORST)
+    return np.where(np.isfinite(values), np.clip(values, -FIT.residual_limit, FIT.residual_limit), FIT.residual_limit)
 
 
 def start_sizes(simulator: Simulator) -> np.ndarray:
     """How far a record may start from rest, by state [SI]."""
     m = simulator.model
-    return START_SIZE * np.concatenate([m.x_scale, m.z_scale])[list(simulator.free_initial_states)]
+    return FIT.start_size * np.concatenate([m.x_scale, m.z_scale])[list(simulator.free_initial_states)]
 
 
 class _Problem:
@@ -297,7 +294,7 @@ class _Problem:
             + [False] * self.n_starts,
             dtype=bool,
         )
-        self.most = np.where(self.log, LONGEST_STEP, np.inf)
+        self.most = np.where(self.log, FIT.longest_log_step, np.inf)
 
     def inner(self, values: np.ndarray) -> np.ndarray:
         """Numbers of order one from SI."""
@@ -318,10 +315,16 @@ class _Problem:
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low = np.concatenate(
-            [[u.low for u in self.structure.free_parameters], np.full(self.n_starts, -1e3) * self.scale[self.k :]]
+            [
+                [u.low for u in self.structure.free_parameters],
+                np.full(self.n_starts, -FIT.start_reach) * self.scale[self.k :],
+            ]
         )
         high = np.concatenate(
-            [[u.high for u in self.structure.free_parameters], np.full(self.n_starts, 1e3) * self.scale[self.k :]]
+            [
+                [u.high for u in self.structure.free_parameters],
+                np.full(self.n_starts, FIT.start_reach) * self.scale[self.k :],
+            ]
         )
         return self.inner(low), self.inner(high)
 
@@ -335,7 +338,9 @@ class _Problem:
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         left = np.where(record.valid, record.observed - y, 0.0)
-        return self.fitter.noise.whiten(np.clip(np.nan_to_num(left, nan=FAR), -FAR, FAR), record.valid).ravel()
+        return self.fitter.noise.whiten(
+            np.clip(np.nan_to_num(left, nan=FIT.reading_limit), -FIT.reading_limit, FIT.reading_limit), record.valid
+        ).ravel()
 
     def _joined(self, rows: list[np.ndarray], scaled: np.ndarray) -> np.ndarray:
         """The records' rows and those of the prior."""
@@ -361,7 +366,7 @@ class _Problem:
             y, Y = simulator.sensitivities(record, values[:k], start)
             rows.append(self._white(record, y))
             J = np.zeros((len(rows[-1]), len(scaled)))
-            W = self.fitter.noise.whiten(np.clip(np.nan_to_num(Y), -FAR, FAR), record.valid)
+            W = self.fitter.noise.whiten(np.clip(np.nan_to_num(Y), -FIT.reading_limit, FIT.reading_limit), record.valid)
             W = W.reshape(len(J), Y.shape[2])
             J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
             slopes.append(J * by_inner)

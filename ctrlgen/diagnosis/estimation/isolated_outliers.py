@@ -8,12 +8,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import median_filter
 
+from ctrlgen.diagnosis.settings import OUTLIERS, STATISTICS
 from ctrlgen.recordings.recording import Record, Recording
-
-SPIKE = 7.0
-MOST_SPIKES = 0.01
-WIDEST_SPIKE = 2  # samples
-BESIDE = 0.3  # of a spike: what its neighbours have at most
 
 
 def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> tuple[Recording, str]:
@@ -37,16 +33,20 @@ def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray
 
 
 def isolated_outliers(left: np.ndarray) -> np.ndarray:
-    """Samples (n, n_y) more than `SPIKE` robust deviations from the median of their neighbours; never over one percent, nor wide ones."""
-    rough = left - median_filter(left, size=(7, 1), mode="nearest")
-    near = SPIKE * np.maximum(
-        1.4826 * np.median(np.abs(rough), axis=0), median_filter(np.abs(rough), size=(51, 1)) * 1.4826
-    )
+    """Isolated outliers (n, n_y) of the residual `left` (n, n_y).
+
+    A sample is one that lies more than `OUTLIERS.threshold` robust standard deviations from the running median. No outlier
+    is wider than `OUTLIERS.widest` samples, and a channel with more than `OUTLIERS.largest_share` of them has none.
+    """
+    rough = left - median_filter(left, size=(OUTLIERS.median_window, 1), mode="nearest")
+    overall = STATISTICS.mad_to_sd * np.median(np.abs(rough), axis=0)
+    local = median_filter(np.abs(rough), size=(OUTLIERS.scale_window, 1)) * STATISTICS.mad_to_sd
+    near = OUTLIERS.threshold * np.maximum(overall, local)
     found = np.abs(rough) > near
-    found[:, found.mean(axis=0) > MOST_SPIKES] = False
+    found[:, found.mean(axis=0) > OUTLIERS.largest_share] = False
     for column, size in zip(found.T, np.abs(rough).T, strict=True):
         for run in np.split(np.flatnonzero(column), np.flatnonzero(np.diff(np.flatnonzero(column)) > 1) + 1):
             beside = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)] if len(run) else []
-            if len(run) > WIDEST_SPIKE or (beside and max(beside) > BESIDE * size[run].max()):
+            if len(run) > OUTLIERS.widest or (beside and max(beside) > OUTLIERS.neighbour_share * size[run].max()):
                 column[run] = False  # a mass that is pushed moves before and after too
     return found

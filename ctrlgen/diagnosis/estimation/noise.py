@@ -15,22 +15,9 @@ from scipy import stats
 from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
+from ctrlgen.diagnosis.settings import NOISE, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record, Recording
-
-LONGEST_ORDER = 8
-SHORTEST_REST = 200  # samples; an AR model of order 8 needs some 25 a coefficient
-DWELL_DEGREE = 4  # of the polynomial taken out of a dwell: creep and lags go on in it
-STATED = 1000.0  # samples that a stated deviation is worth
-LINES = 3  # at most, taken out of a rest
-NEAR_BINS = 15  # of the spectrum, over which noise is level
-OUTSTANDING = 40.0  # times the median around: noise does that once in 1e12 bins
-LOUD = 1.5  # times the median power of all dwells: above, something happened in this one
-LAGS = 20  # samples over which noise that was whitened is looked at for a memory
-SLOW = 3.0  # times its innovations: noise so slow moves
-SAME = 1e-9  # of its range: drives so near are one pose
-LEAST = 6  # repeated poses that tell a deviation, to 30 %
-ROBUST_COST = 5.0  # a median of third differences knows the deviation as badly as so many times fewer samples
 
 
 @dataclass(frozen=True)
@@ -100,7 +87,7 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
         if stated:
             return stated, none, True, f"{name}: as stated", np.inf, False
         sd, count = _scatter(recording.records, i)
-        if count >= LEAST and sd > 0:
+        if count >= NOISE.fewest_repeats and sd > 0:
             return sd, none, True, f"{name}: from repeated poses, {count} beyond the first of each", float(count), False
         few = f"only {count} repeat others" if count else "no pose repeats"
         said = f"{name}: not stated and {few}; taken from what the best model leaves"
@@ -112,27 +99,27 @@ def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.n
     samples = {
         "a record at rest": (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
         "repeated periods": (1, [e for r in moving for e in _repeats(r, i)]),
-        "dwells of the drive": (DWELL_DEGREE, [e for r in moving for e in _dwells(r, i, settling)]),
+        "dwells of the drive": (NOISE.dwell_degree, [e for r in moving for e in _dwells(r, i, settling)]),
     }
     for source, (degree, parts) in samples.items():
         parts = [
-            part for part in parts if len(part) >= SHORTEST_REST and np.ptp(part) > 0
+            part for part in parts if len(part) >= NOISE.shortest_stretch and np.ptp(part) > 0
         ]  # one number alone tells none
         parts = _quiet([without_lines(_flat(part, degree)) for part in parts])
         if parts:
             sd, a = _with_rounding(*autoregression(parts), rounding)
             n, times = sum(map(len, parts)), stationary_deviation(sd, a) / sd
             said = f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}"
-            if times > SLOW:
+            if times > NOISE.slow_ratio:
                 said += f"; it is {times:.0f} times what one sample adds: what moves so slowly may be the device, not its sensor"
             return sd, a, True, said, float(n), False
     if stated:
         sd, _ = _with_rounding(stated, none, rounding)
-        return sd, none, True, f"{name}: as stated, taken as white", STATED, False
+        return sd, none, True, f"{name}: as stated, taken as white", NOISE.stated_samples, False
     parts = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
     sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), rounding, 1e-300)  # 1 + 9 + 9 + 1: third differences
     said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
-    return sd, none, True, said, sum(map(len, parts)) / ROBUST_COST, True
+    return sd, none, True, said, sum(map(len, parts)) / NOISE.robust_cost, True
 
 
 def _scatter(records: tuple[Record, ...], i: int) -> tuple[float, int]:
@@ -140,7 +127,9 @@ def _scatter(records: tuple[Record, ...], i: int) -> tuple[float, int]:
     drive = np.concatenate([r.drive[r.valid[:, i]] for r in records])
     y = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
     span = np.ptp(drive, axis=0)
-    _, group = np.unique(np.round(drive / np.where(span > 0, SAME * span, 1.0)), axis=0, return_inverse=True)
+    _, group = np.unique(
+        np.round(drive / np.where(span > 0, NOISE.same_drive * span, 1.0)), axis=0, return_inverse=True
+    )
     group = group.ravel()
     mean = np.bincount(group, y) / np.bincount(group)
     count = len(y) - len(mean)
@@ -166,11 +155,11 @@ def _flat(part: np.ndarray, degree: int) -> np.ndarray:
 def without_lines(part: np.ndarray) -> np.ndarray:
     """Without sinusoids that stand out of the spectrum: a vibration is a disturbance with a cause, no noise."""
     n = len(part)
-    for _ in range(LINES):
+    for _ in range(NOISE.most_lines):
         power = np.abs(np.fft.rfft(part * np.hanning(n), n=8 * n)) ** 2
-        peak = int(np.argmax(power / np.maximum(median_filter(power, 8 * NEAR_BINS, mode="reflect"), 1e-300)))
-        around = np.median(power[max(0, peak - 4 * NEAR_BINS) : peak + 4 * NEAR_BINS])
-        if power[peak] < OUTSTANDING * around:
+        peak = int(np.argmax(power / np.maximum(median_filter(power, 8 * NOISE.level_bins, mode="reflect"), 1e-300)))
+        around = np.median(power[max(0, peak - 4 * NOISE.level_bins) : peak + 4 * NOISE.level_bins])
+        if power[peak] < NOISE.line_ratio * around:
             break
         phase = 2 * np.pi * peak / (8 * n) * np.arange(n)
         basis = np.column_stack([np.sin(phase), np.cos(phase)])
@@ -181,7 +170,7 @@ def without_lines(part: np.ndarray) -> np.ndarray:
 def _quiet(parts: list[np.ndarray]) -> list[np.ndarray]:
     """Without the parts in which something happened."""
     power = [float(np.var(part)) for part in parts]
-    return [part for part, p in zip(parts, power, strict=True) if p <= LOUD * np.median(power)]
+    return [part for part, p in zip(parts, power, strict=True) if p <= NOISE.loudest_stretch * np.median(power)]
 
 
 def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
@@ -191,7 +180,7 @@ def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np
 
 
 def _robust(values: np.ndarray) -> float:
-    return float(1.4826 * np.median(np.abs(values - np.median(values))))
+    return float(STATISTICS.mad_to_sd * np.median(np.abs(values - np.median(values))))
 
 
 def drive_period(drive: np.ndarray) -> int | None:
@@ -200,12 +189,12 @@ def drive_period(drive: np.ndarray) -> int | None:
     if span == 0 or n < 100:
         return None
     first = drive[:32]
-    matches = np.flatnonzero(np.all(np.abs(drive[: n - 32] - first[0]) <= 1e-9 * span, axis=1))
+    matches = np.flatnonzero(np.all(np.abs(drive[: n - 32] - first[0]) <= NOISE.same_drive * span, axis=1))
     for lag in matches[matches >= 50]:
         if 2 * lag > n:
             return None
-        if np.all(np.abs(drive[lag : lag + 32] - first) <= 1e-9 * span) and np.all(
-            np.abs(drive[lag:] - drive[:-lag]) <= 1e-9 * span
+        if np.all(np.abs(drive[lag : lag + 32] - first) <= NOISE.same_drive * span) and np.all(
+            np.abs(drive[lag:] - drive[:-lag]) <= NOISE.same_drive * span
         ):
             return int(lag)
     return None
@@ -227,18 +216,18 @@ def _dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
     moved = np.any(np.diff(record.drive, axis=0) != 0, axis=1)
     edges = np.flatnonzero(np.concatenate([[True], moved, [True]]))
     wait = int(np.ceil(settling / record.sample_time))
-    dwells = ((a + wait, b) for a, b in pairwise(edges) if b - a - wait >= SHORTEST_REST)
+    dwells = ((a + wait, b) for a, b in pairwise(edges) if b - a - wait >= NOISE.shortest_stretch)
     return [record.observed[a:b, i][record.valid[a:b, i]] for a, b in dwells]
 
 
 def autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
     """Innovation deviation and coefficients by Yule-Walker over all parts; the order by BIC."""
     n = sum(map(len, parts))
-    lags = np.array([sum(float(p[: len(p) - k] @ p[k:]) for p in parts) / n for k in range(LONGEST_ORDER + 1)])
+    lags = np.array([sum(float(p[: len(p) - k] @ p[k:]) for p in parts) / n for k in range(NOISE.longest_order + 1)])
     if lags[0] <= 0:  # a reading that does not move
         return 0.0, np.zeros(0)
     best = (n * np.log(lags[0]), lags[0], np.zeros(0))
-    for order in range(1, LONGEST_ORDER + 1):
+    for order in range(1, NOISE.longest_order + 1):
         toeplitz = lags[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
         a = np.linalg.solve(toeplitz, lags[1 : order + 1])
         variance = lags[0] - a @ lags[1 : order + 1]
@@ -250,7 +239,7 @@ def autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
     return float(np.sqrt(best[1])), best[2]
 
 
-def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
+def ljung_box(e: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
     """p of the hypothesis that `e` has no autocorrelation up to `lags`. G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297."""
     n, e = len(e), e - np.mean(e)
     total = float(e @ e)

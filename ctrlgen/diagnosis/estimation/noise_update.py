@@ -8,13 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.noise import LAGS, Noise, autoregression, ljung_box, without_lines
+from ctrlgen.diagnosis.estimation.noise import Noise, autoregression, ljung_box, without_lines
 from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
+from ctrlgen.diagnosis.settings import NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
-
-LITTLE = 1.3  # times the noise: what leaves more is not noise
-SIGMAS = 2.6  # standard deviations of its first estimate by which noise may be larger
-OTHER = 1e-4  # p below which what is left at rest has another colour
 
 
 def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
@@ -76,12 +73,12 @@ def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:
     for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.fit_records)):
         parts = [_left(fitter, fit, r, i) for r in fitter.fit_records]
         left = np.sqrt(np.mean(np.concatenate(parts) ** 2))
-        if left >= LITTLE * floor[i]:
+        if left >= NOISE_UPDATE.largest_residual * floor[i]:
             continue
         found = autoregression(parts)
         if all(_of_that_colour(_left(fitter, fit, r, i), found[1]) for r in rests):
             learnt, (sd[i], ar[i]) = True, found
-            sd[i] *= min(1.0, floor[i] * (1 + SIGMAS / np.sqrt(2 * noise.count[i])) / left)
+            sd[i] *= min(1.0, floor[i] * (1 + STATISTICS.noise_size_margin / np.sqrt(2 * noise.count[i])) / left)
     return replace(noise, sd=sd, ar=tuple(ar)) if learnt else noise
 
 
@@ -91,10 +88,10 @@ def _left(fitter: Fitter, fit: Fit, record: Record, i: int) -> np.ndarray:
 
 def _of_that_colour(rest: np.ndarray, a: np.ndarray) -> bool:
     """Whether `rest` (n,) is white once what the coefficients `a` foresee is taken out."""
-    if len(rest) < 5 * LAGS or np.ptp(rest) == 0:
+    if len(rest) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags or np.ptp(rest) == 0:
         return True
     white = np.convolve(rest, np.concatenate([[1.0], -a]), "valid")
-    return ljung_box(without_lines(white)) > OTHER
+    return ljung_box(without_lines(white)) > NOISE_UPDATE.other_colour_p
 
 
 def update_noise_size(fitter: Fitter, fit: Fit) -> Noise:

@@ -12,16 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.estimation.fit import CI, Fit, Fitter, _Problem
-from ctrlgen.diagnosis.estimation.robust_covariance import DISAGREES, sandwich_over_model
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, _Problem
+from ctrlgen.diagnosis.estimation.robust_covariance import sandwich_over_model
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER
+from ctrlgen.diagnosis.settings import PROFILE, ROBUST_COVARIANCE, STATISTICS
 
-FIRST = 2.0  # standard deviations at which the profile is looked at
-FARTHER = 3  # times it is looked at twice as far, while it is flat
-STEEP = 1.4  # times the quadratic rise, above which the others are fitted once more
-OVERSHOT, SECANTS = 1.5, 4  # of CI, beyond which the end is looked for again, so many times at most
-COST = 2e7  # samples x states x slopes that all profiles together may take
-ADEQUATE = 2.0  # squares over the noise's, above which the objective is no likelihood and only the sandwich speaks
 BOUNDED, ABOVE, BELOW, FLAT = (
     "bounded", "not bounded above by these data", "not bounded below by these data", "not bounded by these data",
 )  # fmt: skip
@@ -63,7 +58,7 @@ def _profile(surface: _Surface, fit: Fit, i: int, ratio: np.ndarray | None) -> P
     cause = fit.structure.causes[unknown.cause]
     value, sd = float(fit.theta[i]), float(np.sqrt(max(fit.covariance[i, i], 0.0)))
     low, high = (_Side(surface, i, value, sd, bound) for bound in (unknown.low, unknown.high))
-    wider = 1.0 if ratio is None or ratio[i] < DISAGREES else float(ratio[i])
+    wider = 1.0 if ratio is None or ratio[i] < ROBUST_COVARIANCE.agreement else float(ratio[i])
     ends = [max(value + wider * (low.end - value), unknown.low), min(value + wider * (high.end - value), unknown.high)]
     points = sorted([*low.points, (value, 0.0), *high.points])
     shape = {(True, True): BOUNDED, (True, False): ABOVE, (False, True): BELOW, (False, False): FLAT}
@@ -83,17 +78,17 @@ class _Side:
         side = np.sign(bound - value) or 1.0
         room = abs(bound - value)
         self.points: list[tuple[float, float]] = []
-        self.verified, self.bounded = False, CI * sd <= room
-        self.end = value + side * min(CI * sd, room)
-        t, before = FIRST * sd, (0.0, 0.0)
-        for _ in range(FARTHER + 1):
+        self.verified, self.bounded = False, STATISTICS.z_95 * sd <= room
+        self.end = value + side * min(STATISTICS.z_95 * sd, room)
+        t, before = PROFILE.first_distance * sd, (0.0, 0.0)
+        for _ in range(PROFILE.doublings + 1):
             if not surface.affords() or room == 0:
                 return
             reach = min(t, room)
             rise = surface.rise(i, value + side * reach, (reach / sd) ** 2 if sd else np.inf)
             self.points.append((float(value + side * reach), rise))
             self.verified, root = True, np.sqrt(max(rise, 0.0))
-            self.bounded = root >= CI
+            self.bounded = root >= STATISTICS.z_95
             if self.bounded:
                 self.end = value + side * self._between(surface, i, value, side, before, (reach, root))
                 return
@@ -112,13 +107,15 @@ class _Side:
         far: tuple[float, float],
     ) -> float:
         """The distance at which the root of the rise is CI, by the secant; looked at again while it was far overshot."""
-        for _ in range(SECANTS):
-            reach = float(near[0] + (CI - near[1]) / (far[1] - near[1]) * (far[0] - near[0]))
-            if far[1] < OVERSHOT * CI or not surface.affords():
+        for _ in range(PROFILE.most_secants):
+            reach = float(near[0] + (STATISTICS.z_95 - near[1]) / (far[1] - near[1]) * (far[0] - near[0]))
+            if far[1] < PROFILE.overshoot * STATISTICS.z_95 or not surface.affords():
                 return reach
-            rise = surface.rise(i, value + side * reach, CI**2)
+            rise = surface.rise(i, value + side * reach, STATISTICS.z_95**2)
             self.points.append((float(value + side * reach), rise))
-            near, far = ((reach, np.sqrt(max(rise, 0.0))), far) if rise < CI**2 else (near, (reach, np.sqrt(rise)))
+            near, far = (
+                ((reach, np.sqrt(max(rise, 0.0))), far) if rise < STATISTICS.z_95**2 else (near, (reach, np.sqrt(rise)))
+            )
         return far[0]
 
 
@@ -133,8 +130,8 @@ class _Surface:
         J = fit.J * self.problem.by_inner(self.values)
         self.H, self.best = J.T @ J, fit.objective
         states = max(len(s) for s in self.problem.sizes) + fit.J.shape[1]
-        affordable = max(int(COST / (fit.n * states * fit.J.shape[1])), 4)
-        self.left = affordable if fit.chi2 < ADEQUATE * fit.n else 0
+        affordable = max(int(PROFILE.cost / (fit.n * states * fit.J.shape[1])), PROFILE.fewest_points)
+        self.left = affordable if fit.chi2 < PROFILE.largest_ratio * fit.n else 0
 
     def affords(self) -> bool:
         """Whether another point may be looked at."""
@@ -151,7 +148,7 @@ class _Surface:
         x[rest] -= np.linalg.lstsq(self.H[np.ix_(rest, rest)], self.H[rest, i] * (x[i] - self.at[i]), rcond=1e-12)[0]
         x[rest] = np.clip(x, self.low, self.high)[rest]
         rise = self._objective(x) - self.best
-        if rise > STEEP * expected and self.affords():
+        if rise > PROFILE.refit_ratio * expected and self.affords():
             r, J = self.problem.evaluate(x)
             J = J[:, rest]
             x[rest] = np.clip(x[rest] - np.linalg.lstsq(J, r, rcond=1e-10)[0], self.low[rest], self.high[rest])

@@ -12,38 +12,35 @@ from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
 from scipy.signal.windows import blackmanharris
 
-SHORTEST = 200  # samples
-WIDTH = 31  # bins over which a spectrum is smoothed
-OUTSTANDING = 10.0  # times the median around: a line, no noise
-MOST = 0.95  # of a: slower noise cannot be told from drift at quiet frequencies
+from ctrlgen.diagnosis.settings import RESIDUAL_NOISE
+
 MEDIAN = 1 / np.log(2)  # mean over median of a spectrum's bins, which are exponential
-ALIKE, WIDENINGS = 2.0, 4  # frequencies that agree with the noise found, to so much, tell it too
-LOBE = 2.0  # independent bins are so much fewer: the window's main lobe
-FIRST = 4  # bins: below, the window sees the mean
 
 
 def noise_from_residual(left: np.ndarray, motion: np.ndarray) -> tuple[float, np.ndarray, float] | None:
     """Innovation deviation, coefficients and how many samples that is worth, from what is `left` over of a record and the
     `motion` predicted, both (n,); None where it is too short, or where physics left out goes through all frequencies."""
     n = len(left)
-    if n < SHORTEST:
+    if n < RESIDUAL_NOISE.shortest:
         return None
     window = blackmanharris(n)
     window /= np.sqrt(np.sum(window**2))
-    spectrum, moving = (np.abs(np.fft.rfft(window * (y - np.mean(y)))[FIRST:-1]) ** 2 for y in (left, motion))
-    moving = median_filter(moving, WIDTH, mode="reflect")
-    around = median_filter(spectrum, WIDTH, mode="reflect")
-    turn = np.exp(-2j * np.pi * (np.arange(len(spectrum)) + FIRST) / n)
-    lines = spectrum > OUTSTANDING * around
+    spectrum, moving = (
+        np.abs(np.fft.rfft(window * (y - np.mean(y)))[RESIDUAL_NOISE.first_bin : -1]) ** 2 for y in (left, motion)
+    )
+    moving = median_filter(moving, RESIDUAL_NOISE.smoothing_bins, mode="reflect")
+    around = median_filter(spectrum, RESIDUAL_NOISE.smoothing_bins, mode="reflect")
+    turn = np.exp(-2j * np.pi * (np.arange(len(spectrum)) + RESIDUAL_NOISE.first_bin) / n)
+    lines = spectrum > RESIDUAL_NOISE.line_ratio * around
     chosen = (moving <= np.median(moving)) & ~lines
     if not np.any(spectrum[chosen] > 0):
         return None
-    for _ in range(1 + WIDENINGS):
+    for _ in range(1 + RESIDUAL_NOISE.widenings):
         sd, a = _fitted(spectrum[chosen], turn[chosen], n)
-        chosen |= (around * MEDIAN <= ALIKE * sd**2 / np.abs(1 - a * turn) ** 2) & ~lines
-    if a > 0.999 * MOST:  # that is physics left out, fast as well as slow
+        chosen |= (around * MEDIAN <= RESIDUAL_NOISE.agreement * sd**2 / np.abs(1 - a * turn) ** 2) & ~lines
+    if a > 0.999 * RESIDUAL_NOISE.largest_pole:  # that is physics left out, fast as well as slow
         return None
-    return sd, np.array([a] if a else []), np.count_nonzero(chosen) / LOBE
+    return sd, np.array([a] if a else []), np.count_nonzero(chosen) / RESIDUAL_NOISE.window_bins
 
 
 def _fitted(power: np.ndarray, turn: np.ndarray, n: int) -> tuple[float, float]:
@@ -56,6 +53,8 @@ def _fitted(power: np.ndarray, turn: np.ndarray, n: int) -> tuple[float, float]:
         """-2 ln L, up to a constant, with the best s."""
         return float(2 * len(power) * np.log(np.mean(power * gain(a))) - 2 * np.sum(np.log(gain(a))))
 
-    best = minimize_scalar(unlikely, bounds=(-MOST, MOST), method="bounded").x
-    a = best if (unlikely(0.0) - unlikely(best)) / LOBE > np.log(n) else 0.0
+    best = minimize_scalar(
+        unlikely, bounds=(-RESIDUAL_NOISE.largest_pole, RESIDUAL_NOISE.largest_pole), method="bounded"
+    ).x
+    a = best if (unlikely(0.0) - unlikely(best)) / RESIDUAL_NOISE.window_bins > np.log(n) else 0.0
     return float(np.sqrt(np.mean(power * gain(a)))), a

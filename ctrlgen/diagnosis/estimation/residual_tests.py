@@ -14,17 +14,9 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.noise import LAGS, ljung_box, without_lines
+from ctrlgen.diagnosis.estimation.noise import ljung_box, without_lines
+from ctrlgen.diagnosis.settings import HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
-
-STEPS = 20  # at most, to where the held-out records are most likely, as the numbers are known
-RATIO = 1.10  # held-out error over what is expected: the gate of the design
-SURE = 1e-4  # p below which a test of whiteness rejects; there are a dozen tests a diagnosis
-NOTICED = 1.02  # a rejected test counts only where the error is this much above the floor too
-SIGMAS = 2.6  # standard deviations of the noise's own estimate that are granted
-RESTLESS = 1e-6  # p below which what is left at rest is no noise
-ROUNDED = 0.5  # of the noise: steps of the readings from which on these tests see the steps
-SMALL_SAMPLE = 0.001  # p of so large an error by chance, above which the gate's ratio says nothing
 
 
 @dataclass(frozen=True)
@@ -46,7 +38,7 @@ class ResidualTests:
 def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
     """Ratio per channel, Ljung-Box (memory), McLeod-Li (size that comes and goes), correlation with the drive."""
     n_y = len(fitter.recording.channels)
-    moved, price, _ = fitter.refitted_to_held_out(fit, STEPS)
+    moved, price, _ = fitter.refitted_to_held_out(fit, HELD_OUT_REFIT.max_steps_tests)
     squares, expected = np.full(n_y, price / n_y), np.zeros(n_y)
     p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
     for record in fitter.held_out_records:
@@ -57,20 +49,31 @@ def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
         if fitter.recording.kind == "series":
             for i in range(n_y):
                 e = white[usable[:, i], i]
-                if len(e) > 5 * LAGS:
+                if len(e) > STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags:
                     p["memory"].append(ljung_box(e))
                     p["variance"].append(ljung_box(e**2 - np.mean(e**2)))
                     p["drive"].append(cross_correlation(e, record.drive[usable[:, i]]))
     ratio = tuple(np.sqrt(squares / np.maximum(expected, 1.0)))
     smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
-    rejected = any(value < SURE for value in smallest.values()) and max(ratio, default=0.0) > NOTICED
-    doubt = 1 + SIGMAS / np.sqrt(2 * np.maximum(fitter.noise.count, 1.0))  # the noise itself is known no better
+    rejected = (
+        any(value < RESIDUAL_TESTS.whiteness_p for value in smallest.values())
+        and max(ratio, default=0.0) > RESIDUAL_TESTS.noticed_ratio
+    )
+    doubt = 1 + STATISTICS.noise_size_margin / np.sqrt(
+        2 * np.maximum(fitter.noise.count, 1.0)
+    )  # the noise itself is known no better
     chance = min(1.0, n_y * min(map(float, stats.chi2.sf(squares / doubt**2, np.maximum(expected, 1.0)))))
     smallest["size"] = chance
-    above = any(r > RATIO * d for r, d in zip(ratio, doubt, strict=True)) and chance < SMALL_SAMPLE
+    above = (
+        any(r > RESIDUAL_TESTS.error_ratio * d for r, d in zip(ratio, doubt, strict=True))
+        and chance < RESIDUAL_TESTS.size_p
+    )
     free = max(fit.n - len(fit.theta), 1)  # what shows in the records to fit alone is no less left out
     smallest["fitted"] = float(stats.chi2.sf(fit.chi2 / max(doubt) ** 2, free))
-    above |= np.sqrt(fit.chi2 / free) > RATIO * max(doubt) and smallest["fitted"] < SMALL_SAMPLE
+    above |= (
+        np.sqrt(fit.chi2 / free) > RESIDUAL_TESTS.error_ratio * max(doubt)
+        and smallest["fitted"] < RESIDUAL_TESTS.size_p
+    )
     restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
     passed = bool(np.isfinite(ratio).all()) and not (above or rejected or restless)
     return ResidualTests(ratio, smallest, passed, restless)
@@ -84,15 +87,19 @@ def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
         e = fitter.whitened_residual(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
         read = record.observed[record.valid[:, i], i]
         step = quantisation_step(read)
-        if len(e) < 5 * LAGS or np.ptp(read) == 0 or step > ROUNDED * fitter.noise.floor[i]:
+        if (
+            len(e) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags
+            or np.ptp(read) == 0
+            or step > RESIDUAL_TESTS.coarse_reading * fitter.noise.floor[i]
+        ):
             continue
         e = without_lines(e)  # a vibration is looked for by itself
-        if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESTLESS:
+        if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESIDUAL_TESTS.rest_p:
             return True
     return False
 
 
-def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = LAGS) -> float:
+def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
     """p of the hypothesis that white `e` is uncorrelated with the drive's changes at lags 0 ... `lags` (Bonferroni)."""
     n, worst = len(e), 0.0
     for u in drive.T:

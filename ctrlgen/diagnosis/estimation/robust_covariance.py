@@ -9,10 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit
-
-BLOCKS = 40  # of the sandwich, or more for many numbers
-FEWEST_BLOCKS = 3  # times the free numbers: fewer blocks say nothing
-DISAGREES = 1.25  # sandwich over model deviation, above which the noise model is not believed: 40 blocks know 11 %
+from ctrlgen.diagnosis.settings import ROBUST_COVARIANCE
 
 
 def robust_deviations(fit: Fit) -> np.ndarray:
@@ -20,14 +17,16 @@ def robust_deviations(fit: Fit) -> np.ndarray:
     if not len(fit.theta):
         return np.zeros(0)
     ratio = sandwich_over_model(fit)
-    wider = 1.0 if ratio is None else np.where(ratio < DISAGREES, 1.0, ratio)
+    wider = 1.0 if ratio is None else np.where(ratio < ROBUST_COVARIANCE.agreement, 1.0, ratio)
     return np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) * wider
 
 
 def sandwich_over_model(fit: Fit) -> np.ndarray | None:
     """Per unknown, the deviation by block scores over that by curvature; None where there are too few blocks."""
     k = len(fit.theta)
-    size = max(sum(n for n, _ in fit.shapes) // max(BLOCKS, FEWEST_BLOCKS * k), 1)
+    size = max(
+        sum(n for n, _ in fit.shapes) // max(ROBUST_COVARIANCE.blocks, ROBUST_COVARIANCE.blocks_per_parameter * k), 1
+    )
     scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
     J, first, scores = fit.J / scale, 0, []
@@ -36,7 +35,7 @@ def sandwich_over_model(fit: Fit) -> np.ndarray | None:
             rows = slice(first + a * n_y, first + min(a + size, n) * n_y)
             scores.append(J[rows].T @ fit.residual[rows])
         first += n * n_y
-    if len(scores) < FEWEST_BLOCKS * k:
+    if len(scores) < ROBUST_COVARIANCE.blocks_per_parameter * k:
         return None
     s, prior = np.array(scores), J[first:]
     inverse = np.linalg.pinv(J.T @ J, rcond=1e-14)

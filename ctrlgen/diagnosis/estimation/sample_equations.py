@@ -11,12 +11,10 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from ctrlgen.diagnosis.settings import SIMULATION
 from ctrlgen.model.discretisation import Sample, next_sample
 from ctrlgen.model.integrators import Exponential, Sticking, steps_of
 from ctrlgen.model.model import Model
-
-POSE_NEWTON_STEPS, NEWTON_STEPS = 8, 4
-WORTH = 500  # operations on parameters alone, from which on they are done once a record
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +42,7 @@ def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: b
         moving = [following, y]
     rows, symbols, parametric = ca.extract_parametric(moving, model.p, {"extract_trivial": True})
     c, value = model.p, model.p
-    if ca.Function("work", [model.p], parametric).n_instructions() > WORTH:
+    if ca.Function("work", [model.p], parametric).n_instructions() > SIMULATION.parametric_operations:
         moving, c, value = rows, ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
     constants = ca.Function("constants", [model.p], [value, ca.jacobian(value, model.p)])
     if after is None:
@@ -63,4 +61,9 @@ def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: b
 
 
 def _after(model: Model, sample_time: float, linear: bool) -> Sample:
-    return next_sample(model, sample_time, linear, NEWTON_STEPS if np.isfinite(sample_time) else POSE_NEWTON_STEPS)
+    return next_sample(
+        model,
+        sample_time,
+        linear,
+        SIMULATION.newton_steps if np.isfinite(sample_time) else SIMULATION.pose_newton_steps,
+    )

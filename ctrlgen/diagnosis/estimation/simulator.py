@@ -17,12 +17,11 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.forward_sensitivities import forward_sensitivities, takes_several_steps
 from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations, build_sample_equations
+from ctrlgen.diagnosis.settings import SIMULATION
 from ctrlgen.model.discretisation import balanced
 from ctrlgen.model.model import Model, build_model
 from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
 from ctrlgen.recordings.recording import Record
-
-START_NEWTON_STEPS = 12  # from home to the first displacement; later ones start from the sample before
 
 
 class Simulator:
@@ -98,7 +97,7 @@ class Simulator:
         x[list(m.clocks)] = record.time[0] if np.isfinite(self.sample_time) else 0.0
         if m.inertial or not np.isfinite(self.sample_time):
             return np.concatenate([x, 0.0 * m.z_scale])
-        z = balanced(m, m.x, m.u, START_NEWTON_STEPS)
+        z = balanced(m, m.x, m.u, SIMULATION.start_newton_steps)
         start = ca.Function("start", [m.x, m.z, m.u, m.p, self.ambient], [z])
         return np.concatenate([x, start(x, m.z_scale, record.drive[0], p, self._ambients(record)[0]).full().ravel()])
 

@@ -22,12 +22,11 @@ from ctrlgen.diagnosis.hypotheses.hypotheses import (
     numbers,
     written,
 )
+from ctrlgen.diagnosis.settings import FIT
 from ctrlgen.effects import Param, Where
 from ctrlgen.model.assembly import channels
 from ctrlgen.model.model import movable
 from ctrlgen.recordings.recording import Recording
-
-FAR = 100.0  # standard deviations that a number may be off: the price of being off holds it, not a bound
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,9 @@ class Structure:
         for path, sd in nuisances(self.device).items():
             if path in acting and path not in causes:
                 q = sections[path][1]
-                rows.append(FreeParameter(path, written_unit(q.text), q.si, *_around(q.si, FAR * sd), sd, sd))
+                rows.append(
+                    FreeParameter(path, written_unit(q.text), q.si, *_around(q.si, FIT.nuisance_reach * sd), sd, sd)
+                )
         k = len(self.device.effect)
         for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
             if cause.effect == PARAMETER:
@@ -209,13 +210,17 @@ def _inside(value: float, p: Param, where: Where) -> float:
 
 def _around(value: float, reach: float) -> tuple[float, float]:
     """Bounds of an uncertain number, which does not change its sign."""
-    low, high = value - reach, value + reach
-    return (max(low, 1e-3 * value), high) if value > 0 else (low, min(high, 1e-3 * value)) if value < 0 else (low, high)
+    low, high, least = value - reach, value + reach, FIT.smallest_share * value
+    return (max(low, least), high) if value > 0 else (low, min(high, least)) if value < 0 else (low, high)
 
 
 def _reach(number: Quantity) -> tuple[float, float]:
     """How far a suspected number is looked for [SI]: a tenth to ten times of it, half a radian for an angle."""
-    span = (abs(number.si) or 1e-3) * 0.9 if written_unit(number.text) not in ("deg", "rad") else 0.5
+    span = (
+        (abs(number.si) or 1e-3) * FIT.suspected_reach
+        if written_unit(number.text) not in ("deg", "rad")
+        else FIT.suspected_angle
+    )
     return number.si - span, number.si + 10 * span
 
 

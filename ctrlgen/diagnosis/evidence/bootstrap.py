@@ -23,12 +23,8 @@ from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
 from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, Estimate
+from ctrlgen.diagnosis.settings import BOOTSTRAP
 from ctrlgen.recordings.recording import Record, Recording
-
-ENDS = (2.5, 97.5)  # per cent
-FEWEST = 20  # replicates that a 95 % interval needs at the least
-SHORTEST = 5  # blocks a record is made of, at the least
-LONGEST_LAG = 200
 
 Progress = Callable[[int, int], None]
 
@@ -119,11 +115,11 @@ def block_length(record: Record, predicted: np.ndarray) -> int:
     for i in range(predicted.shape[1]):
         e = np.where(record.valid[:, i], record.observed[:, i] - predicted[:, i], 0.0)
         e = e - e.mean()
-        lags = np.arange(1, min(LONGEST_LAG, n // 4) + 1)
+        lags = np.arange(1, min(BOOTSTRAP.longest_lag, n // 4) + 1)
         r = np.array([e[:-k] @ e[k:] for k in lags]) / max(float(e @ e), 1e-300)
-        loud = np.flatnonzero(np.abs(r) > 4.0 / np.sqrt(n))
+        loud = np.flatnonzero(np.abs(r) > BOOTSTRAP.correlated / np.sqrt(n))
         longest = max(longest, int(lags[loud[-1]]) if len(loud) else 1)
-    return int(np.clip(max(2 * longest, round(n ** (1 / 3))), 1, max(n // SHORTEST, 1)))
+    return int(np.clip(max(2 * longest, round(n ** (1 / 3))), 1, max(n // BOOTSTRAP.fewest_blocks, 1)))
 
 
 def bootstrap(
@@ -163,7 +159,7 @@ def _summary(
     for i, unknown in enumerate(structure.free_parameters):
         if not len(drawn):
             break
-        ends = np.percentile(drawn[:, i], ENDS)
+        ends = np.percentile(drawn[:, i], BOOTSTRAP.percentiles)
         shown = [float(from_si(v, unknown.unit)) for v in (theta[i], *ends)]
         values[unknown.path] = Estimate(shown[0], (shown[1], shown[2]), unknown.unit)
         if unknown.amplitude and unknown.cause is not None:
@@ -172,6 +168,10 @@ def _summary(
             gone = (v <= unknown.low + span) | (v >= unknown.high - span)
             gone |= np.sign(v - nominal) != np.sign(theta[i] - nominal)
             vanished[f"{cause.effect} at {cause.location}"] = float(np.mean(gone))
-    few = f"; fewer than {FEWEST} replicates are too few for 95 % intervals" if len(drawn) < FEWEST else ""
+    few = (
+        f"; fewer than {BOOTSTRAP.fewest_replicates} replicates are too few for 95 % intervals"
+        if len(drawn) < BOOTSTRAP.fewest_replicates
+        else ""
+    )
     note = f"residual blocks of {', '.join(map(str, sorted(set(blocks))))} samples, the structure held{few}"
     return Bootstrap(len(drawn), blocks, values, vanished, failed, note)

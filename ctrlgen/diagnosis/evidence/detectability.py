@@ -11,11 +11,8 @@ from dataclasses import dataclass
 from ctrlgen.core.units import difference, written_unit
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, numbers
-from ctrlgen.diagnosis.selection.model_selection import MATERIAL
 from ctrlgen.diagnosis.selection.screen import Screened
-
-ALIKE = 0.98  # |cos| from which two causes cannot be told apart
-MOST_ALIKE = 3
+from ctrlgen.diagnosis.settings import DETECTABILITY, MODEL_SELECTION
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
     Where `fit` leaves more than the noise, that counts as noise here.
     """
     louder = max(1.0, (fit.chi2 / max(n, 1)) ** 0.5)
-    need = max(screened.threshold, MATERIAL * n**0.5)
+    need = max(screened.threshold, MODEL_SELECTION.material_share * n**0.5)
     nominal = {path: number for path, _, number in numbers(fit.structure.device)}
     kinds: dict[str, dict[Hypothesis, tuple[float, float, str]]] = {}
     for suspect in screened.suspects:
@@ -93,7 +90,7 @@ def _smallest(
     others = sorted((s for s in screened.suspects if s.hypothesis != best), key=lambda s: -screened.alike(own, s))
     alike = tuple(
         (s.hypothesis.effect, s.hypothesis.location)
-        for s in others[:MOST_ALIKE] if screened.alike(own, s) >= ALIKE
+        for s in others[:DETECTABILITY.most_alike] if screened.alike(own, s) >= DETECTABILITY.alike
     )  # fmt: skip
     name = best.path.rpartition(".")[2] if kind == PARAMETER else best.law.amplitude().name
     everywhere = {h.location: screened.threshold * value for h, (value, *_) in places.items()}

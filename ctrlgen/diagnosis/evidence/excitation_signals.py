@@ -13,26 +13,8 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
+from ctrlgen.diagnosis.settings import EXCITATION
 from ctrlgen.recordings.recording import Record
-
-STRENGTHS = (
-    0.001,
-    0.002,
-    0.005,
-    0.01,
-    0.02,
-    0.05,
-    0.1,
-    0.2,
-    0.3,
-    0.4,
-    0.6,
-    0.8,
-    1.0,
-)  # of the range of the drives; the largest that keeps every limit
-SLACK = 1e-6  # of a limit's own size
-LINES = 15
-LEVELS = (0.0, 1.0, 0.0, -1.0, 0.0, 0.5, 0.0, -0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +30,19 @@ def shapes(n: int, n_u: int, rate: float, seed: int) -> Iterator[Shape]:
     """Series of `n` samples for `n_u` actuators; `rate` samples a second."""
     rng, s = np.random.default_rng(seed), np.arange(n) / n
     for kind, highest in (("slow multisine", 40), ("fast multisine", n // 10)):
-        harmonics = np.unique(np.geomspace(1, max(highest, 2), LINES).astype(int) // 2 * 2 + 1)
+        harmonics = np.unique(np.geomspace(1, max(highest, 2), EXCITATION.lines).astype(int) // 2 * 2 + 1)
         waves = np.cos(2 * np.pi * (np.multiply.outer(s, harmonics)[:, None] + rng.random((n_u, len(harmonics)))))
         values = waves.sum(axis=2)
         top = harmonics.max() * rate / n
         yield Shape(kind, f"{kind}, odd lines up to {top:.3g} Hz", values / np.abs(values).max())
     triangle = 1 - 2 * np.abs(2 * ((2 * s + 0.25) % 1) - 1)
     yield Shape("slow triangle", "two slow triangles, without rest", _together(triangle, n_u))
-    levels = np.array(LEVELS)[np.minimum((s * len(LEVELS)).astype(int), len(LEVELS) - 1)]
-    yield Shape("steps and rests", f"steps with rests of {n / len(LEVELS) / rate:.3g} s", _together(levels, n_u))
+    levels = np.array(EXCITATION.levels)[
+        np.minimum((s * len(EXCITATION.levels)).astype(int), len(EXCITATION.levels) - 1)
+    ]
+    yield Shape(
+        "steps and rests", f"steps with rests of {n / len(EXCITATION.levels) / rate:.3g} s", _together(levels, n_u)
+    )
     once = np.where((s >= 0.1) & (s < 0.5), 1.0, 0.0)
     yield Shape("on and off", "off, on for 40 % of the time, off for the rest", _together(once, n_u))
     square = np.where((8 * s) % 2 < 1, 1.0, -1.0)
@@ -97,10 +83,10 @@ def admissible(
     n = len(shape.values)
     h = template.sample_time if np.isfinite(template.sample_time) else 1.0
     one_sided, best = low >= 0, None
-    first_left, last_left = 0, len(STRENGTHS) - 1
+    first_left, last_left = 0, len(EXCITATION.strengths) - 1
     while first_left <= last_left:
         middle = (first_left + last_left + 1) // 2
-        half = STRENGTHS[middle] * np.where(one_sided, (high - low) / 2, np.minimum(high, -low))
+        half = EXCITATION.strengths[middle] * np.where(one_sided, (high - low) / 2, np.minimum(high, -low))
         centre = np.where(one_sided, low + half, 0.0)
         drive = np.clip(centre + half * shape.values, low, high)
         record = Record(
@@ -109,7 +95,7 @@ def admissible(
             np.ones((n, template.observed.shape[1]), bool),
         )  # fmt: skip
         if _kept(simulator, p, record):
-            best, first_left = (record, STRENGTHS[middle]), middle + 1
+            best, first_left = (record, EXCITATION.strengths[middle]), middle + 1
         else:
             last_left = middle - 1
     return best
@@ -131,8 +117,8 @@ def _kept(simulator: Simulator, p: np.ndarray, record: Record) -> bool:
         own = values[:, first : first + limit.expr.numel()]
         first += limit.expr.numel()
         size = max(abs(limit.lower or 0.0), abs(limit.upper or 0.0))
-        if limit.lower is not None and own.min() < limit.lower - SLACK * size:
+        if limit.lower is not None and own.min() < limit.lower - EXCITATION.limit_slack * size:
             return False
-        if limit.upper is not None and own.max() > limit.upper + SLACK * size:
+        if limit.upper is not None and own.max() > limit.upper + EXCITATION.limit_slack * size:
             return False
     return True

@@ -17,13 +17,8 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, poses, shapes
 from ctrlgen.diagnosis.selection.candidate_model import Search
+from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.recordings.recording import Record
-
-MOST_SAMPLES = 4000  # of a proposed series
-MOST_POSES = 100
-MOST_RIVALS = 2
-SUSPECTS = 2
-SETTLES = 3.0  # standard deviations that settle a doubt
 
 
 @dataclass(frozen=True)
@@ -51,7 +46,7 @@ class Experiment:
     @property
     def settles(self) -> bool:
         """Whether it would tell them apart."""
-        return self.after >= SETTLES
+        return self.after >= EXPERIMENT.settles
 
 
 def next_experiment(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> Experiment | None:
@@ -72,21 +67,26 @@ def _open(fitter: Fitter, search: Search, explained: bool) -> tuple[list[tuple[F
     rivals = sorted((t for rows in search.rivals for t in rows), key=lambda t: t.total)
     chosen = search.chosen.fit
     if rivals:
-        return [(chosen, t.fit) for t in rivals[:MOST_RIVALS]], "both explain this recording alike"
+        return [(chosen, t.fit) for t in rivals[: EXPERIMENT.most_rivals]], "both explain this recording alike"
     if explained or not search.rounds or search.rounds[-1].before.fit is not chosen:
         return [], ""
     tried: dict[str, Fit] = {}
     for trial in search.rounds[-1].trials:  # none of them was good enough
         tried.setdefault(trial.cause.effect, trial.fit)
-    fits = [*list(tried.values())[:SUSPECTS], chosen][:SUSPECTS]
-    return ([tuple(fits)] if len(fits) == SUSPECTS else []), "neither explains this recording; they come closest"
+    fits = [*list(tried.values())[: EXPERIMENT.suspects], chosen][: EXPERIMENT.suspects]
+    return (
+        [tuple(fits)] if len(fits) == EXPERIMENT.suspects else []
+    ), "neither explains this recording; they come closest"
 
 
 def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:
     """The drive of the family that best separates two fits."""
     template = max(fitter.fit_records, key=lambda r: len(r.time))
     settled = not np.isfinite(template.sample_time)
-    n, n_u = min(len(template.time), MOST_POSES if settled else MOST_SAMPLES), template.drive.shape[1]
+    n, n_u = (
+        min(len(template.time), EXPERIMENT.most_poses if settled else EXPERIMENT.most_samples),
+        template.drive.shape[1],
+    )
     family = poses(n, n_u, seed) if settled else shapes(n, n_u, 1 / template.sample_time, seed)
     first = 0.0 if settled else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
     simulator = a.structure.simulators(fitter.recording, fitter.cache)[template.sample_time, template.linear]

@@ -12,10 +12,10 @@ from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment
 from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
+from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.model.model import Model
 
 DRIVE, RECORDING, SCENARIO, COMMAND = "drive.csv", "recording.toml", "scenario.toml", "displacement.csv"
-FITTED = 0.6  # of the proposed record; the rest is held out
 
 
 def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
@@ -54,7 +54,7 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
     """A recording.toml that names the drive's columns and leaves the readings' to the reader."""
     recording, record, signal = fitter.recording, chosen.record, simulator.model.signals["drive"]
     n = len(record.drive)
-    cut = int(FITTED * n)
+    cut = int(EXPERIMENT.fitted_share * n)
     lines = [
         f"# {chosen.candidates[0].said}. Add the readings as columns of {DRIVE}, under the names below.",
         f"title  = {json.dumps(f'next experiment after: {recording.title}')}",

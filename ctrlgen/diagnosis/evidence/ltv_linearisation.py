@@ -18,11 +18,9 @@ from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
 from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_links
+from ctrlgen.diagnosis.settings import LTV_MODEL
 from ctrlgen.effects import Place
 from ctrlgen.recordings.recording import Record
-
-BLOCK = 5000  # samples linearised at a time
-STANDS = 1e-3  # of the fastest motion: below, a stage counts as standing
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +75,7 @@ class Along:
     def direction(self) -> np.ndarray:
         """Sign of the motion of each axis, (n, n_axes), 0 where it stands."""
         fastest = np.abs(self.velocity).max(axis=0)
-        return np.where(np.abs(self.velocity) > STANDS * fastest, np.sign(self.velocity), 0.0)
+        return np.where(np.abs(self.velocity) > LTV_MODEL.standing * fastest, np.sign(self.velocity), 0.0)
 
 
 def acts_at(links: Links) -> Place:
@@ -146,7 +144,10 @@ def _linearised(
 ) -> tuple[np.ndarray, ...]:
     """F_S, F_f, H_S, H_f along the motion."""
     linear, inputs = r.linearise(p, chosen), (before, *r._inputs(record))
-    parts = [linear.evaluate_along(*(x[a : a + BLOCK] for x in inputs)) for a in range(0, len(before), BLOCK)]
+    parts = [
+        linear.evaluate_along(*(x[a : a + LTV_MODEL.block] for x in inputs))
+        for a in range(0, len(before), LTV_MODEL.block)
+    ]
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
 
 

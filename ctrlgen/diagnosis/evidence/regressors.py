@@ -8,11 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
-
-PLAYS = (0.02, 0.05, 0.1, 0.2, 0.4)  # half widths, of the largest displacement
-STOPS = (0.4, 0.6, 0.8)  # of the largest displacement, where something one-sided may begin
-LAGS = 5  # relaxation times, logarithmic between four samples and a third of the record
-SOFT_SIGN = 0.02  # of the largest speed
+from ctrlgen.diagnosis.settings import REGRESSORS
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +30,7 @@ def sizes(to_fit: list[Along], axis: int) -> Sizes:
     )
     drives = np.max([np.abs(a.record.drive).max(axis=0) for a in to_fit], axis=0)
     h, longest = to_fit[0].record.sample_time, max(len(a.white) for a in to_fit)
-    lags = () if to_fit[0].settled else tuple(np.geomspace(4 * h, longest * h / 3, LAGS))
+    lags = () if to_fit[0].settled else tuple(np.geomspace(4 * h, longest * h / 3, REGRESSORS.lags))
     time = max(float(np.abs(a.record.time).max()) for a in to_fit)
     return Sizes(travel or 1.0, speed or 1.0, np.where(drives > 0, drives, 1.0), time or 1.0, lags)
 
@@ -43,8 +39,8 @@ def features(left: Along, axis: int, size: Sizes) -> dict[str, np.ndarray]:
     """Features (n,) by their formula, of order one. Separate poses have neither speed nor history."""
     d = left.displacement[:, axis] / size.travel
     found = {"1": np.ones_like(d), "d": d, "d^2": d**2, "d^3": d**3, "d^4": d**4, "d^5": d**5, "|d|": np.abs(d)}
-    found |= {f"max(d - {x:g}, 0)": np.maximum(d - x, 0) for x in STOPS}
-    found |= {f"min(d + {x:g}, 0)": np.minimum(d + x, 0) for x in STOPS}
+    found |= {f"max(d - {x:g}, 0)": np.maximum(d - x, 0) for x in REGRESSORS.stops}
+    found |= {f"min(d + {x:g}, 0)": np.minimum(d + x, 0) for x in REGRESSORS.stops}
     for k, u in enumerate((left.record.drive / size.drives).T):
         found |= {f"u{k + 1}": u, f"u{k + 1}^2": u**2, f"u{k + 1}^3": u**3}
     for k, other in enumerate(left.displacement.T / size.travel):
@@ -54,10 +50,10 @@ def features(left: Along, axis: int, size: Sizes) -> dict[str, np.ndarray]:
         return found
     v = left.velocity[:, axis] / size.speed
     found |= {"v": v, "v|v|": v * np.abs(v), "v^3": v**3, "d v": d * v, "d^2 v": d**2 * v, "|v|": np.abs(v)}
-    found["sign(v)"] = np.tanh(v / SOFT_SIGN)
+    found["sign(v)"] = np.tanh(v / REGRESSORS.soft_sign)
     found["|d| sign(v)"] = np.abs(d) * found["sign(v)"]
-    plays = play(d, np.array(PLAYS))
-    found |= {f"play(d, {r:g})": d - p for r, p in zip(PLAYS, plays.T, strict=True)}
+    plays = play(d, np.array(REGRESSORS.plays))
+    found |= {f"play(d, {r:g})": d - p for r, p in zip(REGRESSORS.plays, plays.T, strict=True)}
     for tau in size.lags:
         a = np.exp(-left.record.sample_time / tau)
         for name, x in (("d", d), ("d^2", d**2), ("u1^2", found["u1^2"])):

@@ -16,15 +16,7 @@ from scipy import signal, stats
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
 from ctrlgen.diagnosis.evidence.spectral_lines import Lines, lines
-
-BLOCKS = 60  # of the bootstrap, over all records
-DRAWS = 400
-BANDS, TIMES, REGIONS = 5, 10, 5
-FEWEST = 8  # samples in a cell that is reported
-ORDER = 5  # of the polynomial in position that is no dependence on direction
-SURE = 4.0  # standard deviations of the whole excess, below which there is nothing to place
-SEGMENTS = 8  # of a record, for the coherence
-STANDS_OUT = 0.1  # of the excess: by how much one kind of coordinate must explain it better than the other
+from ctrlgen.diagnosis.settings import LOCALISATION
 
 
 @dataclass(frozen=True)
@@ -111,7 +103,7 @@ def where(left: list[Along], channels: tuple[str, ...], units: tuple[str, ...], 
 
 
 def _quintiles(values: np.ndarray, unit: str) -> list[tuple[str, np.ndarray]]:
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, REGIONS + 1)))
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, LOCALISATION.regions + 1)))
     shown = difference(edges, unit)
     return [
         (f"{shown[k]:.4g} ... {shown[k + 1]:.4g} {unit}", (values >= edges[k]) & (values <= edges[k + 1]))
@@ -123,7 +115,7 @@ def _without_position(values: np.ndarray, d: np.ndarray, usable: np.ndarray) -> 
     """What is left when a smooth function of the position alone has taken its part: where the device went forward more
     often than back, that would look like a dependence on direction."""
     size = np.abs(d).max(initial=0.0) or 1.0
-    powers = np.vander(d / size, ORDER + 1)
+    powers = np.vander(d / size, LOCALISATION.position_degree + 1)
     return values - powers @ np.linalg.lstsq(powers[usable], values[usable], rcond=1e-10)[0]
 
 
@@ -166,13 +158,13 @@ class _Maps:
         """The size of each cell (label, mask), with intervals."""
         found = []
         weights = self.rng.multinomial(
-            self.block.max() + 1, np.ones(self.block.max() + 1) / (self.block.max() + 1), DRAWS
+            self.block.max() + 1, np.ones(self.block.max() + 1) / (self.block.max() + 1), LOCALISATION.draws
         )
         total = max(float(np.sum(white[usable] ** 2) - usable.sum()), 1e-300)
         for label, mask in cells:
             chosen = mask & usable
             n = int(chosen.sum())
-            if n < min(FEWEST, max(len(white) // 20, 2)):
+            if n < min(LOCALISATION.fewest_samples, max(len(white) // 20, 2)):
                 continue
             count, squares, sums = (
                 np.bincount(self.block[chosen], w, self.block.max() + 1)
@@ -197,7 +189,9 @@ class _Maps:
         cells, first = [], 0
         for a in self.left:
             n, t = len(a.white), a.record.time
-            for part in np.array_split(np.arange(n), TIMES if not a.settled else min(TIMES, max(n // 4, 1))):
+            for part in np.array_split(
+                np.arange(n), LOCALISATION.times if not a.settled else min(LOCALISATION.times, max(n // 4, 1))
+            ):
                 mask = np.zeros(self.n, bool)
                 mask[first + part] = True
                 unit = "" if a.settled else " s"
@@ -211,7 +205,7 @@ class _Maps:
         """In which coordinates the excess is sparser."""
         w, a, rows = self.white[self.complete], self.actuators_white[self.complete], self.along_each[self.complete]
         total = float(np.sum(w**2) - w.size)
-        if total < SURE * np.sqrt(2 * w.size):
+        if total < LOCALISATION.least_excess * np.sqrt(2 * w.size):
             return Coordinates({}, {}, "there is nothing left to place")
         alone = {
             kind: {name: float(x) for name, x in zip(names, np.clip((np.sum(v**2, axis=0) - len(w)) / total, 0, 1), strict=True)}
@@ -222,7 +216,7 @@ class _Maps:
         gap = best["actuator"] - best["reading"]
         if len(channels) == 1:
             lives = "one reading cannot tell"
-        elif abs(gap) < STANDS_OUT:
+        elif abs(gap) < LOCALISATION.stands_out:
             lives = "neither stands out"
         else:
             lives = "actuator" if gap > 0 else "reading"
@@ -231,7 +225,7 @@ class _Maps:
 
 def _blocks(lengths: list[int]) -> np.ndarray:
     """The block of the bootstrap that each sample is in; single poses where there are few."""
-    size = max(sum(lengths) // BLOCKS, 1)
+    size = max(sum(lengths) // LOCALISATION.blocks, 1)
     blocks, first = [], 0
     for n in lengths:
         own = np.arange(n) // size
@@ -274,18 +268,18 @@ def _bands(left: list[Along]) -> tuple[Band, ...]:
     if left[0].settled:
         return ()
     longest, fastest = max(a.record.sample_time * len(a.white) for a in left), min(a.record.sample_time for a in left)
-    edges = np.geomspace(1 / longest, 0.5 / fastest, BANDS + 1)
-    power, count = np.zeros(BANDS), np.zeros(BANDS)
+    edges = np.geomspace(1 / longest, 0.5 / fastest, LOCALISATION.bands + 1)
+    power, count = np.zeros(LOCALISATION.bands), np.zeros(LOCALISATION.bands)
     coherences = [_coherence(a, edges) for a in left]
     for a in left:
         f = np.fft.rfftfreq(len(a.white), a.record.sample_time)[1:]
         spectrum = np.abs(np.fft.rfft(a.white, axis=0)[1:]) ** 2 / np.maximum(a.usable.sum(axis=0), 1)
-        which = np.clip(np.searchsorted(edges, f * (1 + 1e-12), side="right") - 1, 0, BANDS - 1)
+        which = np.clip(np.searchsorted(edges, f * (1 + 1e-12), side="right") - 1, 0, LOCALISATION.bands - 1)
         for i in np.flatnonzero(a.usable.any(axis=0)):
-            power += np.bincount(which, spectrum[:, i], BANDS)
-            count += np.bincount(which, minlength=BANDS)
+            power += np.bincount(which, spectrum[:, i], LOCALISATION.bands)
+            count += np.bincount(which, minlength=LOCALISATION.bands)
     found = []
-    for k in range(BANDS):
+    for k in range(LOCALISATION.bands):
         if count[k] == 0:
             continue
         level, m = power[k] / count[k], 2 * count[k]
@@ -298,7 +292,7 @@ def _bands(left: list[Along]) -> tuple[Band, ...]:
 
 def _coherence(a: Along, edges: np.ndarray) -> tuple[list[float | None], float]:
     """Per band the largest coherence of a reading's residual with a drive, and what chance reaches with 5 %."""
-    segment = max(len(a.white) // SEGMENTS * 2, 8)
+    segment = max(len(a.white) // LOCALISATION.coherence_segments * 2, 8)
     averages = max(2 * len(a.white) // segment - 1, 2)
     best: list[float | None] = [None] * (len(edges) - 1)
     for i in range(a.white.shape[1]):

@@ -14,10 +14,7 @@ from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
 from ctrlgen.diagnosis.evidence.regressors import Sizes, features, sizes
-
-MOST_TERMS = 5
-WORTH = 0.01  # of the excess: a smaller term is not added
-ALREADY = 1e-6  # of a feature's squares left after projection: below, free numbers and earlier terms do as well
+from ctrlgen.diagnosis.settings import SPARSE_REGRESSION
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,7 @@ def empirical(fitter: Fitter, fit: Fit, left: list[Along], i: int) -> Empirical 
     delta = (into @ a / scale)[: len(fit.theta)]
     held = [_held(fitter, fit, h, _slopes(fitter, h, i, size)[0] @ a, delta) for h in left if h.record.role != "fit"]
     before, after = (sum(part) for part in zip(*held, strict=True))
-    if not (before > 0 and 1 - after / before > WORTH):
+    if not (before > 0 and 1 - after / before > SPARSE_REGRESSION.least_share):
         return None
     unit = left[0].units[i]
     terms = {name: float(difference(value, unit)) for name, value in zip(names, a, strict=True) if value}
@@ -76,12 +73,12 @@ def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n:
     size = np.sqrt(np.where(squares > 0, squares, 1.0))
     G, c = G / np.outer(size, size), c / size
     chosen: list[int] = []
-    explained, need = 0.0, max(12.0 + np.log(max(n, 2)), WORTH * excess)
-    while len(chosen) < MOST_TERMS:
+    explained, need = 0.0, max(SPARSE_REGRESSION.least_gain + np.log(max(n, 2)), SPARSE_REGRESSION.least_share * excess)
+    while len(chosen) < SPARSE_REGRESSION.most_terms:
         gains = np.full(len(c), -np.inf)
         for j in range(len(c)):
             trial = [*chosen, j]
-            if j not in chosen and np.linalg.eigvalsh(G[np.ix_(trial, trial)])[0] > ALREADY:
+            if j not in chosen and np.linalg.eigvalsh(G[np.ix_(trial, trial)])[0] > SPARSE_REGRESSION.own_share:
                 gains[j] = c[trial] @ np.linalg.solve(G[np.ix_(trial, trial)], c[trial]) - explained
         best = int(np.argmax(gains))
         if not gains[best] > need:

@@ -14,11 +14,8 @@ from scipy import stats
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.estimation.noise import drive_period
+from ctrlgen.diagnosis.settings import SPECTRAL_LINES
 from ctrlgen.recordings.recording import Record
-
-EXCITED = 1e-3  # of the drive's largest line: below, a line counts as not excited
-SURE = 1e-4  # p below which lines count as above the noise
-REACH = 3.0  # times the highest excited line, up to which answers are looked for
 
 
 @dataclass(frozen=True)
@@ -54,12 +51,12 @@ def lines(record: Record, i: int, channel: str, unit: str) -> Lines | None:
         return None
     harmonics = np.arange(1, drive.shape[0] + 1)
     largest = drive.max(axis=0, initial=0.0)
-    excited = np.any(drive > EXCITED * np.where(largest > 0, largest, np.inf), axis=1)
+    excited = np.any(drive > SPECTRAL_LINES.excited * np.where(largest > 0, largest, np.inf), axis=1)
     if not excited.any():
         return None
     mean = spectra.mean(axis=0)
     noise = np.sum(np.abs(spectra - mean) ** 2, axis=0) / (m - 1) / m  # variance of the mean, per line
-    near = harmonics <= REACH * harmonics[excited].max()
+    near = harmonics <= SPECTRAL_LINES.highest * harmonics[excited].max()
     kinds = {"odd": harmonics % 2 == 1, "even": harmonics % 2 == 0}
     levels, p = {}, {}
     for kind, mask in kinds.items():
@@ -85,7 +82,7 @@ def _p(mean: np.ndarray, noise: np.ndarray, m: int) -> float:
 
 
 def _said(p: dict[str, float | None], both: bool) -> str:
-    odd, even = (p[kind] is not None and p[kind] < SURE for kind in ("odd", "even"))
+    odd, even = (p[kind] is not None and p[kind] < SPECTRAL_LINES.answer_p for kind in ("odd", "even"))
     if not odd and not even:
         return "answers only where it is driven: what is missing is linear and fixed in time, or below the noise"
     if both:

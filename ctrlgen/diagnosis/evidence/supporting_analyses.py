@@ -16,7 +16,6 @@ from ctrlgen.diagnosis.evidence.unmodelled_dynamics import unknown
 from ctrlgen.diagnosis.selection.candidate_model import Round, Search, Trial
 
 NEXT_DEVICE = "../device.next.toml"  # from the folder of the next experiment
-REST = 1.1  # noise: what is left above it is looked into although causes were found
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
-
-SPEEDS = tuple(10.0 ** np.arange(-7, 0.1, 1.0))  # variance of f's change a sample, in squares of its own size
-POSE_SPEEDS = tuple(10.0 ** np.arange(-3, 1.1, 1.0))
-TRIED = 2000  # samples on which the speed is chosen
-LONGEST = 20_000  # samples of one record that are explained
-MISSING = 1e12  # variance of a missing sample, in those of a present one
+from ctrlgen.diagnosis.settings import UNKNOWN_INPUT
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +29,13 @@ class Free:
 def free(left: Along, noise: Noise, size: np.ndarray) -> Free:
     """The most likely disturbance of typical `size` (n_axes,) [SI] along one record."""
     problem = _Problem(left, noise, size)
-    speeds = POSE_SPEEDS if left.settled else SPEEDS
-    start = max(0, int(np.argmax(np.convolve(np.sum(left.white**2, axis=1), np.ones(TRIED))[: problem.n])) - TRIED)
-    likely = problem.likelihood(np.array(speeds), start, min(start + TRIED, problem.n))
+    speeds = UNKNOWN_INPUT.pose_random_walks if left.settled else UNKNOWN_INPUT.random_walks
+    start = max(
+        0,
+        int(np.argmax(np.convolve(np.sum(left.white**2, axis=1), np.ones(UNKNOWN_INPUT.tried_samples))[: problem.n]))
+        - UNKNOWN_INPUT.tried_samples,
+    )
+    likely = problem.likelihood(np.array(speeds), start, min(start + UNKNOWN_INPUT.tried_samples, problem.n))
     speed = speeds[int(np.argmax(likely))]
     f, sd = problem.smoothed(speed)
     return Free(left, f, sd, float(speed))
@@ -46,7 +45,7 @@ class _Problem:
     """The augmented linear system of one record, in numbers of order one."""
 
     def __init__(self, left: Along, noise: Noise, size: np.ndarray) -> None:
-        self.n = min(len(left.white), LONGEST)
+        self.n = min(len(left.white), UNKNOWN_INPUT.most_samples)
         self.m, self.k = left.F_S.shape[1], left.F_f.shape[2]
         self.left, self.size = left, size
         density = noise.sd / np.array([1 - min(np.sum(a), 0.99) for a in noise.ar])  # coloured noise counts as white of
@@ -67,7 +66,7 @@ class _Problem:
         return self.down[:, None] * A * self.up, H * self.up / self.sd[:, None]
 
     def _noise(self, k: int) -> np.ndarray:
-        return np.where(self.left.record.valid[k], 1.0, MISSING)
+        return np.where(self.left.record.valid[k], 1.0, UNKNOWN_INPUT.missing_variance)
 
     def _change(self, speed: float | np.ndarray) -> np.ndarray:
         Q = np.zeros((*np.shape(speed), self.m + self.k, self.m + self.k))

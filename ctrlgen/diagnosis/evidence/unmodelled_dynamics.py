@@ -11,15 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.estimation.fit import CI, Fit, Fitter
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
 from ctrlgen.diagnosis.evidence.residual_localisation import projected
 from ctrlgen.diagnosis.evidence.sparse_regression import Empirical, empirical
 from ctrlgen.diagnosis.evidence.unknown_input import Free, free
-
-BINS = 24
-FEWEST = 5  # samples in a bin that is shown
-MOST_AXES = 2  # for which a term is sought
+from ctrlgen.diagnosis.settings import MAPS, STATISTICS
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ def unknown(fitter: Fitter, fit: Fit, left: list[Along]) -> Unknown:
     axes, units = left[0].axes, left[0].units
     rms = {axis: float(difference(_rms(found, i), units[i])) for i, axis in enumerate(axes)}
     maps = {axis: _maps(found, i) for i, axis in enumerate(axes)}
-    loudest = sorted(range(len(axes)), key=lambda i: -_rms(found, i) / max(_sd(found, i), 1e-300))[:MOST_AXES]
+    loudest = sorted(range(len(axes)), key=lambda i: -_rms(found, i) / max(_sd(found, i), 1e-300))[: MAPS.most_axes]
     terms = [e for i in loudest if (e := empirical(fitter, fit, left, i)) is not None]
     best = max(terms, key=lambda e: e.held_out_gain, default=None)
     said = [_said(axis, maps[axis]) for axis in (axes[i] for i in loudest)]
@@ -95,21 +92,21 @@ def _maps(found: list[Free], i: int) -> tuple[Map, ...]:
     if all(values is not None for values in ambient):
         T = np.concatenate([values[: len(e.f)] for values, e in zip(ambient, found, strict=True)])
         rows += [("temperature", "K", T, everywhere)] if np.ptp(T) > 0 else []
-    return tuple(_map(name, u, x[mask], f[mask], sd[mask], unit) for name, u, x, mask in rows if mask.sum() > BINS)
+    return tuple(_map(name, u, x[mask], f[mask], sd[mask], unit) for name, u, x, mask in rows if mask.sum() > MAPS.bins)
 
 
 def _map(name: str, unit: str, x: np.ndarray, f: np.ndarray, sd: np.ndarray, value_unit: str) -> Map:
-    edges = np.linspace(x.min(), x.max(), BINS + 1)
-    which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
+    edges = np.linspace(x.min(), x.max(), MAPS.bins + 1)
+    which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, MAPS.bins - 1)
     at, mean, low, high, within = [], [], [], [], 0.0
-    for k in range(BINS):
+    for k in range(MAPS.bins):
         inside = which == k
         within += float(np.sum((f[inside] - f[inside].mean()) ** 2)) if inside.any() else 0.0
-        if inside.sum() < min(FEWEST, max(len(x) // BINS, 1)):
+        if inside.sum() < min(MAPS.fewest_samples, max(len(x) // MAPS.bins, 1)):
             continue
         m, s = float(f[inside].mean()), float(sd[inside].mean())  # neighbours' errors go together: no root of n
         at.append(float(difference(x[inside].mean(), unit)))
-        for values, value in ((mean, m), (low, m - CI * s), (high, m + CI * s)):
+        for values, value in ((mean, m), (low, m - STATISTICS.z_95 * s), (high, m + STATISTICS.z_95 * s)):
             values.append(float(difference(value, value_unit)))
     total = float(np.sum((f - f.mean()) ** 2))
     share = 1 - within / total if total else 0.0

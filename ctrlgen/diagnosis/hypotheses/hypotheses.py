@@ -12,6 +12,7 @@ from itertools import product
 from ctrlgen.core.units import Quantity, from_si
 from ctrlgen.devices import Device, Links
 from ctrlgen.devices.base import Section
+from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect, Param, Place, Where
 from ctrlgen.model.assembly import available, channels
 
@@ -20,7 +21,6 @@ DOMAIN = {
     Place.POSE: "mechanism", Place.SENSOR: "sensor",
 }  # fmt: skip
 PARAMETER = "parameter"
-HALF = 0.49  # of the sampling rate: frequencies beyond look like lower ones, and half of it like nothing or an offset
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Hypothesis:
             return low, max(low, min(high, self.highest))
         if p.unit == "s" and p.level and self.law.place is not Place.SENSOR:
             low = min(
-                high, max(low, HALF / self.highest)
+                high, max(low, CANDIDATE_TERMS.highest_frequency / self.highest)
             )  # within a sample a motion shows the middle of a change, not its length
         return low, high
 
@@ -122,7 +122,7 @@ def _of_law(
     if not law.needs <= there or (law.place is Place.HEAT and links.heat_signal is None):
         return
     domain = law.domain or DOMAIN[law.place]
-    highest = HALF / sample_time if sample_time else float("inf")
+    highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
     places = channels(links, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:

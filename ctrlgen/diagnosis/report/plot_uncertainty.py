@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.report.narrative import hypothesis_name, number
 from ctrlgen.diagnosis.selection.candidate_model import Round
-from ctrlgen.diagnosis.selection.diagnosis import CI, Diagnosis
-from ctrlgen.diagnosis.selection.search import RIVAL
+from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+from ctrlgen.diagnosis.settings import SEARCH, STATISTICS
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6
@@ -45,19 +45,19 @@ def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
 
 def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
     best = round_.trials[0].total
-    far = max(10 * RIVAL, *(t.total - best for t in round_.trials))
+    far = max(10 * SEARCH.rival_difference, *(t.total - best for t in round_.trials))
     for row, trial in enumerate(round_.trials):
         worse = trial.total - best
-        colour = FOUND if trial.cause in kept else ALIKE if worse < RIVAL else WORSE
+        colour = FOUND if trial.cause in kept else ALIKE if worse < SEARCH.rival_difference else WORSE
         panel.barh(row, worse, color=colour, height=0.6)
         panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)
         _beside(panel, worse, row, number(worse, 3) if row else "best")
     panel.set_yticks(range(len(round_.trials)), [hypothesis_name(t.cause) for t in round_.trials], fontsize=8)
     panel.invert_yaxis()
-    panel.set_xscale("symlog", linthresh=RIVAL)
+    panel.set_xscale("symlog", linthresh=SEARCH.rival_difference)
     panel.set_xlim(0, 30 * far)
     panel.set_xticks([0, *(10.0**k for k in range(1, int(np.log10(30 * far)) + 1))])
-    panel.axvline(RIVAL, color="#666666", lw=1, ls=":")
+    panel.axvline(SEARCH.rival_difference, color="#666666", lw=1, ls=":")
 
 
 def _beside(panel: Axes, x: float, y: float, text: str) -> None:
@@ -146,7 +146,7 @@ def _profile(panel: Axes, p: dict[str, Any]) -> None:
     fine = np.linspace(x[0], x[-1], 101)
     panel.plot(fine, np.interp(fine, x, root) ** 2, color=FOUND, lw=1.2)
     panel.plot(x, rise, "o", ms=3.5, color=FOUND)
-    panel.axhline(CI**2, color="#666666", lw=1, ls=":")
+    panel.axhline(STATISTICS.z_95**2, color="#666666", lw=1, ls=":")
     panel.axvspan(*p["ci95"], color=FOUND, alpha=0.12, lw=0)
     unit = "" if p["unit"] == "1" else f" [{p['unit']}]"
     panel.set_xlabel(f"{p['parameter']}{unit}")

@@ -11,8 +11,6 @@ from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screened
 
-CONFIRMED = 2.0  # z^2 that the held-out records must show of a cause at least
-
 
 @dataclass(frozen=True, eq=False)
 class Trial:

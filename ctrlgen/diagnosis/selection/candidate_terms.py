@@ -17,15 +17,13 @@ from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, Seen, nominal_links
+from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect, Place
 from ctrlgen.model.assembly import channels
 from ctrlgen.numerics.phi_functions import phis
 
 Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
 REACHED = ("channel", "travel", "travel/s")
-
-SMALL = 1e-6
-SETTLED_LAG = 1e9  # s: the lags of a settled pose have passed
 
 
 @dataclass(frozen=True)
@@ -190,14 +188,16 @@ class Laws:
             return []
         h = self.simulator.sample_time
         settled = not np.isfinite(h)
-        h = SETTLED_LAG if settled else h
+        h = CANDIDATE_TERMS.settled_time if settled else h
         memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)
         A = ca.jacobian(rates, memory)
         if not ca.symvar(A):
             step = h * ca.DM(phis(h * ca.DM(A).full(), 1)[1]) @ rates
         elif A.sparsity().is_diag():
             own = h * ca.diag(A)
-            step = h * rates * ca.if_else(ca.fabs(own) > SMALL, ca.expm1(own) / own, 1 + own / 2)
+            step = (
+                h * rates * ca.if_else(ca.fabs(own) > CANDIDATE_TERMS.small_exponent, ca.expm1(own) / own, 1 + own / 2)
+            )
         else:
             step = h * rates
         return [

@@ -14,11 +14,10 @@ from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_links
 from ctrlgen.diagnosis.selection.diagnosis import Finding
 from ctrlgen.diagnosis.selection.direct_detection import named
+from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Effect, Place, Where
 from ctrlgen.model.assembly import channels
 from ctrlgen.recordings.recording import Recording
-
-SURELY = 0.01  # of a channel's typical size: what the device would move it by, if it is called dead
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +57,7 @@ def alive(device: Device, recording: Recording) -> Alive:
         moves = f"the device as described moves it by {way * difference(1.0, unit):.3g} {unit}"
         said.append(f"{name}: reads {show(level, unit)} throughout, {moves}; it is left out of every fit.")
         where = places.get(name)
-        if where is not None and way > SURELY * where.scale:
+        if where is not None and way > DIRECT_DETECTION.dead_motion * where.scale:
             findings += [named(law, where, read) for law, read in _laws(where, values[i])]
     return Alive(
         _only(recording, [i for i in range(len(recording.channels)) if i not in dead]), tuple(findings), tuple(said)

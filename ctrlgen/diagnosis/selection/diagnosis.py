@@ -11,21 +11,18 @@ from scipy import stats
 
 from ctrlgen.core.units import difference, from_si, to_si
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.fit import CI, Fit, Fitter
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.diagnosis.estimation.profile_likelihood import Profile
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, written
-from ctrlgen.diagnosis.selection.candidate_model import CONFIRMED, Search
+from ctrlgen.diagnosis.selection.candidate_model import Search
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, STATISTICS, VERDICT
 from ctrlgen.recordings.recording import Recording
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
-LITTLE = 0.05  # of the mismatch: a law is right to that where it does not say how rough it is
-IMPOSSIBLE = 1e-6  # p of the device's own numbers so far off by chance
-FAR_OFF = 2.0  # stated deviations: numbers that are named where they are so far off together
-CHANCE = 4.0  # standard deviations of the noise's own squares
 
 
 @dataclass(frozen=True)
@@ -138,16 +135,16 @@ def verdict(fitter: Fitter, search: Search, after: ResidualTests, seen: bool = F
 
 
 def excluded(fit: Fit) -> dict[str, float]:
-    """The device's uncertain numbers, by path, that stand more than `FAR_OFF` stated deviations off, in deviations; empty
+    """The device's uncertain numbers, by path, that stand more than `VERDICT.named_deviation` stated deviations off, in deviations; empty
     where all of them together are as far off as chance puts them."""
     off = {
         u.path: float((value - u.nominal) / u.sd)
         for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)
         if u.sd
     }
-    if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > IMPOSSIBLE:
+    if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > VERDICT.impossible_p:
         return {}
-    least = min(FAR_OFF, max(map(abs, off.values())))
+    least = min(VERDICT.named_deviation, max(map(abs, off.values())))
     return {path: z for path, z in off.items() if abs(z) >= least}
 
 
@@ -157,7 +154,7 @@ def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
     return tuple(
         cause
         for cause, bare in zip(chosen.fit.structure.causes, search.bare, strict=True)
-        if bare.held - chosen.held < CONFIRMED
+        if bare.held - chosen.held < MODEL_SELECTION.least_confirmed
         and bare.fit.penalty - chosen.fit.penalty < 0.5 * (bare.fit.objective - chosen.fit.objective)
     )
 
@@ -166,18 +163,19 @@ def loose(fitter: Fitter, search: Search) -> bool:
     """Whether the held-out records are foreseen worse than before, beyond chance, though the causes may be right: by the
     numbers as fitted, not as far as those are known."""
     worse = fitter.held_out_squares(search.chosen.fit) - fitter.held_out_squares(search.nominal.fit)
-    return worse > CHANCE * np.sqrt(2 * _n_held(fitter))
+    return worse > STATISTICS.chance_excess * np.sqrt(2 * _n_held(fitter))
 
 
 def tolerated(search: Search) -> float:
     """The share of the mismatch that the chosen causes may leave: what the form of the roughest of their laws may."""
     causes = search.chosen.fit.structure.causes
-    return max([LITTLE, *(c.law.rough for c in causes if c.effect != PARAMETER)])
+    return max([VERDICT.model_form_error, *(c.law.rough for c in causes if c.effect != PARAMETER)])
 
 
 def remaining(fitter: Fitter, search: Search) -> float:
     """What the chosen causes leave beyond the noise, as a share of what the device as described leaves, both root mean
-    square; the larger one of the records to fit and of those held out. By as much as `CHANCE` the noise itself may differ."""
+    square; the larger one of the records to fit and of those held out. An excess below `STATISTICS.chance_excess`
+    standard deviations of chi-square counts as noise."""
     n_held = _n_held(fitter)
     after, before = search.chosen, search.nominal
     shares = [0.0]
@@ -185,7 +183,7 @@ def remaining(fitter: Fitter, search: Search) -> float:
         (after.fit.objective, before.fit.objective, after.fit.n),
         (after.held, before.held, n_held),
     ):
-        if left - n > CHANCE * np.sqrt(2 * n):
+        if left - n > STATISTICS.chance_excess * np.sqrt(2 * n):
             shares.append(float(np.sqrt((left - n) / max(all_ - n, left - n))))
     return max(shares)
 
@@ -221,7 +219,7 @@ def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
         if unknown.amplitude and cause.effect != PARAMETER:
             s = np.hypot(s, cause.law.rough * (value - unknown.nominal))
-        ends = (value, max(value - CI * s, unknown.low), min(value + CI * s, unknown.high))
+        ends = (value, max(value - STATISTICS.z_95 * s, unknown.low), min(value + STATISTICS.z_95 * s, unknown.high))
         value, low, high = (float(from_si(v, unknown.unit)) for v in ends)
         if unknown.path in profiled:
             below, above = profiled[unknown.path].ci95

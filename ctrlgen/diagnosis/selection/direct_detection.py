@@ -12,10 +12,9 @@ from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_links
 from ctrlgen.diagnosis.selection.candidate_model import Search
 from ctrlgen.diagnosis.selection.diagnosis import Estimate, Finding
+from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Effect, Place, Where
 from ctrlgen.model.assembly import channels
-
-NOTICED = 0.5  # of the noise, root mean square
 
 
 def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
@@ -35,7 +34,7 @@ def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
             seen = law.read_off(values) if law.place is Place.SENSOR and law.fits(where) else None
             if (
                 seen is None
-                or seen[1] < NOTICED * fitter.noise.floor[i]
+                or seen[1] < DIRECT_DETECTION.noticed * fitter.noise.floor[i]
                 or {(law.kind, where.channel), (law.kind, "all")} & known
             ):
                 continue

@@ -9,11 +9,9 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.settings import LINE_RESOLVABILITY
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
-
-APART = 0.5  # periods by which two lines must part over what the records to fit cover: nearer, they only beat as one
-STEPS = 3.0  # of a lattice of readings: a shorter period is that of their rounding
 
 
 def resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()) -> bool:
@@ -29,7 +27,7 @@ def resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()
         if a in accepted and b in accepted:
             continue
         lines = [_line(fit, i) for i in (j, k)]
-        if abs(lines[0] - lines[1]) * _covered(recording, a) < APART:
+        if abs(lines[0] - lines[1]) * _covered(recording, a) < LINE_RESOLVABILITY.apart:
             return False
     return True
 
@@ -44,7 +42,7 @@ def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> bool:
     values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
     read, *_ = cause.law.read_off(values) or ({},)
     steps = (p.name for p in cause.law.params if p.off is None and (p.seen == "pitches" or p.name in read))
-    return any(fit.values(k)[name] < STEPS * quantisation_step(values) for name in steps)
+    return any(fit.values(k)[name] < LINE_RESOLVABILITY.shortest_period * quantisation_step(values) for name in steps)
 
 
 def _line(fit: Fit, k: int) -> float:

@@ -10,21 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import CI, Fit, Fitter
-from ctrlgen.diagnosis.estimation.residual_tests import RATIO
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CONFIRMED, Trial, cooled
+from ctrlgen.diagnosis.selection.candidate_model import Trial, cooled
 from ctrlgen.diagnosis.selection.line_resolvability import resolved
 from ctrlgen.diagnosis.selection.screen import Screened
-
-MATERIAL = 0.1  # of the noise, root mean square on the records to fit: smaller causes are not named
-DEAR = 16.0  # squared deviations of the device's numbers, beyond what their count explains, that make them suspicious
-WORTHWHILE = 0.05  # of the held-out excess over the noise: what a further cause must take away
-MOSTLY = 0.9  # of the mismatch: where causes take it away, a series' others are sought one or two at a time
-SLACK = 0.01  # of what a structure leaves beyond the noise: smaller differences do not choose among causes
-FORM = 0.25  # the same for the held-out records, where either explains all of the records to fit
-VAGUE = 5.0  # times as much may be the form of another law where a cause may as well be nothing
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, RESIDUAL_TESTS, STATISTICS
 
 
 class Weighing:
@@ -53,8 +45,14 @@ class Weighing:
         c_held = max(best.held / max(self.n_held, 1), 1.0)
         gained = (b.fit.objective - a.fit.objective) / c_fit + (b.held - a.held) / c_held + b.price - a.price
         met = a.fit.is_noise and b.fit.is_noise and self.fitter.noise.known.all()
-        slack = FORM if met else SLACK  # alike on the records to fit, and neither law is right
-        return gained - SLACK * self.n_fit * (1 - 1 / c_fit) - slack * self.n_held * (1 - 1 / c_held)
+        slack = (
+            MODEL_SELECTION.held_out_slack if met else MODEL_SELECTION.excess_slack
+        )  # alike on the records to fit, and neither law is right
+        return (
+            gained
+            - MODEL_SELECTION.excess_slack * self.n_fit * (1 - 1 / c_fit)
+            - slack * self.n_held * (1 - 1 / c_held)
+        )
 
     def plainest(self, better: list[Trial]) -> Trial:
         """The best trial, or one of as few numbers that is no worse beyond the slack and is less rare."""
@@ -68,12 +66,14 @@ class Weighing:
     @staticmethod
     def hides(fit: Fit) -> bool:
         """Whether the device's own numbers stand so far off that they may hide a cause, at a price."""
-        return fit.penalty > DEAR + 2 * len(fit.structure.free_parameters)
+        return fit.penalty > MODEL_SELECTION.hidden_penalty + 2 * len(fit.structure.free_parameters)
 
     def need(self, current: Trial, screened: Screened) -> float:
         """The z^2 that a cause must show: of its own size in the readings, or of the price at which the device hides it."""
         return (
-            screened.threshold**2 if self.hides(current.fit) else max(screened.threshold**2, MATERIAL**2 * self.n_fit)
+            screened.threshold**2
+            if self.hides(current.fit)
+            else max(screened.threshold**2, MODEL_SELECTION.material_share**2 * self.n_fit)
         )
 
     def meant(self, trial: Trial, accepted: tuple[Hypothesis, ...] = ()) -> bool:
@@ -107,18 +107,29 @@ class Weighing:
         """
         gained, confirmed = before.fit.objective - after.fit.objective, before.held - after.held
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
-        needed = 12.0 + added * np.log(max(self.n_fit, 2))
-        if before.fit.penalty - after.fit.penalty > 0.5 * gained:  # the device hid it at a price: it shows nowhere else
-            return gained > needed and confirmed > -4.0
-        if self.out_of_reach(before) and gained > MOSTLY * (before.fit.objective - self.n_fit) and confirmed > -4.0:
+        needed = MODEL_SELECTION.least_gain + added * np.log(max(self.n_fit, 2))
+        if (
+            before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gained
+        ):  # the device hid it at a price: it shows nowhere else
+            return gained > needed and confirmed > -MODEL_SELECTION.largest_contradiction
+        if (
+            self.out_of_reach(before)
+            and gained > MODEL_SELECTION.most_of_mismatch * (before.fit.objective - self.n_fit)
+            and confirmed > -MODEL_SELECTION.largest_contradiction
+        ):
             return gained > needed
-        if gained + min(confirmed, gained) <= needed + CONFIRMED or gained <= MATERIAL**2 * self.n_fit:
+        if (
+            gained + min(confirmed, gained) <= needed + MODEL_SELECTION.least_confirmed
+            or gained <= MODEL_SELECTION.material_share**2 * self.n_fit
+        ):
             return False
-        return confirmed > max(CONFIRMED, WORTHWHILE * max(before.held - self.n_held, 0.0))
+        return confirmed > max(
+            MODEL_SELECTION.least_confirmed, MODEL_SELECTION.worthwhile_share * max(before.held - self.n_held, 0.0)
+        )
 
     def out_of_reach(self, trial: Trial) -> bool:
         """Whether the records to fit show, by the gate of adequacy, what the held-out ones do not."""
-        most = RATIO**2 - 1
+        most = RESIDUAL_TESTS.error_ratio**2 - 1
         return trial.fit.objective - self.n_fit > most * self.n_fit and trial.held - self.n_held < most * self.n_held
 
     def doubtful(self, bare: Trial, current: Trial, k: int) -> bool:
@@ -129,10 +140,12 @@ class Weighing:
         own = [i for i, u in enumerate(fit.structure.free_parameters) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
         vague = bool(own) and all(
-            abs(fit.theta[i] - fit.structure.free_parameters[i].nominal) < CI * sd[i] for i in own
+            abs(fit.theta[i] - fit.structure.free_parameters[i].nominal) < STATISTICS.z_95 * sd[i] for i in own
         )
         lost = max(bare.held - current.held, 0.0) * max(bare.fit.objective - current.fit.objective, 0.0)
-        return self._may_be_form(lost, bare, VAGUE if vague else 1.0)  # beside k another may take a cause's place
+        return self._may_be_form(
+            lost, bare, MODEL_SELECTION.vague_factor if vague else 1.0
+        )  # beside k another may take a cause's place
 
     def of_form(self, current: Trial) -> bool:
         """Whether all that is left is no more than the form of a cause's law may leave: what would be found in it, would be

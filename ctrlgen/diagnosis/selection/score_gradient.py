@@ -17,12 +17,10 @@ from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
 from ctrlgen.diagnosis.selection.candidate_terms import Column, Laws
 from ctrlgen.diagnosis.selection.ltv_propagation import Spread
+from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
 from ctrlgen.numerics.batched_evaluation import evaluate
 from ctrlgen.recordings.recording import Record
-
-BLOCK = 500  # samples worked on at a time: what belongs to them stays in the cache
-LOST = 1e100
 
 
 @dataclass(eq=False)
@@ -118,7 +116,7 @@ class Slopes:
         before = np.vstack([r._start(record, self.p, start), after[:-1]])
         inputs = (before, *r._inputs(record))
         seen = (before if series else after, record.drive, inputs[3], after)
-        size = min(BLOCK, n)
+        size = min(CANDIDATE_TERMS.block, n)
         laws = self.laws.compiled(self.p).mapaccum(size + 1)
         memory = self.laws.start(record.time[0])
         for a in range(0, n, size):
@@ -129,7 +127,7 @@ class Slopes:
             if a + k == n:
                 found[k:] = found[k - 1]
             found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])
-            lost |= ~np.all(np.abs(found) < LOST, axis=0)
+            lost |= ~np.all(np.abs(found) < CANDIDATE_TERMS.diverged, axis=0)
             found[:, lost] = 0.0  # memories that have left the numbers say nothing
             f, following = found[:k], found[1 : k + 1].copy() if series else found[:k]
             following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])

@@ -23,16 +23,9 @@ from ctrlgen.diagnosis.selection.candidate_terms import Column, Peaks, peaks
 from ctrlgen.diagnosis.selection.score_gradient import Slopes, Sums
 from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
 from ctrlgen.diagnosis.selection.subset_search import Suspect, Together
+from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import channels
-
-ALIKE = 1e-6  # of the largest: free directions with smaller slopes are taken as one with the others
-OWN_LEFT = 1e-10  # of |s|^2: below, the hypothesis cannot be told from what is free already
-LINES = 3  # of the spectrum of what is left, tried as frequencies
-PARTS = 12  # of the records' time: an event is tried in the middle of each
-ZEROS = 8  # padding of that spectrum
-OTHERS = 8  # shapes of a law beside the best, in which it may be begun again
-NULLS = 2000  # simulated records without mismatch
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +99,8 @@ class Screen:
         series, records = self.fitter.recording.kind == "series", self.fitter.fit_records
         ends = [(r.time[0], r.time[-1]) if series else (0.0, float(len(r.time))) for r in records] or [(0.0, 1.0)]
         begin, end = min(a for a, _ in ends), max(b for _, b in ends)
-        part = (end - begin) / PARTS
-        return tuple(begin + (k + 0.5) * part for k in range(PARTS)), part
+        part = (end - begin) / SCREEN.event_times
+        return tuple(begin + (k + 0.5) * part for k in range(SCREEN.event_times)), part
 
     def _lines(self, fit: Fit) -> tuple[float, ...]:
         """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
@@ -118,10 +111,10 @@ class Screen:
         begin = sum(r.valid.size for r in records[:k])
         left = fit.residual[begin : begin + records[k].valid.size].reshape(records[k].valid.shape)
         window = np.hanning(len(left))[:, None]
-        power = np.sum(np.abs(np.fft.rfft(left * window, n=ZEROS * len(left), axis=0)) ** 2, axis=1)
-        peaks, _ = find_peaks(power, distance=4 * ZEROS)
-        best = peaks[np.argsort(-power[peaks])[:LINES]]
-        return tuple(float(f) for f in np.sort(best) / (ZEROS * len(left) * records[k].sample_time))
+        power = np.sum(np.abs(np.fft.rfft(left * window, n=SCREEN.spectrum_padding * len(left), axis=0)) ** 2, axis=1)
+        peaks, _ = find_peaks(power, distance=4 * SCREEN.spectrum_padding)
+        best = peaks[np.argsort(-power[peaks])[: SCREEN.most_lines]]
+        return tuple(float(f) for f in np.sort(best) / (SCREEN.spectrum_padding * len(left) * records[k].sample_time))
 
     def _along_path(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
         """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does, and the
@@ -149,7 +142,7 @@ class Screen:
         own = norm - np.sum(sums.US**2, axis=0)
         score = sums.Sr - gradient @ sums.US
         left = np.where(norm > 0, own / np.where(norm > 0, norm, 1.0), 0.0)
-        seen = np.flatnonzero((left > OWN_LEFT) & (norm > 0) & np.isfinite(norm))
+        seen = np.flatnonzero((left > SCREEN.own_share) & (norm > 0) & np.isfinite(norm))
         gram = sums.SS - sums.US.T @ sums.US
         d = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         cosine = np.clip(gram / np.outer(d, d), -1, 1)
@@ -164,7 +157,7 @@ class Screen:
         order = [js[0] for js in ranked.values()]
         suspect = {j: self._suspect(columns[j], z[j], score[j] / own[j], left[j], j) for j in map(int, seen)}
         suspects = tuple(
-            replace(suspect[j], others=tuple(suspect[i].start for i in others[:OTHERS]))
+            replace(suspect[j], others=tuple(suspect[i].start for i in others[: SCREEN.most_other_starts]))
             for j, *others in ranked.values()
         )
         sds = {
@@ -192,8 +185,8 @@ class Screen:
             return np.inf
         values, vectors = np.linalg.eigh(cosine)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        draws = np.random.default_rng(self.seed).standard_normal((NULLS, len(cosine)))
-        return float(np.quantile(np.abs(draws @ root.T).max(axis=1), 0.99))
+        draws = np.random.default_rng(self.seed).standard_normal((SCREEN.null_draws, len(cosine)))
+        return float(np.quantile(np.abs(draws @ root.T).max(axis=1), SCREEN.false_alarm_quantile))
 
 
 def _read_truly(fit: Fit) -> Fit:
@@ -211,5 +204,5 @@ def _directions(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     scale = np.linalg.norm(J, axis=0)
     scale[scale == 0] = 1.0
     U, s, V = np.linalg.svd(J / scale, full_matrices=False)
-    kept = s > ALIKE * s.max(initial=0.0)
+    kept = s > SCREEN.free_direction * s.max(initial=0.0)
     return U[:, kept], scale[:, None] * (V.T * s)[:, kept]

@@ -16,20 +16,9 @@ from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import Round, Search, Trial, cooled, freed, warm
-from ctrlgen.diagnosis.selection.model_selection import MOSTLY, Weighing
+from ctrlgen.diagnosis.selection.model_selection import Weighing
 from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
-
-MOST_CAUSES = {"poses": 24, "series": 8}
-LEARNINGS = 8  # of the noise from what is left, at most
-SAME_NOISE = 0.05  # of itself: a noise that changes by less shows nothing new
-TRIALS = 6  # suspects fitted a round, and as many sets of each size; three times as many where fits are cheap (poses)
-TRIAL_STEPS = 8
-ENDED = 2  # trials a round that are fitted to the end although they look useless: corners and moments need many steps
-RIVAL = 9.0  # difference of T below which two structures explain alike (three standard deviations)
-ABLE = 0.5  # of what a cause takes away: what its rival must promise; shapes between the grid's points lose that much
-REPLACEMENTS = 6  # rivals fitted for a cause
-NEARLY = 0.9  # of what the best cause takes away: what takes so much is fitted to its end before both are compared
-CLOSE = 0.25  # of the largest z^2: suspects below are not tried, unless nothing else is
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 
 
 class Searcher:
@@ -41,13 +30,13 @@ class Searcher:
         self.known: dict[frozenset, tuple[Trial, int]] = {}
         self.screens: dict[frozenset, tuple[Fit, Screened]] = {}
         self.mismatch = np.inf  # objective of the described device beyond the noise
-        self.trials = TRIALS * (3 if fitter.recording.kind == "poses" else 1)
+        self.trials = SEARCH.trials * (SEARCH.cheap_factor if fitter.recording.kind == "poses" else 1)
 
     def trial(
         self,
         structure: Structure,
         cause: Hypothesis | None = None,
-        steps: int = TRIAL_STEPS,
+        steps: int = SEARCH.trial_steps,
         nested: Fit | None = None,
     ) -> Trial:
         """Fits one structure, which contains that of `nested`, and judges it on the held-out records; not again where it was
@@ -69,7 +58,7 @@ class Searcher:
         described = self.fitter.fit_described(structure.device)
         current, rounds = self._measured(self.trial(cooled(described), steps=40)), []
         self.mismatch = current.fit.objective - self.weigh.n_fit
-        for _ in range(LEARNINGS):
+        for _ in range(SEARCH.most_noise_updates):
             current = self._rounds(current, rounds)
             before = self.fitter.noise
             if self.fitter.recording.kind == "series":
@@ -79,7 +68,7 @@ class Searcher:
             self.known.clear()
             self.screens.clear()
             current = self._prune(self._polished(current))
-            if np.allclose(self.fitter.noise.floor, before.floor, rtol=SAME_NOISE):
+            if np.allclose(self.fitter.noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
         current = self._prune(self._polished(current))
         nominal = self.trial(structure, steps=40)
@@ -94,9 +83,9 @@ class Searcher:
         while True:
             self.step(f"screening, {len(current.fit.structure.causes)} causes so far")
             screened = self._screened(current)
-            if len(current.fit.structure.causes) >= MOST_CAUSES[self.fitter.recording.kind] or self.weigh.of_form(
-                current
-            ):
+            if len(current.fit.structure.causes) >= SEARCH.most_causes[
+                self.fitter.recording.kind
+            ] or self.weigh.of_form(current):
                 return current
             trials = self._try(current.fit, self._conspicuous(current, screened))
             if self.weigh.hides(current.fit):
@@ -110,7 +99,9 @@ class Searcher:
             best, n = self._best(current, better, screened), len(current.fit.structure.causes)
             current = self._prune(self._swap(best, n))
             key = frozenset(current.fit.structure.causes)
-            if current.fit.objective > visited.get(key, np.inf) - RIVAL:  # no better than when it was there before
+            if (
+                current.fit.objective > visited.get(key, np.inf) - SEARCH.rival_difference
+            ):  # no better than when it was there before
                 return current
             current = self._measured(self._polished(current))
             visited[key] = current.fit.objective
@@ -138,19 +129,19 @@ class Searcher:
             starts = [*starts, *({**start, size: structure.starts[k][size]} for start in starts)]
             if starts:
                 starts = [structure.restarted(k, start) for start in starts]
-                again = self.fitter.fit(min(starts, key=self.fitter.initial_objective), steps=TRIAL_STEPS)
+                again = self.fitter.fit(min(starts, key=self.fitter.initial_objective), steps=SEARCH.trial_steps)
                 if again.objective < trial.fit.objective:
                     trial = self._polished(self.weigh.judged(again, trial.cause))
         return trial
 
     def _near(self, without: float, best: Trial, others: list[Trial]) -> list[Trial]:
         """The first of those that take away nearly as much of an objective as the best one."""
-        least = NEARLY * (without - best.fit.objective)
-        return [t for t in others if without - t.fit.objective >= least][:ENDED]
+        least = SEARCH.nearly_best * (without - best.fit.objective)
+        return [t for t in others if without - t.fit.objective >= least][: SEARCH.finished_trials]
 
     def _ended(self, current: Trial, trials: tuple[Trial, ...]) -> tuple[Trial, ...]:
         """The trials, those driven to their end that leave least on the records to fit but are not justified so early."""
-        best = sorted(trials, key=lambda t: t.fit.objective)[:ENDED]
+        best = sorted(trials, key=lambda t: t.fit.objective)[: SEARCH.finished_trials]
         early = [t for t in best if t.fit.objective < current.fit.objective and not self.weigh.justified(current, t)]
         return tuple(self._polished(t) if t in early else t for t in trials)
 
@@ -158,7 +149,7 @@ class Searcher:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""
         if self.fitter.noise.known.all():
             return trial
-        for _ in range(LEARNINGS):  # the numbers move as the noise that holds them shrinks
+        for _ in range(SEARCH.most_noise_updates):  # the numbers move as the noise that holds them shrinks
             before = self.fitter.noise.sd
             self.fitter.noise = update_noise_size(self.fitter, trial.fit)
             self.known.clear()
@@ -176,7 +167,11 @@ class Searcher:
         chosen: list[Suspect] = []
         for s in loud:
             same = sum(c.hypothesis.effect == s.hypothesis.effect for c in chosen)
-            if s.z**2 >= CLOSE * loud[0].z ** 2 and same < self.trials // 3 and len(chosen) < self.trials:
+            if (
+                s.z**2 >= SEARCH.smallest_score * loud[0].z ** 2
+                and same < self.trials // 3
+                and len(chosen) < self.trials
+            ):
                 chosen.append(s)
         return chosen
 
@@ -206,7 +201,11 @@ class Searcher:
         best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
         excess, trials = current.fit.objective - self.weigh.n_fit, []
         for size in (2, 3, 4):
-            if size > 2 and excess - best < (1 - MOSTLY) * self.mismatch and self.fitter.recording.kind == "series":
+            if (
+                size > 2
+                and excess - best < (1 - MODEL_SELECTION.most_of_mismatch) * self.mismatch
+                and self.fitter.recording.kind == "series"
+            ):
                 break
             tried, used = 0, {}
             enough = best + max(self.weigh.need(current, screened), 0.05 * (excess - best))
@@ -235,7 +234,7 @@ class Searcher:
             for rival in self._replacements(current, k):
                 plainer = len(rival.fit.structure.free_parameters) < len(current.fit.structure.free_parameters)
                 ahead = current.total - rival.total if plainer else self.weigh.ahead(rival, current)
-                if ahead > RIVAL and self.weigh.meant(rival, current.fit.structure.causes):
+                if ahead > SEARCH.rival_difference and self.weigh.meant(rival, current.fit.structure.causes):
                     current = rival
         return current
 
@@ -250,10 +249,10 @@ class Searcher:
         able = [
             s
             for s in self._loud(screened, self.weigh.need(current, screened))
-            if s.z**2 > ABLE * gained and s.hypothesis != structure.causes[k]
+            if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
         ]
         trials = []
-        for s in able[:REPLACEMENTS]:
+        for s in able[: SEARCH.most_rivals]:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
             trials += self._attempt(self._in_place(current.fit, k, others, s), s.hypothesis)
         near = self._near(without, current, sorted(trials, key=lambda t: t.total))
@@ -289,7 +288,11 @@ class Searcher:
         """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude."""
         there, special = current.fit.structure.causes, current.fit.nested_case(k)
         alike = [t for t in self._replacements(current, k) if not _same(t.cause, there[k])]
-        alike = [t for t in alike if t.total < current.total + RIVAL or (special and t.cause.effect == special)]
+        alike = [
+            t
+            for t in alike
+            if t.total < current.total + SEARCH.rival_difference or (special and t.cause.effect == special)
+        ]
         return tuple(t for t in alike if self.weigh.meant(t, there))
 
 

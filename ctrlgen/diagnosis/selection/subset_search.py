@@ -7,12 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-
-TOO_ALIKE = 0.04  # of a slope left beside the others of a set, below which amplitudes mean nothing
-BEAM = 200  # sets kept at each size
-LARGEST_SET = 4
-RIDGE = 1e-9  # keeps sets of two slopes that are all but one solvable
-LOOSE = 0.35  # how far beyond its bounds a linear estimate of an amplitude may lie, relative
+from ctrlgen.diagnosis.settings import SUBSETS
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class Together:
         """Sets of every size from two, those whose amplitudes make sense, the best first."""
         beam: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
         found = []
-        for size in range(1, LARGEST_SET + 1):
+        for size in range(1, SUBSETS.largest + 1):
             beam = self._grown(beam)
             if size > 1:
                 sets = [(gain, self._amplitudes(members), members) for gain, members in beam]
@@ -62,14 +57,14 @@ class Together:
         for member, (gain, members) in enumerate(beam):
             K = list(members)
             if K:
-                W = np.linalg.solve(self.C[np.ix_(K, K)] + RIDGE * np.eye(len(K)), self.C[K])
+                W = np.linalg.solve(self.C[np.ix_(K, K)] + SUBSETS.ridge * np.eye(len(K)), self.C[K])
                 rest = 1 - np.einsum("kj,kj->j", self.C[K], W)
                 score = self.z - W.T @ self.z[K]
             else:
                 rest, score = np.ones(len(self.z)), self.z
-            more = np.where(rest > TOO_ALIKE, score**2 / np.maximum(rest, TOO_ALIKE), 0.0)
+            more = np.where(rest > SUBSETS.own_share, score**2 / np.maximum(rest, SUBSETS.own_share), 0.0)
             more[np.isin(self.group, self.group[K])] = 0.0
-            best = np.argsort(-more)[:BEAM]
+            best = np.argsort(-more)[: SUBSETS.beam]
             best = best[more[best] > 0]
             gains.append(gain + more[best])
             places += [(member, int(j)) for j in best]
@@ -79,19 +74,23 @@ class Together:
             member, j = places[i]
             members = (*beam[member][1], j)
             grown.setdefault(frozenset(self.group[list(members)]), (float(joined[i]), members))
-            if len(grown) == BEAM:
+            if len(grown) == SUBSETS.beam:
                 break
         return list(grown.values())
 
     def _amplitudes(self, members: tuple[int, ...]) -> np.ndarray:
         K = list(members)
-        return np.linalg.solve(self.C[np.ix_(K, K)] + RIDGE * np.eye(len(K)), self.z[K]) / self.root[K]
+        return np.linalg.solve(self.C[np.ix_(K, K)] + SUBSETS.ridge * np.eye(len(K)), self.z[K]) / self.root[K]
 
     def _sensible(self, members: tuple[int, ...], b: np.ndarray) -> bool:
         """Whether amplitudes are about inside their bounds, and in the range that the effect expects."""
         for k, value in zip(members, b, strict=True):
             low, high = self.columns[k].range
-            if not low - LOOSE * (high - low) * (low < 0) <= value <= high + LOOSE * (high - low):
+            if (
+                not low - SUBSETS.bound_margin * (high - low) * (low < 0)
+                <= value
+                <= high + SUBSETS.bound_margin * (high - low)
+            ):
                 return False
         return True
 

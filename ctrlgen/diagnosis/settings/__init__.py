@@ -1,0 +1,77 @@
+"""Every threshold, size and count of the diagnosis, with its unit, its meaning and the reason for its value.
+
+One frozen record a step; one file a package of `ctrlgen.diagnosis`. "Judgement" marks a value that no derivation fixes: it
+was chosen on simulated recordings whose causes are known, and another value of the same order would serve too.
+"""
+
+from ctrlgen.diagnosis.settings.estimation import (
+    FIT,
+    HELD_OUT_REFIT,
+    NOISE,
+    NOISE_UPDATE,
+    OUTLIERS,
+    PROFILE,
+    RESIDUAL_NOISE,
+    RESIDUAL_TESTS,
+    ROBUST_COVARIANCE,
+    SIMULATION,
+    STATISTICS,
+)
+from ctrlgen.diagnosis.settings.evidence import (
+    BOOTSTRAP,
+    DETECTABILITY,
+    EXCITATION,
+    EXPERIMENT,
+    LOCALISATION,
+    LTV_MODEL,
+    MAPS,
+    REGRESSORS,
+    SPARSE_REGRESSION,
+    SPECTRAL_LINES,
+    UNKNOWN_INPUT,
+)
+from ctrlgen.diagnosis.settings.selection import (
+    CANDIDATE_TERMS,
+    DIRECT_DETECTION,
+    LINE_RESOLVABILITY,
+    MODEL_SELECTION,
+    SCREEN,
+    SEARCH,
+    SPATIAL_PERIODS,
+    SUBSETS,
+    VERDICT,
+)
+
+__all__ = [
+    "BOOTSTRAP",
+    "CANDIDATE_TERMS",
+    "DETECTABILITY",
+    "DIRECT_DETECTION",
+    "EXCITATION",
+    "EXPERIMENT",
+    "FIT",
+    "HELD_OUT_REFIT",
+    "LINE_RESOLVABILITY",
+    "LOCALISATION",
+    "LTV_MODEL",
+    "MAPS",
+    "MODEL_SELECTION",
+    "NOISE",
+    "NOISE_UPDATE",
+    "OUTLIERS",
+    "PROFILE",
+    "REGRESSORS",
+    "RESIDUAL_NOISE",
+    "RESIDUAL_TESTS",
+    "ROBUST_COVARIANCE",
+    "SCREEN",
+    "SEARCH",
+    "SIMULATION",
+    "SPARSE_REGRESSION",
+    "SPATIAL_PERIODS",
+    "SPECTRAL_LINES",
+    "STATISTICS",
+    "SUBSETS",
+    "UNKNOWN_INPUT",
+    "VERDICT",
+]

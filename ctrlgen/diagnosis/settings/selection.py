@@ -1,0 +1,197 @@
+"""Settings of `ctrlgen.diagnosis.selection` and `hypotheses`: screen, search, model selection, verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class CandidateTermsSettings:
+    """Candidate terms propagated along the motion of the current model, and their score."""
+
+    highest_frequency: float = 0.49
+    """Highest frequency of a candidate, as a share of the sampling rate: beyond one half it looks like a lower one, and
+    at one half like nothing or an offset."""
+    small_exponent: float = 1e-6
+    """|x| below which (exp(x) - 1)/x is taken as 1 + x/2: the error x^2/6 is below rounding."""
+    settled_time: float = 1e9
+    """Sample time [s] of a settled pose: every lag has passed."""
+    block: int = 500
+    """Samples that are propagated at a time: their sensitivities stay in the processor's cache."""
+    diverged: float = 1e100
+    """Magnitude of a state above which a candidate has diverged and is left out."""
+
+
+@dataclass(frozen=True)
+class ScreenSettings:
+    """Score tests of all hypotheses."""
+
+    free_direction: float = 1e-6
+    """Singular value over the largest one, below which a direction of the free parameters is dependent on the others."""
+    own_share: float = 1e-10
+    """Share of a score's squares outside of the span of the free parameters, below which it cannot be told from them:
+    rounding leaves that much."""
+    false_alarm_quantile: float = 0.99
+    """Quantile of the largest |z| among simulated records without mismatch that is the screen's threshold: one false
+    alarm in a hundred rounds."""
+    null_draws: int = 2000
+    """Simulated records without mismatch: 20 of them lie above the threshold, which is so known to 22 % of its p."""
+    most_lines: int = 3
+    """Peaks of the residual's spectrum that are tried as frequencies of a candidate. Judgement."""
+    spectrum_padding: int = 8
+    """Zero padding of that spectrum: a peak is then within 1/16 of a bin."""
+    event_times: int = 12
+    """Equal parts of the records' time; an event is tried in the middle of each. Judgement: the fit refines it."""
+    most_other_starts: int = 8
+    """Further values of a candidate's shape parameters, beside the best, from which it may be fitted again. Judgement."""
+
+
+@dataclass(frozen=True)
+class SpatialPeriodSettings:
+    """Periods and jumps of the residual along a path."""
+
+    cells: int = 2**14
+    """Equal cells into which the range of the path is divided."""
+    finest_cells: int = 4
+    """Cells of the shortest period: two are needed by the sampling theorem."""
+    padding: int = 4
+    """Zero padding of the spectrum along the path: a period is then right to 1/16 of a cycle over the whole path."""
+    fewest_cycles: int = 20
+    """Cycles within the path of the longest period; longer ones are among the start values of the laws."""
+    same_period: float = 1e-4
+    """Relative difference below which two periods are one."""
+    false_alarm_p: float = 1e-4
+    """p of a peak so high anywhere in a spectrum without periods."""
+    most: int = 3
+    """Periods, and jumps, that are tried. Judgement."""
+    jump_cells: int = 512
+    """Equal cells of the path in which jumps are sought. Judgement."""
+    jump_side: int = 16
+    """Cells on either side of a place whose means are compared. Judgement."""
+
+
+@dataclass(frozen=True)
+class SubsetSettings:
+    """Sets of candidates that are tried together."""
+
+    largest: int = 4
+    """Candidates of the largest set."""
+    beam: int = 200
+    """Sets kept at each size."""
+    own_share: float = 0.04
+    """Share of a score's squares that must be left beside the others of its set: below, |cos| exceeds 0.98 and the
+    amplitudes are arbitrary."""
+    ridge: float = 1e-9
+    """Added to the diagonal of the correlation matrix, so that sets of two dependent scores can be solved."""
+    bound_margin: float = 0.35
+    """How far beyond its bounds a linear estimate of an amplitude may lie, relative to their distance. The estimate is
+    taken at zero amplitude, where the law may be bent. Judgement."""
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Forward-backward search with swaps."""
+
+    most_causes: dict[str, int] = field(default_factory=lambda: {"poses": 24, "series": 8})
+    """Causes of a model at most, by kind of recording. Poses have many independent offsets. Judgement."""
+    most_noise_updates: int = 8
+    """Updates of the noise from the residual at most."""
+    same_noise: float = 0.05
+    """Relative change of the noise below which it counts as unchanged."""
+    trials: int = 6
+    """Single candidates fitted a round, and as many sets of each size."""
+    cheap_factor: int = 3
+    """Times as many for settled poses, whose fits are cheap."""
+    trial_steps: int = 8
+    """Levenberg-Marquardt steps of a trial. The ones that matter are fitted to the end later."""
+    finished_trials: int = 2
+    """Trials a round that are fitted to the end although they look useless: laws with corners and moments of events need
+    many steps."""
+    rival_difference: float = 9.0
+    """Difference of the total criterion below which two models explain alike: three standard deviations."""
+    rival_share: float = 0.5
+    """Share of what a cause explains that a rival must promise by its score to be fitted: shape parameters between the
+    start values lose so much."""
+    most_rivals: int = 6
+    """Rivals fitted for a cause."""
+    nearly_best: float = 0.9
+    """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
+    smallest_score: float = 0.25
+    """Share of the largest z^2 below which candidates are not tried, unless nothing else is."""
+
+
+@dataclass(frozen=True)
+class ModelSelectionSettings:
+    """Comparison of two candidate models, and what a further cause must show."""
+
+    least_gain: float = 12.0
+    """Decrease of the objective that a further cause must bring beside the price of its parameters. Chi-square with one
+    degree of freedom exceeds it with p = 5e-4, for the cause was chosen among many."""
+    least_confirmed: float = 2.0
+    """z^2 by which the held-out records must confirm a cause, at least."""
+    largest_contradiction: float = 4.0
+    """z^2 by which the held-out records may contradict a cause that they cannot show: two standard deviations."""
+    hidden_share: float = 0.5
+    """Share of the decrease that comes from the stated numbers' penalty, above which the device hid the cause."""
+    material_share: float = 0.1
+    """Root mean square of a cause's effect on the records to fit, over the noise; smaller causes are not named. Design
+    goal."""
+    hidden_penalty: float = 16.0
+    """Penalty of the device's stated numbers, beyond twice their count, that makes them suspect of hiding a cause: one
+    number four standard deviations off."""
+    worthwhile_share: float = 0.05
+    """Share of the held-out excess over the noise that a further cause must explain. Judgement."""
+    most_of_mismatch: float = 0.9
+    """Share of the mismatch: a cause that explains so much of the records to fit need not be confirmed by held-out
+    records that do not show it; and where accepted causes explain so much, only singles and pairs are searched (time
+    series). Judgement."""
+    excess_slack: float = 0.01
+    """Share of the excess over the noise, below which a difference of two models does not choose between them."""
+    held_out_slack: float = 0.25
+    """The same for the held-out records, where both models explain the records to fit: neither law is right there.
+    Judgement."""
+    vague_factor: float = 5.0
+    """Factor on the model-form error of the other laws, for a cause whose amplitude may be zero. Judgement."""
+
+
+@dataclass(frozen=True)
+class LineResolvabilitySettings:
+    """Whether two lines, or a line and the rounding of the readings, can be told apart."""
+
+    apart: float = 0.5
+    """Cycles by which two lines must part within the records to fit: nearer, they beat as one."""
+    shortest_period: float = 3.0
+    """Shortest period along a reading, in its quantisation steps: a shorter one is that of the rounding."""
+
+
+@dataclass(frozen=True)
+class DirectDetectionSettings:
+    """Causes read directly from the readings: dead channels, quantisation."""
+
+    noticed: float = 0.5
+    """Root mean square of the effect over the noise, from which it is reported."""
+    dead_motion: float = 0.01
+    """Motion predicted at a constant channel, over the channel's typical size, above which the channel is called dead."""
+
+
+@dataclass(frozen=True)
+class VerdictSettings:
+    """The verdict."""
+
+    model_form_error: float = 0.05
+    """Share of the mismatch that a law may leave, where it states no model-form error of its own. Judgement."""
+    impossible_p: float = 1e-6
+    """p of the device's stated numbers so far off by chance, below which they contradict the data sheet."""
+    named_deviation: float = 2.0
+    """Stated standard deviations from which on such a number is named."""
+
+
+CANDIDATE_TERMS = CandidateTermsSettings()
+SCREEN = ScreenSettings()
+SPATIAL_PERIODS = SpatialPeriodSettings()
+SUBSETS = SubsetSettings()
+SEARCH = SearchSettings()
+MODEL_SELECTION = ModelSelectionSettings()
+LINE_RESOLVABILITY = LineResolvabilitySettings()
+DIRECT_DETECTION = DirectDetectionSettings()
+VERDICT = VerdictSettings()
