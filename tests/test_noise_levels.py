@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.estimation.noise import coloured, estimate, ljung_box
+from ctrlgen.diagnosis.estimation.noise import estimate_noise, ljung_box, stationary_deviation
 from ctrlgen.recordings.recording import Record, Recording
 
 SIGMAS = 4.0  # once in 16 000
@@ -47,7 +47,7 @@ def test_a_record_at_rest_tells_colour_and_level_of_every_sensor(ar, h, rng):
     """Of three sensors, one a thousand times as loud; whatever the rate."""
     n, sds = 20000, (3e-9, 3e-6, 5e-8)
     y = np.column_stack([noise(rng, n, sd, ar) for sd in sds])
-    found = estimate(recording(record(y, "rest", h=h)), SETTLING)
+    found = estimate_noise(recording(record(y, "rest", h=h)), SETTLING)
     assert found.sd == pytest.approx(np.array(sds), rel=SIGMAS / np.sqrt(2 * n))
     for sd, coefficients, floor in zip(sds, found.ar, found.floor, strict=True):
         assert len(coefficients) >= len(ar)
@@ -56,7 +56,7 @@ def test_a_record_at_rest_tells_colour_and_level_of_every_sensor(ar, h, rng):
         longer = (1 + np.sum(np.abs(ar))) / (
             1 - min(np.sum(np.abs(ar)), 0.9)
         )  # correlated samples tell less of the level
-        assert floor == pytest.approx(coloured(sd, np.array(ar)), rel=SIGMAS * np.sqrt(longer / (2 * n)))
+        assert floor == pytest.approx(stationary_deviation(sd, np.array(ar)), rel=SIGMAS * np.sqrt(longer / (2 * n)))
     assert found.known.all() and not found.guessed.any() and found.count == pytest.approx(n)
 
 
@@ -65,7 +65,7 @@ def test_a_record_at_rest_tells_colour_and_level_of_every_sensor(ar, h, rng):
 )
 def test_the_level_of_coloured_noise_is_the_closed_form(ar, level):
     """Yule and Walker: 1/sqrt(1 - a^2), and sqrt((1 - b)/((1 + b)((1 - b)^2 - a^2))) of two coefficients a, b."""
-    assert coloured(2.0, np.array(ar)) == pytest.approx(2.0 * level, rel=1e-9)
+    assert stationary_deviation(2.0, np.array(ar)) == pytest.approx(2.0 * level, rel=1e-9)
 
 
 @every_colour
@@ -75,9 +75,9 @@ def test_periods_that_repeat_tell_the_noise_beside_any_motion(ar, rng):
     drive = np.tile(moving(P), periods)
     motion = lfilter([0.05], [1.0, -0.95], 1e-6 * drive)
     motion[:P] *= 1.5  # the first one is on its way
-    found = estimate(recording(record(motion + noise(rng, P * periods, sd, ar), drive=drive)), SETTLING)
+    found = estimate_noise(recording(record(motion + noise(rng, P * periods, sd, ar), drive=drive)), SETTLING)
     n = (periods - 1) // 2 * P
-    assert "periods" in found.said[0] and found.count[0] == n
+    assert "periods" in found.notes[0] and found.count[0] == n
     assert found.sd[0] == pytest.approx(sd, rel=SIGMAS / np.sqrt(2 * n))
 
 
@@ -89,9 +89,9 @@ def test_dwells_tell_the_noise_once_the_stage_has_settled(ar, rng):
     t = np.arange(length)
     each = 1e-6 * np.exp(-t / 60) + 2e-7 * np.log1p(t / 4000)  # to e^-5 of it after the wait
     y = np.tile(np.where(t < wait, each, each - 1e-6 * np.exp(-t / 60)), 10)
-    found = estimate(recording(record(y + noise(rng, 10 * length, sd, ar), drive=drive, h=h)), wait * h)
+    found = estimate_noise(recording(record(y + noise(rng, 10 * length, sd, ar), drive=drive, h=h)), wait * h)
     n = 10 * (length - wait)
-    assert "dwells" in found.said[0] and found.count[0] == n
+    assert "dwells" in found.notes[0] and found.count[0] == n
     # A polynomial of fourth degree takes five of 1200 samples with it, more of what is slow
     assert found.sd[0] == pytest.approx(sd, rel=SIGMAS / np.sqrt(2 * n) + 5 / 1200)
 
@@ -101,7 +101,7 @@ def test_a_dwell_in_which_something_happened_is_left_out(loud, rng):
     drive = np.repeat(rng.uniform(-1, 1, 8), 1000)
     y = noise(rng, 8000, 1e-9)
     y[3000:4000] *= loud
-    found = estimate(recording(record(y, drive=drive)), SETTLING)
+    found = estimate_noise(recording(record(y, drive=drive)), SETTLING)
     assert found.sd[0] == pytest.approx(1e-9, rel=SIGMAS / np.sqrt(2 * 7000) + 5 / 1000)
 
 
@@ -111,7 +111,7 @@ def test_the_fastest_part_of_readings_that_never_rest_tells_white_noise(h, rng):
     n, sds = 40000, (3e-9, 7e-7)
     motion = 1e-5 * moving(n)[:, None]
     y = motion + np.column_stack([noise(rng, n, sd) for sd in sds])
-    found = estimate(recording(record(y, drive=moving(n), h=h)), SETTLING)
+    found = estimate_noise(recording(record(y, drive=moving(n), h=h)), SETTLING)
     assert found.guessed.all() and found.count == pytest.approx((n - 3) / 5)
     assert found.sd == pytest.approx(np.array(sds), rel=SIGMAS / np.sqrt(2 * n / 5))
 
@@ -130,14 +130,14 @@ def test_an_estimate_knows_how_well_it_is_known(source):
 
     def make(rng):
         if source == "rest":
-            return estimate(recording(record(noise(rng, n, 1.0), "rest")), SETTLING)
+            return estimate_noise(recording(record(noise(rng, n, 1.0), "rest")), SETTLING)
         if source == "periods":
             drive = np.tile(moving(200), 31)
-            return estimate(recording(record(noise(rng, len(drive), 1.0), drive=drive)), SETTLING)
+            return estimate_noise(recording(record(noise(rng, len(drive), 1.0), drive=drive)), SETTLING)
         if source == "dwells":
             drive = np.repeat(rng.uniform(-1, 1, 4), 1000)
-            return estimate(recording(record(noise(rng, len(drive), 1.0), drive=drive)), SETTLING)
-        return estimate(recording(record(noise(rng, n, 1.0), drive=moving(n))), SETTLING)
+            return estimate_noise(recording(record(noise(rng, len(drive), 1.0), drive=drive)), SETTLING)
+        return estimate_noise(recording(record(noise(rng, n, 1.0), drive=moving(n))), SETTLING)
 
     seen, said = scatter(make)
     assert 0.75 < seen / said < 1.25
@@ -146,10 +146,10 @@ def test_an_estimate_knows_how_well_it_is_known(source):
 def test_a_stated_deviation_stands_where_nothing_else_tells_and_yields_to_a_rest(rng):
     n = 4000
     y = 1e-6 * moving(n) + noise(rng, n, 2e-9)
-    one = estimate(recording(record(y, drive=moving(n)), stated=(5e-9,)), SETTLING)
+    one = estimate_noise(recording(record(y, drive=moving(n)), stated=(5e-9,)), SETTLING)
     assert one.sd[0] == 5e-9 and one.known[0] and not one.guessed[0]
     rest = record(noise(rng, n, 2e-9), "rest")
-    two = estimate(recording(record(y, drive=moving(n)), rest, stated=(5e-9,)), SETTLING)
+    two = estimate_noise(recording(record(y, drive=moving(n)), rest, stated=(5e-9,)), SETTLING)
     assert two.sd[0] == pytest.approx(2e-9, rel=SIGMAS / np.sqrt(2 * n))
 
 
@@ -160,7 +160,7 @@ def test_rounding_counts_where_it_is_larger_than_the_noise(steps, counts, rng):
     q = steps * sd
     rest = np.round(noise(rng, 6000, sd) / q) * q
     floor = np.std(rest)
-    found = estimate(recording(record(rest, "rest")), SETTLING)
+    found = estimate_noise(recording(record(rest, "rest")), SETTLING)
     wanted = np.hypot(floor, q / np.sqrt(12)) if counts else floor
     assert found.floor[0] == pytest.approx(wanted, rel=SIGMAS / np.sqrt(2 * 6000))
 
@@ -170,7 +170,7 @@ def test_poses_that_repeat_tell_the_noise_from_all_but_the_first_of_each(repeats
     places, sd = 40, 3e-8
     drive = np.tile(np.linspace(-1, 1, places), repeats)
     poses = record(1e-5 * drive**3 + noise(rng, len(drive), sd), drive=drive, h=np.inf)
-    found = estimate(recording(poses, kind="poses"), SETTLING)
+    found = estimate_noise(recording(poses, kind="poses"), SETTLING)
     n = places * (repeats - 1)
     assert found.count[0] == n and found.sd[0] == pytest.approx(sd, rel=SIGMAS / np.sqrt(2 * n))
 
@@ -179,7 +179,7 @@ def test_poses_that_repeat_tell_the_noise_from_all_but_the_first_of_each(repeats
 def test_whitened_noise_is_unit_white_noise_again(ar, rng):
     n = 20000
     y = noise(rng, n, 3e-9, ar)[:, None]
-    found = estimate(recording(record(y, "rest")), SETTLING)
+    found = estimate_noise(recording(record(y, "rest")), SETTLING)
     valid = np.ones_like(y, bool)
     valid[777] = False
     white, usable = found.whiten(y, valid), found.usable(valid)
