@@ -1,30 +1,36 @@
-"""Readings that lie on a lattice: what a converter, a counter or a printed number of few digits leaves."""
+"""The quantisation step of readings: what a converter, a counter or numbers printed with few digits leave."""
 
 from __future__ import annotations
 
 import numpy as np
 
-FEWEST = 200  # readings that a lattice is seen in
-OFF = 0.1  # of a step: how far a reading may lie from the lattice, for what was rounded again when it was written
+FEWEST = 200  # readings among which a common step is no coincidence
+OFF_STEP = 0.1  # of a step: how far a reading may lie from a multiple, because it was rounded again when it was written
+SAME_LEVEL = 1e-9  # of the largest reading: levels nearer than this differ by the rounding of the file
 
 
-def quantisation_step(values: np.ndarray) -> float:
-    """The step of which all differences of `values` are multiples; zero where there is none to be seen."""
+def quantisation_step(values: np.ndarray, fewest: int = FEWEST) -> float:
+    """The largest step of which all differences of `values` (n,) are multiples, in their unit; NaN are left out.
+
+    Zero where there is none: fewer than `fewest` values, or values off every common step by more than `OFF_STEP`.
+    """
     levels = np.unique(values[np.isfinite(values)])
-    if len(values) < FEWEST or len(levels) < 2:
+    if len(values) < fewest or len(levels) < 2:
         return 0.0
     gaps = np.diff(levels)
-    gaps = gaps[gaps > 1e-9 * np.abs(levels).max()]
+    gaps = gaps[gaps > SAME_LEVEL * np.abs(levels).max()]
     if not len(gaps):
         return 0.0
-    step, way = float(gaps.min()), levels - levels[0]
-    reach = max(step, way[1])
-    while True:  # the longer the way, the better known the step, and the farther it can be counted
-        near = way[way <= reach]
+    step, distance = float(gaps.min()), levels - levels[0]
+    reach = max(step, distance[1])
+    while (
+        True
+    ):  # a longer distance tells the step more precisely, and a preciser step can be counted over a longer distance
+        near = distance[distance <= reach]
         count = np.round(near / step)
-        if np.abs(near - count * step).max() > OFF * step:
+        if np.abs(near - count * step).max() > OFF_STEP * step:
             return 0.0
         step = float(near @ count / (count @ count))
-        if reach >= way[-1]:
+        if reach >= distance[-1]:
             return step
         reach *= 2

@@ -1,49 +1,71 @@
-"""Samples that must not count: spikes of the instrument and stretches where it stuck or clipped. Found, never filled."""
+"""Samples of one channel that must not count: isolated outliers, and stretches where the sensor stuck or clipped.
+
+They are found and marked, never replaced.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import scipy
 
-SPIKE = 8.0  # standard deviations of the local high-pass noise
-WIDEST = 3  # samples in a spike; what lasts longer may be motion
-WINDOW = 201  # samples over which noise is called local
-LEAST_AROUND = 5  # samples beside a spike, also where the record ends: two make a line, three tell whether it is one
+from ctrlgen.numerics.quantisation_step import quantisation_step
+
+THRESHOLD = 8.0  # local standard deviations of the deviation from the chord
+WIDEST = 3  # samples in an outlier; what lasts longer may be motion
+FEWEST = 50  # finite samples below which there is no local noise to compare with
+WINDOW = 201  # samples over which the noise counts as local
+SIDE = 4  # samples on either side that are compared with a straight line
+ON_LINE = 0.3  # of an outlier's size: how far those may lie from the line
+LEAST_AROUND = 5  # of them, also where the record ends: two make a line, three more tell whether it is one
 AFTER_JUMP = 10  # samples after a jump of the drive in which the device may do anything
+JUMP = 6.0  # robust standard deviations of the drive's steps; a larger step is a jump
+SMALLEST_JUMP = 0.01  # of the drive's range
+ROUNDING = 1e-9  # of a channel's range: smaller differences are rounding of the file or of a simulation
+MAD = 1.4826  # standard deviation over median absolute value, normal distribution
+
 STUCK = 8  # equal samples in a row
 RAIL_RUN = 5  # equal samples in a row at the end of the range
+MOVES = 0.05  # of the drive's range: it moves while the channel does not
+FEWEST_RESTING = 50  # pairs of samples that tell whether a channel is noisy
+STEPS_AT_SPEED = 10.0  # quantisation steps a sample: the channel is not slowing down
+RANGE_AT_SPEED = 1e-3  # of the range a sample, likewise
+FEWEST_STEPS = 20  # successive differences that tell how often the sign changes
+SIGN_CHANGES = 0.25  # share of successive differences that change sign: two thirds in white noise, few in motion
 
 
-def outliers(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
-    """Where one channel `observed` (n,) leaves for at most three samples and comes back: (n,) bool.
+def outliers(
+    values: np.ndarray, drive: np.ndarray | None = None, threshold: float = THRESHOLD, widest: int = WIDEST
+) -> np.ndarray:
+    """Where one channel `values` (n,) leaves for at most `widest` samples and comes back: (n,) bool.
 
-    A stretch of w = 1, 2 or 3 samples is a spike where every one of them stands off the chord between the samples
-    before and after it by more than 8 sigma, on one side, and the neighbours do not. sigma is the local median
-    absolute value of the same statistic (w = 1: half the second difference), hence right for coloured noise too.
-    Nothing next to a jump of the `drive` (n, n_u) is marked, nor what follows it within ten samples. NaN is no spike.
+    A stretch of w = 1 ... `widest` samples is an outlier where each of them lies off the chord between the samples before
+    and after the stretch by more than `threshold` sigma, all on one side, and the samples around continue on a straight
+    line. sigma is the local median absolute value of the same statistic (w = 1: half the second difference), so it holds
+    for coloured noise too. Nothing next to a jump of the `drive` (n, n_u) is marked, nor within ten samples after it: there
+    the device itself may move so. NaN is no outlier.
     """
-    n = len(observed)
+    n = len(values)
     marked = np.zeros(n, dtype=bool)
-    finite = np.isfinite(observed)
-    if finite.sum() < 50:  # no local noise to speak of
+    finite = np.isfinite(values)
+    if finite.sum() < FEWEST:
         return marked
-    y = np.interp(np.arange(n), np.flatnonzero(finite), observed[finite])  # for the statistic only
-    floor = quantum(y) / 2
-    moved = _near_jump(drive)
-    for width in range(1, WIDEST + 1):
+    y = np.interp(np.arange(n), np.flatnonzero(finite), values[finite])  # for the statistic only
+    floor = max(quantisation_step(values[finite], fewest=2), ROUNDING * np.ptp(y)) / 2
+    near_jump = marked.copy() if drive is None else _near_jump(drive)
+    for width in range(1, widest + 1):
         off = _off_chord(y, width)
-        sigma = 1.4826 * scipy.ndimage.median_filter(np.abs(off.mean(1)), min(WINDOW, len(off)), mode="reflect")
+        sigma = MAD * scipy.ndimage.median_filter(np.abs(off.mean(1)), min(WINDOW, len(off)), mode="reflect")
         size = np.abs(off).min(1)
         one_sided = np.abs(np.sign(off).sum(1)) == width
-        for start in np.flatnonzero(one_sided & (size > SPIKE * np.maximum(sigma, floor))) + 1:
-            block = slice(start, start + width)
-            if not moved[block].any() and finite[block].all() and _isolated(y, start, width, size[start - 1]):
-                marked[block] = True
+        for start in np.flatnonzero(one_sided & (size > threshold * np.maximum(sigma, floor))) + 1:
+            stretch = slice(start, start + width)
+            if not near_jump[stretch].any() and finite[stretch].all() and _isolated(y, start, width, size[start - 1]):
+                marked[stretch] = True
     return marked
 
 
 def _off_chord(y: np.ndarray, width: int) -> np.ndarray:
-    """Row k: samples k + 1 .. k + width minus the chord from k to k + width + 1, (m, width)."""
+    """Row k: samples k + 1 .. k + width minus the chord from sample k to sample k + width + 1, (m, width)."""
     m = len(y) - width - 1
     before, after = y[:m], y[width + 1 :]
     share = np.arange(1, width + 1) / (width + 1)
@@ -52,60 +74,52 @@ def _off_chord(y: np.ndarray, width: int) -> np.ndarray:
 
 
 def _isolated(y: np.ndarray, start: int, width: int, size: float) -> bool:
-    """Whether the signal goes on after the stretch as it came: a step does not, nor does ringing. One sample around, not
-    beside it, may be another spike."""
-    around = np.r_[max(start - 4, 0) : start, start + width : min(start + width + 4, len(y))]
-    apart = around[(around < start - 1) | (around > start + width)]
-    return any(_straight(y, around[around != other], start, 0.3 * size) for other in (-1, *apart))
+    """Whether the signal goes on after the stretch as it came, which it does not after a step nor while ringing.
+
+    One of the samples around, not adjacent to the stretch, may be another outlier and is left out.
+    """
+    around = np.r_[max(start - SIDE, 0) : start, start + width : min(start + width + SIDE, len(y))]
+    not_adjacent = around[(around < start - 1) | (around > start + width)]
+    return any(_straight(y, around[around != other], start, ON_LINE * size) for other in (-1, *not_adjacent))
 
 
-def _straight(y: np.ndarray, at: np.ndarray, start: int, within: float) -> bool:
-    """Whether the samples `at` lie on one line."""
-    if len(at) < LEAST_AROUND:
+def _straight(y: np.ndarray, samples: np.ndarray, start: int, within: float) -> bool:
+    """Whether enough `samples` are given and all lie `within` a straight line."""
+    if len(samples) < LEAST_AROUND:
         return False
-    line = np.polyfit(at - start, y[at], 1)
-    return bool(np.abs(y[at] - np.polyval(line, at - start)).max() < within)
+    line = np.polyfit(samples - start, y[samples], 1)
+    return bool(np.abs(y[samples] - np.polyval(line, samples - start)).max() < within)
 
 
 def _near_jump(drive: np.ndarray) -> np.ndarray:
-    """(n,) bool: one sample before a jump of any drive to ten after it."""
+    """(n,) bool: from one sample before a jump of any drive to ten samples after it."""
     step = np.abs(np.diff(drive, axis=0, prepend=drive[:1]))
-    usual = 6 * 1.4826 * np.median(step, axis=0)
-    jump = (step > np.maximum(usual, 0.01 * np.ptp(drive, axis=0)) * (1 + 1e-9)).any(1)
+    usual = JUMP * MAD * np.median(step, axis=0)
+    jump = (step > np.maximum(usual, SMALLEST_JUMP * np.ptp(drive, axis=0)) * (1 + 1e-9)).any(1)
     near = np.convolve(jump, np.ones(AFTER_JUMP + 2), "full")[1 : len(jump) + 1]
     return near > 0
-
-
-def quantum(y: np.ndarray) -> float:
-    """The smallest step between samples that occurs, but rounding; 0 where nothing moves."""
-    step = np.abs(np.diff(y))
-    step = step[step > 1e-9 * np.ptp(y)] if len(step) else step
-    return float(step.min()) if len(step) else 0.0
 
 
 def stuck_samples(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
     """Where one channel `observed` (n,) repeats itself to the last bit although it should not: (n,) bool.
 
-    A stretch of eight equal samples or more counts where the channel is seen to be noisy with the drive at rest, or,
-    no rest being there to tell, where the drive (n, n_u) moves meanwhile and the channel repeats itself nowhere else.
-    At the end of the channel's range five suffice where the channel is noisy otherwise, or ran into the end at speed while
-    the drive moved: clipping.
-    Coarsely quantised channels at rest, and stages held by friction, repeat themselves rightly and are left alone.
+    A stretch of eight equal samples or more counts where the channel is known to be noisy while the drive rests, or,
+    where the drive never rests, where the drive (n, n_u) moves meanwhile and the channel repeats itself nowhere else.
+    At the end of the channel's range five samples suffice where the channel is noisy otherwise, or where it ran into the
+    end at speed while the drive moved: it is clipped.
+    Coarsely quantised channels at rest, and stages held by friction, repeat themselves rightly and are not marked.
     """
     marked = np.zeros(len(observed), dtype=bool)
     runs = [(a, b) for a, b in _runs(observed) if b - a >= RAIL_RUN]
     if not runs or np.nanmin(observed) == np.nanmax(observed):
         return marked
-    noisy = _noisy(observed, drive, runs)
+    at_rest, elsewhere, alternates = _noisiness(observed, drive, runs)
     span, ends = np.ptp(drive, axis=0), (np.nanmin(observed), np.nanmax(observed))
     for a, b in runs:
-        moves = bool(
-            (np.ptp(drive[a : (a + b) // 2], axis=0) > 0.05 * span)[span > 0].any()
-        )  # the end may be dead time
-        frozen = b - a >= STUCK and (noisy["rest"] or (noisy["rest"] is None and moves and noisy["elsewhere"]))
-        clipped = observed[a] in ends and (
-            (moves and _at_speed(observed, a, b)) or (noisy["elsewhere"] and noisy["shakes"])
-        )
+        first_half = drive[a : (a + b) // 2]  # the rest of the stretch may be dead time
+        moves = bool((np.ptp(first_half, axis=0) > MOVES * span)[span > 0].any())
+        frozen = b - a >= STUCK and (at_rest or (at_rest is None and moves and elsewhere))
+        clipped = observed[a] in ends and ((moves and _at_speed(observed, a, b)) or (elsewhere and alternates))
         if frozen or clipped:
             marked[a:b] = True
     return marked
@@ -118,30 +132,33 @@ def _runs(y: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
 
-def _noisy(y: np.ndarray, drive: np.ndarray, runs: list[tuple[int, int]]) -> dict[str, bool | None]:
-    """Whether neighbouring samples differ, `rest` with the drive at rest (None: no rest seen), `elsewhere` out of the runs;
-    `shakes` whether they differ as noise does."""
+def _noisiness(y: np.ndarray, drive: np.ndarray, runs: list[tuple[int, int]]) -> tuple[bool | None, bool, bool]:
+    """Whether successive samples differ while the drive rests (None: it never does) and outside the runs, and whether the
+    differences outside the runs alternate in sign as noise does."""
     equal = y[1:] == y[:-1]
     inside = np.zeros(len(y) - 1, dtype=bool)
     for a, b in runs:
         inside[a : b - 1] = True
     resting = (np.diff(drive, axis=0) == 0).all(1)
-    rest = None
-    if resting.sum() >= 50:
-        rest = bool(equal[resting].mean() < 0.5 and equal[resting & ~inside].mean() < 0.2 and _shakes(y, resting))
-    elsewhere = bool((~inside).sum() >= 50 and equal[~inside].mean() < 0.2)
-    return {"rest": rest, "elsewhere": elsewhere, "shakes": _shakes(y, ~inside)}
+    at_rest = None
+    if resting.sum() >= FEWEST_RESTING:
+        at_rest = bool(
+            equal[resting].mean() < 0.5 and equal[resting & ~inside].mean() < 0.2 and _alternates(y, resting)
+        )
+    elsewhere = bool((~inside).sum() >= FEWEST_RESTING and equal[~inside].mean() < 0.2)
+    return at_rest, elsewhere, _alternates(y, ~inside)
 
 
-def _shakes(y: np.ndarray, where: np.ndarray) -> bool:
-    """Whether steps change sign as often as noise does: white two of three times, settling and ringing seldom."""
-    step = np.where(where & np.isfinite(y[1:]) & np.isfinite(y[:-1]), np.diff(y), 0.0)
+def _alternates(y: np.ndarray, chosen: np.ndarray) -> bool:
+    """Whether successive differences change sign as often as those of noise do; settling and ringing seldom do."""
+    step = np.where(chosen & np.isfinite(y[1:]) & np.isfinite(y[:-1]), np.diff(y), 0.0)
     both = (step[1:] != 0) & (step[:-1] != 0)
-    return bool(both.sum() >= 20 and (step[1:] * step[:-1] < 0)[both].mean() > 0.25)
+    return bool(both.sum() >= FEWEST_STEPS and (step[1:] * step[:-1] < 0)[both].mean() > SIGN_CHANGES)
 
 
 def _at_speed(y: np.ndarray, a: int, b: int) -> bool:
-    """Whether y[a:b] was reached or left at speed, not by slowing down."""
-    speed = max(10 * quantum(y[np.isfinite(y)]), 1e-3 * (np.nanmax(y) - np.nanmin(y)))
+    """Whether the stretch y[a:b] was entered or left at speed, not by slowing down."""
+    step = quantisation_step(y[np.isfinite(y)], fewest=2)
+    speed = max(STEPS_AT_SPEED * step, RANGE_AT_SPEED * (np.nanmax(y) - np.nanmin(y)))
     sides = [(a - 2, a - 1)] * (a >= 2) + [(b, b + 1)] * (b + 1 < len(y))
     return any(abs(y[j] - y[i]) >= speed for i, j in sides)

@@ -1,4 +1,7 @@
-"""Readings that stand alone: a fault of the sensor, which no mechanism could follow."""
+"""Outliers of the residual: faults of a sensor that the recorded channel alone does not show.
+
+Next to a jump of the drive the channel itself moves like an outlier; what the model does not predict of it does not.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,17 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import median_filter
 
-from ctrlgen.diagnosis.settings import OUTLIERS, STATISTICS
+from ctrlgen.diagnosis.settings import OUTLIERS
+from ctrlgen.recordings.outliers import outliers
 from ctrlgen.recordings.recording import Record, Recording
 
 
 def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> tuple[Recording, str]:
-    """A series with what stands alone, for one or two samples, in what `predicted` leaves over as not valid; how many.
+    """The recording with outliers of the residual, observed minus `predicted` (n, n_y), marked not valid, and a note.
 
-    A mechanism cannot jump there and back within two samples, so this takes no physics away.
+    Series only: a mechanism cannot leave and return within two samples, so no physics is taken away; settled poses have no
+    neighbours in time. Records at rest are left as they are. The note is empty where nothing is marked.
     """
     if recording.kind == "poses":
         return recording, ""
@@ -24,29 +28,17 @@ def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray
         if record.role == "rest":
             records.append(record)
             continue
-        left = np.where(record.valid, record.observed - predicted(record), 0.0)
-        spikes = record.valid & isolated_outliers(np.nan_to_num(left))
-        count += int(spikes.sum())
-        records.append(replace(record, valid=record.valid & ~spikes) if spikes.any() else record)
-    said = f"{count} samples stand out alone and are left out as spikes of the sensor." if count else ""
-    return replace(recording, records=tuple(records)), said
+        marked = isolated_outliers(np.where(record.valid, record.observed - predicted(record), np.nan))
+        count += int(marked.sum())
+        records.append(replace(record, valid=record.valid & ~marked) if marked.any() else record)
+    note = f"{count} samples lie off the model's prediction alone, without their neighbours: taken for sensor faults, not used."
+    return replace(recording, records=tuple(records)), note if count else ""
 
 
-def isolated_outliers(left: np.ndarray) -> np.ndarray:
-    """Isolated outliers (n, n_y) of the residual `left` (n, n_y).
+def isolated_outliers(residual: np.ndarray) -> np.ndarray:
+    """Isolated outliers (n, n_y) of the `residual` (n, n_y), NaN where a sample is not valid.
 
-    A sample is one that lies more than `OUTLIERS.threshold` robust standard deviations from the running median. No outlier
-    is wider than `OUTLIERS.widest` samples, and a channel with more than `OUTLIERS.largest_share` of them has none.
+    A channel with more than `OUTLIERS.largest_share` of them has none.
     """
-    rough = left - median_filter(left, size=(OUTLIERS.median_window, 1), mode="nearest")
-    overall = STATISTICS.mad_to_sd * np.median(np.abs(rough), axis=0)
-    local = median_filter(np.abs(rough), size=(OUTLIERS.scale_window, 1)) * STATISTICS.mad_to_sd
-    near = OUTLIERS.threshold * np.maximum(overall, local)
-    found = np.abs(rough) > near
-    found[:, found.mean(axis=0) > OUTLIERS.largest_share] = False
-    for column, size in zip(found.T, np.abs(rough).T, strict=True):
-        for run in np.split(np.flatnonzero(column), np.flatnonzero(np.diff(np.flatnonzero(column)) > 1) + 1):
-            beside = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)] if len(run) else []
-            if len(run) > OUTLIERS.widest or (beside and max(beside) > OUTLIERS.neighbour_share * size[run].max()):
-                column[run] = False  # a mass that is pushed moves before and after too
-    return found
+    marked = [outliers(column, threshold=OUTLIERS.threshold, widest=OUTLIERS.widest) for column in residual.T]
+    return np.column_stack([m & (m.mean() <= OUTLIERS.largest_share) for m in marked])

@@ -12,11 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import stats
-from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.settings import NOISE, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
+from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
 from ctrlgen.recordings.recording import Record, Recording
 
 
@@ -156,10 +156,10 @@ def without_lines(part: np.ndarray) -> np.ndarray:
     """Without sinusoids that stand out of the spectrum: a vibration is a disturbance with a cause, no noise."""
     n = len(part)
     for _ in range(NOISE.most_lines):
-        power = np.abs(np.fft.rfft(part * np.hanning(n), n=8 * n)) ** 2
-        peak = int(np.argmax(power / np.maximum(median_filter(power, 8 * NOISE.level_bins, mode="reflect"), 1e-300)))
-        around = np.median(power[max(0, peak - 4 * NOISE.level_bins) : peak + 4 * NOISE.level_bins])
-        if power[peak] < NOISE.line_ratio * around:
+        power = periodogram(part, np.hanning(n), padding=8)
+        level = local_floor(power, 8 * NOISE.level_bins)
+        peak = int(np.argmax(power / np.maximum(level, 1e-300)))
+        if power[peak] < NOISE.line_ratio * level[peak]:
             break
         phase = 2 * np.pi * peak / (8 * n) * np.arange(n)
         basis = np.column_stack([np.sin(phase), np.cos(phase)])

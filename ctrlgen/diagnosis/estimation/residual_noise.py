@@ -8,11 +8,11 @@ likelihood (P. Whittle, Arkiv for Matematik 2 (1953) 423), and continued to the 
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
 from scipy.signal.windows import blackmanharris
 
 from ctrlgen.diagnosis.settings import RESIDUAL_NOISE
+from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
 
 MEDIAN = 1 / np.log(2)  # mean over median of a spectrum's bins, which are exponential
 
@@ -25,11 +25,9 @@ def noise_from_residual(left: np.ndarray, motion: np.ndarray) -> tuple[float, np
         return None
     window = blackmanharris(n)
     window /= np.sqrt(np.sum(window**2))
-    spectrum, moving = (
-        np.abs(np.fft.rfft(window * (y - np.mean(y)))[RESIDUAL_NOISE.first_bin : -1]) ** 2 for y in (left, motion)
-    )
-    moving = median_filter(moving, RESIDUAL_NOISE.smoothing_bins, mode="reflect")
-    around = median_filter(spectrum, RESIDUAL_NOISE.smoothing_bins, mode="reflect")
+    spectrum, moving = (periodogram(y - np.mean(y), window)[RESIDUAL_NOISE.first_bin : -1] for y in (left, motion))
+    moving = local_floor(moving, RESIDUAL_NOISE.smoothing_bins)
+    around = local_floor(spectrum, RESIDUAL_NOISE.smoothing_bins)
     turn = np.exp(-2j * np.pi * (np.arange(len(spectrum)) + RESIDUAL_NOISE.first_bin) / n)
     lines = spectrum > RESIDUAL_NOISE.line_ratio * around
     chosen = (moving <= np.median(moving)) & ~lines

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
@@ -26,6 +25,7 @@ from ctrlgen.diagnosis.selection.subset_search import Suspect, Together
 from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import channels
+from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +110,8 @@ class Screen:
         k = int(np.argmax([r.valid.size for r in records]))
         begin = sum(r.valid.size for r in records[:k])
         left = fit.residual[begin : begin + records[k].valid.size].reshape(records[k].valid.shape)
-        window = np.hanning(len(left))[:, None]
-        power = np.sum(np.abs(np.fft.rfft(left * window, n=SCREEN.spectrum_padding * len(left), axis=0)) ** 2, axis=1)
-        peaks, _ = find_peaks(power, distance=4 * SCREEN.spectrum_padding)
-        best = peaks[np.argsort(-power[peaks])[: SCREEN.most_lines]]
+        power = np.sum(periodogram(left, np.hanning(len(left)), SCREEN.spectrum_padding), axis=1)
+        best = highest_peaks(power, SCREEN.most_lines, distance=4 * SCREEN.spectrum_padding)
         return tuple(float(f) for f in np.sort(best) / (SCREEN.spectrum_padding * len(left) * records[k].sample_time))
 
     def _along_path(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ctrlgen.diagnosis.settings import SPATIAL_PERIODS
+from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
 
 
 def pitches(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
@@ -26,11 +26,10 @@ def pitches(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     n, padding = SPATIAL_PERIODS.cells, SPATIAL_PERIODS.padding
     cell = np.minimum(((path - path.min()) / span * n).astype(int), n - 1)
     along = np.bincount(cell, weights=left - np.mean(left), minlength=n)
-    spectrum = np.abs(np.fft.rfft(along, n=padding * n)) ** 2 / power
+    spectrum = periodogram(along, padding=padding) / power
     first, last = padding * SPATIAL_PERIODS.fewest_cycles, padding * n // SPATIAL_PERIODS.finest_cells
     least = np.log((last - first) / SPATIAL_PERIODS.false_alarm_p)
-    found, _ = find_peaks(spectrum[first:last], height=least, distance=2 * padding)
-    best = found[np.argsort(-spectrum[first + found])][: SPATIAL_PERIODS.most]
+    best = highest_peaks(spectrum[first:last], SPATIAL_PERIODS.most, distance=2 * padding, height=least)
     return tuple(float(padding * span / (first + k)) for k in best)
 
 
@@ -57,6 +56,5 @@ def jumps(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     sums = np.concatenate([[0.0], np.cumsum(mean)])
     step = (sums[2 * side :] - 2 * sums[side:-side] + sums[: -2 * side]) / side
     step = np.abs(step - np.median(step))
-    found, _ = find_peaks(np.concatenate([[0.0], step, [0.0]]), distance=side)
-    best = (found - 1)[np.argsort(-step[found - 1])][: SPATIAL_PERIODS.most]
+    best = highest_peaks(np.concatenate([[0.0], step, [0.0]]), SPATIAL_PERIODS.most, distance=side) - 1
     return tuple(float(path.min() + (k + side) / n * span) for k in best)

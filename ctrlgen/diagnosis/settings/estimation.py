@@ -101,21 +101,15 @@ class NoiseUpdateSettings:
 
 @dataclass(frozen=True)
 class OutlierSettings:
-    """Isolated outliers of the residual."""
+    """Isolated outliers of the residual; how they are found is in `ctrlgen.recordings.outliers`."""
 
-    threshold: float = 7.0
-    """Robust standard deviations from the running median. Normal noise does that once in 4e11 samples."""
+    threshold: float = 6.0
+    """Local standard deviations of the deviation from the chord between the neighbours. In white noise that is sqrt(1.5)
+    of its own, so an outlier of 7.3 standard deviations; normal noise does that once in 1e9 samples."""
     largest_share: float = 0.01
     """Share of a channel's samples; where more stand out, they are no isolated faults and all are kept. Judgement."""
     widest: int = 2
     """Samples of one outlier. A mechanism cannot leave and return within two samples."""
-    neighbour_share: float = 0.3
-    """Of an outlier's height, the most that the samples beside it may show: a mass that was pushed moves before and
-    after, too. Judgement."""
-    median_window: int = 7
-    """Samples of the running median from which a deviation counts: three times the widest outlier, and one."""
-    scale_window: int = 51
-    """Samples of the running median of the deviations, where the noise varies in time. Judgement."""
 
 
 @dataclass(frozen=True)
