@@ -81,7 +81,7 @@ def test_a_line_that_was_not_written_to_its_end_does_not_count(tmp_path):
     checkpoint = Checkpoint(path, MADE_FROM)
     assert checkpoint.reused == 1 and checkpoint.recall("b") is None
     checkpoint.keep("c", np.array([3.0]))
-    assert set(Checkpoint(path, MADE_FROM).found) == {"a", "c"}
+    assert set(Checkpoint(path, MADE_FROM).optima) == {"a", "c"}
 
 
 def test_a_key_tells_values_and_order():

@@ -1,4 +1,4 @@
-"""The optima found so far, on disk: a diagnosis that was stopped goes on from them and ends with the same answer."""
+"""Optima of finished fits on disk. A diagnosis that was interrupted continues from them and gives the same answer."""
 
 from __future__ import annotations
 
@@ -13,42 +13,44 @@ from ctrlgen.core.files import write_text
 
 
 class Checkpoint:
-    """Optimum by optimum, a line each, in the file `path`; begun anew unless it was `made_from` the same."""
+    """Optima by key in the text file `path`, one JSON pair a line after a header line.
+
+    `made_from` describes the diagnosis: program version, seed, digests of its files. A file with another header is ignored
+    and replaced by the first `keep`. `reused` counts the optima that were read.
+    """
 
     def __init__(self, path: Path, made_from: dict[str, Any]) -> None:
         self.path, self.made_from = path, made_from
-        self.found = self._read(made_from)
-        self.reused = len(self.found)
-        self._begun = False
+        self.optima = self._read()
+        self.reused = len(self.optima)
+        self._has_header = False
 
-    def _read(self, made_from: dict[str, Any]) -> dict[str, list[float]]:
-        """What is there of the same diagnosis; a line that was not written to its end does not count."""
+    def _read(self) -> dict[str, list[float]]:
+        """The optima in the file; none where its header differs. A line without its end was cut off and is skipped."""
         try:
             header, *lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
-            return (
-                dict(json.loads(line) for line in lines if line.endswith("\n"))
-                if json.loads(header) == made_from
-                else {}
-            )
+            if json.loads(header) != self.made_from:
+                return {}
+            return dict(json.loads(line) for line in lines if line.endswith("\n"))
         except (OSError, ValueError):
             return {}
 
     def recall(self, key: str) -> np.ndarray | None:
-        """The optimum kept under `key`."""
-        return np.array(self.found[key]) if key in self.found else None
+        """The optimum kept under `key`, None where there is none."""
+        return np.array(self.optima[key]) if key in self.optima else None
 
     def keep(self, key: str, optimum: np.ndarray) -> None:
-        """For the next time."""
-        self.found[key] = optimum.tolist()
-        if not self._begun:
-            write_text(self.path, _line(self.made_from) + "".join(map(_line, self.found.items())))
-            self._begun = True
+        """Appends an optimum (k,) to the file."""
+        self.optima[key] = optimum.tolist()
+        if not self._has_header:
+            write_text(self.path, _line(self.made_from) + "".join(map(_line, self.optima.items())))
+            self._has_header = True
             return
         with self.path.open("a", encoding="utf-8") as file:
-            file.write(_line((key, self.found[key])))
+            file.write(_line((key, self.optima[key])))
 
     def done(self) -> None:
-        """Nothing more is needed of it."""
+        """Deletes the file: the diagnosis is complete."""
         self.path.unlink(missing_ok=True)
 
 
@@ -57,7 +59,7 @@ def _line(value: Any) -> str:
 
 
 def key_of(*parts: Any) -> str:
-    """A digest of arrays, and of anything whose text tells what it is."""
+    """SHA-256, 32 hexadecimal digits, of arrays by their bytes and of other objects by their `repr`."""
     digest = hashlib.sha256()
     for part in parts:
         digest.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())

@@ -1,8 +1,9 @@
-"""Step 1: the noise, never from the misfit.
+"""Step 1: the noise of every channel, estimated before any model is fitted.
 
-In order of trust: a record at rest, repeated periods of the drive, dwells, the stated deviation, and last, saying so,
-the fastest part of the readings, which `quiet` then refines. Its colour is an autoregressive model, order by BIC.
-Of settled poses: the stated deviation, then what repeated poses differ by, which a lost motion or creep widens.
+The misfit of a model is never taken as noise while another source exists. Of a time series, in order of trust: a record at
+rest; differences of repeated periods; dwells of the drive; the stated standard deviation; last, with a note, the fastest
+part of the readings, which `residual_noise` then refines. The noise is autoregressive, its order chosen by BIC. Of settled
+poses: the stated standard deviation; then the scatter of repeated poses, which lost motion and creep widen.
 """
 
 from __future__ import annotations
@@ -22,9 +23,13 @@ from ctrlgen.recordings.recording import Record, Recording
 
 @dataclass(frozen=True)
 class Noise:
-    """Per channel: innovation `sd` [SI], AR coefficients, and a sentence on where they come from; `known` False where
-    nothing but the misfit can tell; `count` independent samples that the estimate rests on (inf where it was stated);
-    `guessed` True where only the readings' fastest part told it."""
+    """Autoregressive noise e of each channel: e[k] = a[0] e[k-1] + a[1] e[k-2] + ... + sd w[k], w white with unit variance.
+
+    `sd` (n_y,) [SI] of the innovations, `ar` the coefficients a of each channel, `notes` a sentence a channel on their
+    source. `known` (n_y,) is False where only the misfit tells the noise, `guessed` (n_y,) True where only the fastest part
+    of the readings does. `count` (n_y,) is the number of independent samples that the estimate rests on, infinite where it
+    was stated.
+    """
 
     sd: np.ndarray
     ar: tuple[np.ndarray, ...]
@@ -34,7 +39,10 @@ class Noise:
     guessed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
-        """`values` (n, n_y, ...) filtered to unit white noise; zero where a sample or one that it leans on is not `valid`."""
+        """`values` (n, n_y, ...) [SI] filtered so that the noise in them becomes white with unit variance.
+
+        Zero where a sample, or one of the earlier samples that its filter needs, is not `valid` (n, n_y).
+        """
         white, usable = np.zeros_like(values), self.usable(valid)
         for i, a in enumerate(self.ar):
             clean = np.where(valid[:, i].reshape(-1, *(1,) * (values.ndim - 2)), values[:, i], 0.0)
@@ -43,7 +51,7 @@ class Noise:
         return white
 
     def whiten_channel(self, values: np.ndarray, i: int) -> np.ndarray:
-        """`values` (n, ...) of channel i as unit white noise, from the first sample on whose memory is there, (n - order, ...)."""
+        """`values` (n, ...) [SI] of channel i whitened, (n - order, ...): without the first samples, as many as the order."""
         sd, a = self.sd[i], self.ar[i]
         n, order = len(values), len(a)
         white = values[order:] / sd
@@ -52,7 +60,7 @@ class Noise:
         return white
 
     def usable(self, valid: np.ndarray) -> np.ndarray:
-        """Which samples can be whitened, (n, n_y)."""
+        """Which samples (n, n_y) can be whitened: they and the earlier samples that the filter needs are `valid` (n, n_y)."""
         good = valid.copy()
         for i, a in enumerate(self.ar):
             for lag in range(1, len(a) + 1):
@@ -62,74 +70,104 @@ class Noise:
 
     @property
     def floor(self) -> np.ndarray:
-        """Standard deviation of the noise itself, colour included."""
+        """Standard deviation (n_y,) [SI] of the noise itself, not of its innovations."""
         return np.array([stationary_deviation(sd, a) for sd, a in zip(self.sd, self.ar, strict=True)])
 
 
 def stationary_deviation(sd: float, a: np.ndarray) -> float:
-    """Standard deviation of autoregressive noise with innovations `sd` and coefficients `a`."""
+    """Standard deviation of autoregressive noise with innovations `sd` and coefficients `a`.
+
+    sd times the root of the summed squares of the impulse response, over 4096 samples.
+    """
     impulse = np.zeros(4096)
     impulse[0] = 1.0
     return float(sd * np.sqrt(np.sum(lfilter([1.0], np.concatenate([[1.0], -a]), impulse) ** 2)))
 
 
+@dataclass(frozen=True)
+class _ChannelNoise:
+    """The fields of `Noise` for one channel."""
+
+    sd: float
+    note: str
+    count: float
+    ar: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    known: bool = True
+    guessed: bool = False
+
+
 def estimate_noise(recording: Recording, settling: float) -> Noise:
-    """The noise of each observed channel. `settling` [s]: how long the device itself goes on after a change of drive."""
-    rows = [_channel(recording, i, settling) for i in range(len(recording.channels))]
-    sd, ar, known, said, count, guessed = zip(*rows, strict=True)
-    return Noise(np.array(sd), ar, np.array(known), said, np.array(count), np.array(guessed))
+    """The noise of each observed channel.
 
-
-def _channel(recording: Recording, i: int, settling: float) -> tuple[float, np.ndarray, bool, str, float, bool]:
-    name, stated = recording.channels[i], recording.noise[i]
-    none = np.zeros(0)
-    if recording.kind == "poses":
-        if stated:
-            return stated, none, True, f"{name}: as stated", np.inf, False
-        sd, count = _scatter(recording.records, i)
-        if count >= NOISE.fewest_repeats and sd > 0:
-            return sd, none, True, f"{name}: from repeated poses, {count} beyond the first of each", float(count), False
-        few = f"only {count} repeat others" if count else "no pose repeats"
-        said = f"{name}: not stated and {few}; taken from what the best model leaves"
-        return 1.0, none, False, said, np.inf, False
-    moving = [r for r in recording.records if r.role != "rest"]
-    rounding = quantisation_step(np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])) / np.sqrt(
-        12.0
+    `settling` [s] is the time that the device itself needs after a change of its drive; dwells are read after it.
+    """
+    estimate = _of_poses if recording.kind == "poses" else _of_series
+    rows = [estimate(recording, i, settling) for i in range(len(recording.channels))]
+    return Noise(
+        sd=np.array([r.sd for r in rows]),
+        ar=tuple(r.ar for r in rows),
+        known=np.array([r.known for r in rows]),
+        notes=tuple(f"{name}: {r.note}" for name, r in zip(recording.channels, rows, strict=True)),
+        count=np.array([r.count for r in rows]),
+        guessed=np.array([r.guessed for r in rows]),
     )
-    samples = {
+
+
+def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
+    """Channel i of settled poses."""
+    if recording.noise[i]:
+        return _ChannelNoise(recording.noise[i], "as stated", np.inf)
+    sd, count = _repeatability(recording.records, i)
+    if count >= NOISE.fewest_repeats and sd > 0:
+        return _ChannelNoise(sd, f"from repeated poses, {count} beyond the first of each", float(count))
+    few = f"only {count} poses repeat an earlier one" if count else "no pose repeats"
+    note = f"not stated, and {few}; estimated from the residual of the best model"
+    return _ChannelNoise(1.0, note, np.inf, known=False)
+
+
+def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
+    """Channel i of a time series."""
+    values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
+    rounding = quantisation_step(values) / np.sqrt(12.0)  # standard deviation of a uniform rounding error
+    moving = [r for r in recording.records if r.role != "rest"]
+    sources = {  # degree of the polynomial to subtract, stretches of noise
         "a record at rest": (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
-        "repeated periods": (1, [e for r in moving for e in _repeats(r, i)]),
+        "repeated periods": (1, [e for r in moving for e in _period_differences(r, i)]),
         "dwells of the drive": (NOISE.dwell_degree, [e for r in moving for e in _dwells(r, i, settling)]),
     }
-    for source, (degree, parts) in samples.items():
-        parts = [
-            part for part in parts if len(part) >= NOISE.shortest_stretch and np.ptp(part) > 0
-        ]  # one number alone tells none
-        parts = _quiet([without_lines(_flat(part, degree)) for part in parts])
-        if parts:
-            sd, a = _with_rounding(*autoregression(parts), rounding)
-            n, times = sum(map(len, parts)), stationary_deviation(sd, a) / sd
-            said = f"{name}: from {source}, {n} samples, autoregressive of order {len(a)}"
-            if times > NOISE.slow_ratio:
-                said += f"; it is {times:.0f} times what one sample adds: what moves so slowly may be the device, not its sensor"
-            return sd, a, True, said, float(n), False
-    if stated:
-        sd, _ = _with_rounding(stated, none, rounding)
-        return sd, none, True, f"{name}: as stated, taken as white", NOISE.stated_samples, False
-    parts = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
-    sd = max(_robust(np.concatenate(parts)) / np.sqrt(20.0), rounding, 1e-300)  # 1 + 9 + 9 + 1: third differences
-    said = f"{name}: from the fastest part of the readings, taken as white; record some rest to know it"
-    return sd, none, True, said, sum(map(len, parts)) / NOISE.robust_cost, True
+    for source, (degree, stretches) in sources.items():
+        # a constant stretch is a dead or coarse channel: it tells no noise
+        long = [s for s in stretches if len(s) >= NOISE.shortest_stretch and np.ptp(s) > 0]
+        quiet = _without_events([without_lines(_detrended(s, degree)) for s in long])
+        if quiet:
+            return _from_stretches(quiet, source, rounding)
+    if recording.noise[i]:
+        sd, _ = _with_rounding(recording.noise[i], np.zeros(0), rounding)
+        return _ChannelNoise(sd, "as stated, taken as white", NOISE.stated_samples)
+    thirds = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
+    # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
+    sd = max(_robust_deviation(np.concatenate(thirds)) / np.sqrt(20.0), rounding, 1e-300)
+    note = "from the fastest part of the readings, taken as white; a record at rest would tell it better"
+    return _ChannelNoise(sd, note, sum(map(len, thirds)) / NOISE.robust_cost, guessed=True)
 
 
-def _scatter(records: tuple[Record, ...], i: int) -> tuple[float, int]:
-    """Standard deviation of channel i among poses of one drive, and how many there are beyond the first of each."""
+def _from_stretches(stretches: list[np.ndarray], source: str, rounding: float) -> _ChannelNoise:
+    """The autoregressive noise of stretches of pure noise."""
+    sd, a = _with_rounding(*autoregression(stretches), rounding)
+    n, ratio = sum(map(len, stretches)), stationary_deviation(sd, a) / sd
+    note = f"from {source}, {n} samples, autoregressive of order {len(a)}"
+    if ratio > NOISE.slow_ratio:
+        note += f"; it is slow, {ratio:.0f} times its innovations: part of it may be motion of the device, not of its sensor"
+    return _ChannelNoise(sd, note, float(n), a)
+
+
+def _repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
+    """Standard deviation [SI] of channel i within groups of poses with one drive, and its degrees of freedom."""
     drive = np.concatenate([r.drive[r.valid[:, i]] for r in records])
     y = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
     span = np.ptp(drive, axis=0)
-    _, group = np.unique(
-        np.round(drive / np.where(span > 0, NOISE.same_drive * span, 1.0)), axis=0, return_inverse=True
-    )
+    levels = np.round(drive / np.where(span > 0, NOISE.same_drive * span, 1.0))
+    _, group = np.unique(levels, axis=0, return_inverse=True)
     group = group.ravel()
     mean = np.bincount(group, y) / np.bincount(group)
     count = len(y) - len(mean)
@@ -137,7 +175,7 @@ def _scatter(records: tuple[Record, ...], i: int) -> tuple[float, int]:
 
 
 def _at_rest(record: Record, i: int) -> np.ndarray:
-    """The valid readings of a channel without what goes with the recorded surroundings: that has a cause, and is no noise."""
+    """The valid readings of channel i without their regression on the recorded ambient, which is a cause and no noise."""
     good = record.valid[:, i]
     y = record.observed[good, i]
     if record.ambient is None or not len(y):
@@ -146,73 +184,77 @@ def _at_rest(record: Record, i: int) -> np.ndarray:
     return y - T * (T @ y) / (T @ T) if T @ T > 0 else y
 
 
-def _flat(part: np.ndarray, degree: int) -> np.ndarray:
-    """Without its slow part, a polynomial: what still settles is no noise."""
-    t = np.linspace(-1, 1, len(part))
-    return part - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, part, degree))
+def _detrended(stretch: np.ndarray, degree: int) -> np.ndarray:
+    """A stretch without its polynomial of `degree` by least squares: what still settles is no noise."""
+    t = np.linspace(-1, 1, len(stretch))
+    return stretch - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, stretch, degree))
 
 
-def without_lines(part: np.ndarray) -> np.ndarray:
-    """Without sinusoids that stand out of the spectrum: a vibration is a disturbance with a cause, no noise."""
-    n = len(part)
+def without_lines(stretch: np.ndarray) -> np.ndarray:
+    """A stretch (n,) without the sinusoids that stand out of its spectrum: a vibration is a disturbance, not noise."""
+    n, padding = len(stretch), 8
     for _ in range(NOISE.most_lines):
-        power = periodogram(part, np.hanning(n), padding=8)
-        level = local_floor(power, 8 * NOISE.level_bins)
+        power = periodogram(stretch, np.hanning(n), padding)
+        level = local_floor(power, padding * NOISE.level_bins)
         peak = int(np.argmax(power / np.maximum(level, 1e-300)))
         if power[peak] < NOISE.line_ratio * level[peak]:
             break
-        phase = 2 * np.pi * peak / (8 * n) * np.arange(n)
+        phase = 2 * np.pi * peak / (padding * n) * np.arange(n)
         basis = np.column_stack([np.sin(phase), np.cos(phase)])
-        part = part - basis @ np.linalg.lstsq(basis, part, rcond=None)[0]
-    return part
+        stretch = stretch - basis @ np.linalg.lstsq(basis, stretch, rcond=None)[0]
+    return stretch
 
 
-def _quiet(parts: list[np.ndarray]) -> list[np.ndarray]:
-    """Without the parts in which something happened."""
-    power = [float(np.var(part)) for part in parts]
-    return [part for part, p in zip(parts, power, strict=True) if p <= NOISE.loudest_stretch * np.median(power)]
+def _without_events(stretches: list[np.ndarray]) -> list[np.ndarray]:
+    """The stretches whose variance is not far above the median: in the others something happened."""
+    power = [float(np.var(s)) for s in stretches]
+    return [s for s, p in zip(stretches, power, strict=True) if p <= NOISE.loudest_stretch * np.median(power)]
 
 
 def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
-    """Noise seen at rest and readings in steps: at rest a coarse step hides the noise, on the move it is noise itself."""
+    """Noise of a device that moves, from noise at rest and the standard deviation of the rounding error [SI].
+
+    A quantisation step above the noise hides it at rest, and on the move its rounding error is white noise itself.
+    """
     floor = stationary_deviation(sd, a)
     return (float(np.hypot(rounding, floor)), np.zeros(0)) if rounding > floor else (sd, a)
 
 
-def _robust(values: np.ndarray) -> float:
+def _robust_deviation(values: np.ndarray) -> float:
+    """Standard deviation of normal values (n,) by their median absolute deviation."""
     return float(STATISTICS.mad_to_sd * np.median(np.abs(values - np.median(values))))
 
 
 def drive_period(drive: np.ndarray) -> int | None:
-    """The number of samples after which the drive (n, n_u) repeats exactly, at least twice; None where it does not."""
+    """Samples after which the drive (n, n_u) repeats exactly, at least twice; None where it does not."""
     n, span = len(drive), np.ptp(drive, axis=0).max(initial=0.0)
     if span == 0 or n < 100:
         return None
-    first = drive[:32]
-    matches = np.flatnonzero(np.all(np.abs(drive[: n - 32] - first[0]) <= NOISE.same_drive * span, axis=1))
-    for lag in matches[matches >= 50]:
+    near, first = NOISE.same_drive * span, drive[:32]
+    lags = np.flatnonzero(np.all(np.abs(drive[: n - 32] - first[0]) <= near, axis=1))
+    for lag in lags[lags >= 50]:
         if 2 * lag > n:
             return None
-        if np.all(np.abs(drive[lag : lag + 32] - first) <= NOISE.same_drive * span) and np.all(
-            np.abs(drive[lag:] - drive[:-lag]) <= NOISE.same_drive * span
-        ):
+        begins = np.all(np.abs(drive[lag : lag + 32] - first) <= near)  # cheap: tried before the whole record
+        if begins and np.all(np.abs(drive[lag:] - drive[:-lag]) <= near):
             return int(lag)
     return None
 
 
-def _repeats(record: Record, i: int) -> list[np.ndarray]:
-    """Differences of neighbouring periods, the first left out for its transient, with the noise's own size."""
+def _period_differences(record: Record, i: int) -> list[np.ndarray]:
+    """Differences of neighbouring periods over sqrt(2), so that they have the noise's own size; the first period, which
+    holds a transient, is left out, and no period is used twice."""
     P = drive_period(record.drive) if record.period is None else round(record.period / record.sample_time)
     if P is None or len(record.time) < 3 * P:
         return []
     y = np.where(record.valid[:, i], record.observed[:, i], np.nan)
-    whole = y[P : len(y) // P * P].reshape(-1, P)
-    differences = np.diff(whole[: len(whole) // 2 * 2], axis=0)[::2] / np.sqrt(2.0)
+    periods = y[P : len(y) // P * P].reshape(-1, P)
+    differences = np.diff(periods[: len(periods) // 2 * 2], axis=0)[::2] / np.sqrt(2.0)
     return [d[np.isfinite(d)] for d in differences]
 
 
 def _dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
-    """Readings while the drive stood still, after the device has settled."""
+    """The valid readings of channel i while the drive is constant, from `settling` [s] after its last change."""
     moved = np.any(np.diff(record.drive, axis=0) != 0, axis=1)
     edges = np.flatnonzero(np.concatenate([[True], moved, [True]]))
     wait = int(np.ceil(settling / record.sample_time))
@@ -220,17 +262,21 @@ def _dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
     return [record.observed[a:b, i][record.valid[a:b, i]] for a, b in dwells]
 
 
-def autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
-    """Innovation deviation and coefficients by Yule-Walker over all parts; the order by BIC."""
-    n = sum(map(len, parts))
-    lags = np.array([sum(float(p[: len(p) - k] @ p[k:]) for p in parts) / n for k in range(NOISE.longest_order + 1)])
-    if lags[0] <= 0:  # a reading that does not move
+def autoregression(stretches: list[np.ndarray]) -> tuple[float, np.ndarray]:
+    """Standard deviation of the innovations and coefficients of autoregressive noise, (0, none) of a constant.
+
+    Yule-Walker equations with the autocovariances of all stretches; of the orders up to `NOISE.longest_order` the one with
+    the least BIC, n ln(variance) + order ln(n).
+    """
+    n, orders = sum(map(len, stretches)), range(1, NOISE.longest_order + 1)
+    r = np.array([sum(float(s[: len(s) - k] @ s[k:]) for s in stretches) / n for k in (0, *orders)])
+    if r[0] <= 0:
         return 0.0, np.zeros(0)
-    best = (n * np.log(lags[0]), lags[0], np.zeros(0))
-    for order in range(1, NOISE.longest_order + 1):
-        toeplitz = lags[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
-        a = np.linalg.solve(toeplitz, lags[1 : order + 1])
-        variance = lags[0] - a @ lags[1 : order + 1]
+    best = (n * np.log(r[0]), r[0], np.zeros(0))
+    for order in orders:
+        toeplitz = r[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
+        a = np.linalg.solve(toeplitz, r[1 : order + 1])
+        variance = r[0] - a @ r[1 : order + 1]
         if variance <= 0:
             break
         bic = n * np.log(variance) + order * np.log(n)
@@ -240,7 +286,10 @@ def autoregression(parts: list[np.ndarray]) -> tuple[float, np.ndarray]:
 
 
 def ljung_box(e: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
-    """p of the hypothesis that `e` has no autocorrelation up to `lags`. G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297."""
+    """p of the hypothesis that `e` (n,) has no autocorrelation at lags 1 ... `lags`.
+
+    n (n + 2) sum r_k^2/(n - k) against chi-square (G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297).
+    """
     n, e = len(e), e - np.mean(e)
     total = float(e @ e)
     if total == 0:
