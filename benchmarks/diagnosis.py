@@ -18,9 +18,9 @@ from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_physics
 from ctrlgen.diagnosis.selection.screen import Screen
-from ctrlgen.model.model import movable
+from ctrlgen.model.assembly import movable
 from ctrlgen.recordings.recording import Record, Recording
 
 DEVICES = SCENARIO.parent / "devices"
@@ -40,9 +40,9 @@ def _screen(repeat: int) -> list[Line | Note]:
     device = load_device(DEVICES / "mems_hexapod.toml")
     model = build_model(device)
     channels = tuple(f"reading.{name}" for name in model.signals["reading"].channels)
-    links = nominal_links(device)
+    physics = nominal_physics(device)
     open_ = [
-        h for h in hypotheses(device, links, channels, H, False) if h.effect != PARAMETER or h.path in movable(device)
+        h for h in hypotheses(device, physics, channels, H, False) if h.effect != PARAMETER or h.path in movable(device)
     ]
     creep = next(h for h in open_ if (h.effect, h.at) == ("creep", "1X"))
     plant = Structure(device).with_cause(creep, {"gain": 0.05, "tau": 5.0}).described

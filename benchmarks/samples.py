@@ -15,8 +15,9 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.firmware.cprint import Real
+from ctrlgen.model.assembly import build_model
 from ctrlgen.model.feedforward import Controller
-from ctrlgen.model.model import Model, build_model
+from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.scenario import Scenario, load_scenario
 from ctrlgen.trajectory.solution import Solution, solve

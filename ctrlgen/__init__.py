@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from ctrlgen.diagnosis.pipeline import diagnose
     from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
     from ctrlgen.firmware.folder import generate
+    from ctrlgen.model.assembly import build_model
     from ctrlgen.model.feedforward import Controller, ControllerStatus
-    from ctrlgen.model.model import Model, build_model
+    from ctrlgen.model.model import Model
     from ctrlgen.model.simulation import Trace, simulate
     from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
     from ctrlgen.recordings.reader import load_recordings
@@ -35,7 +36,8 @@ _EXPORTS = {
     "diagnosis.selection.diagnosis": ("Diagnosis",),
     "firmware.folder": ("generate",),
     "model.feedforward": ("Controller", "ControllerStatus"),
-    "model.model": ("Model", "build_model"),
+    "model.assembly": ("build_model",),
+    "model.model": ("Model",),
     "model.simulation": ("Trace", "simulate"),
     "model.virtual_sensors": ("SensorReadings", "simulate_sensors"),
     "recordings.reader": ("load_recordings",),

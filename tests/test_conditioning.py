@@ -8,7 +8,7 @@ from conftest import ROOT
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings import preprocessing
 from ctrlgen.recordings.reader import load_recordings
 

@@ -13,7 +13,7 @@ from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation import sample_equations
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import hypotheses, nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import hypotheses, nominal_physics
 from ctrlgen.diagnosis.settings import SIMULATION
 from ctrlgen.model import integrators
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
@@ -33,7 +33,7 @@ def simulator(text, effects, linear, folder) -> tuple[Simulator, np.ndarray]:
     (folder / "device.toml").write_text(text)
     device, channel = load_device(folder / "device.toml"), "reading.axis"
     structure = Structure(device)
-    for h in hypotheses(device, nominal_links(device), (channel,), H, False):
+    for h in hypotheses(device, nominal_physics(device), (channel,), H, False):
         if h.effect in effects:
             structure = structure.with_cause(h, SHAPES[h.effect])
     assert len(structure.causes) == len(effects)
@@ -96,7 +96,7 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
     )  # to the end: where N is solved for, slopes of steps on the way are others
     monkeypatch.setattr(sample_equations, "SIMULATION", replace(SIMULATION, parametric_operations=worth))
     r, p = simulator(text, effects, linear, tmp_path)
-    assert isinstance(r._equations.steps, integrators.Sticking) == ("coulomb" in effects)
+    assert isinstance(r._equations.steps, integrators.ImplicitRadau) == ("coulomb" in effects)
     assert r._equations.model.held.numel() == ("loop" in text)
     moved = record(size)
     y, Y = r.sensitivities(moved, p)

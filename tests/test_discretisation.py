@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 import ctrlgen
 from ctrlgen import build_model, load_device
-from ctrlgen.model.discretisation import balanced, next_sample
+from ctrlgen.model.discretisation import balanced, one_step_map
 from ctrlgen.numerics.phi_functions import driven, driven_lags, phis
 
 H, TAU = 2e-3, 5e-3
@@ -27,13 +27,13 @@ def pushed(*effects: dict, rates=None, force=None, tau: str = "5 ms", **paramete
     return ctrlgen.user_device(
         "pushed", parameters={"tau": tau, "spring": "1 N/m", **parameters}, drive={"motor": "1 N"}, axes={"way": "1 m"},
         state={"push": "1 N"}, rates=rates or (lambda u, x, p: (u.motor - x.push) / p.tau),
-        force=force or (lambda x: x.push), resistance=lambda d, p: p.spring * d.way, effect=list(effects),
+        force=force or (lambda x: x.push), restoring_force=lambda d, p: p.spring * d.way, effect=list(effects),
     )  # fmt: skip
 
 
 def walked(model, u: np.ndarray, h: float, linear: bool) -> tuple[np.ndarray, np.ndarray]:
     """States (n, n_x) and displacements (n, n_z) at the samples of the drive (n, n_u), from rest, in balance with the first drive."""
-    one = next_sample(model, h, linear)
+    one = one_step_map(model, h, linear)
     step = ca.Function("step", [model.x, model.z, model.u, one.u_next, model.p], [one.x, one.z])
     x, z = ca.DM(model.rest), ca.DM.zeros(model.z.numel())
     if not model.inertial:
@@ -127,7 +127,7 @@ def test_what_follows_a_displacement_that_follows_at_once_is_exact(linear):
     """Creep of a stage whose force is the drive itself: nothing but the displacement tells it of the drive."""
     stage = ctrlgen.user_device(
         "direct", parameters={"spring": "2 N/m"}, drive={"motor": "1 N"}, axes={"way": "1 m"},
-        force=lambda u: u.motor, resistance=lambda d, p: p.spring * d.way, effect=list(CHAIN[1:2]),
+        force=lambda u: u.motor, restoring_force=lambda d, p: p.spring * d.way, effect=list(CHAIN[1:2]),
     )  # fmt: skip
     u = broken_line(30)
     x, z = walked(build_model(stage), u[:, None], H, linear)

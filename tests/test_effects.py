@@ -26,7 +26,7 @@ from ctrlgen.effects import Effect, Place, Where
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.toolchains import FLAGS
-from ctrlgen.model.assembly import available, channels
+from ctrlgen.model.effect_terms import available, channels
 
 TESTED = {
     "kind": "tested_axis", "name": "tested", "title": "an axis under test", "source": "round numbers",
@@ -53,12 +53,12 @@ def place_of(effect: type[Effect]) -> tuple[dict, list[Where]]:
     """The first device on which the effect can act, and every channel (and partner) there."""
     for table in tables():
         device = device_of(table)
-        links = device.links(device.values())
-        places = channels(links, effect.place)
+        physics = device.physics(device.values())
+        places = channels(physics, effect.place)
         if effect.pairs:
             places = [w.beside(other) for w in places for other in places]
         places = [w for w in places if effect.fits(w)]
-        if places and effect.needs <= available(links, SAMPLE_TIME):
+        if places and effect.needs <= available(physics, SAMPLE_TIME):
             return table, places
     raise AssertionError(f"{effect.kind} acts on no device that is known here")
 

@@ -26,7 +26,7 @@ def simulated(effect: str, drive: np.ndarray, folder) -> tuple[np.ndarray, integ
     """Displacement (N + 1,) [m] by ctrlgen, and the steps it took."""
     (folder / "device.toml").write_text(f"{AXIS}\n[[effect]]\nat = 'axis'\n{effect}")
     model = build_model(load_device(folder / "device.toml"))
-    return simulate(model, drive[:, None], H).signals["displacement"][:, 0], integrators.steps_of(model, H)
+    return simulate(model, drive[:, None], H).signals["displacement"][:, 0], integrators.integrator_of(model, H)
 
 
 def rubbing(force: float, reach: float) -> str:
@@ -72,7 +72,7 @@ def test_dry_friction_is_right_to_hundredths_of_itself_sliding_and_sticking(tmp_
     """Contacts that yield by 0.1 um are crossed in 5 us of a sample of 1 ms, and hold 25 times as stiffly as the flexures."""
     force = 0.5
     found, steps = simulated(rubbing(force, reach), drive, tmp_path)
-    assert isinstance(steps, integrators.Sticking)
+    assert isinstance(steps, integrators.ImplicitRadau)
     fine = int(np.ceil(H * 0.03 / reach))  # a bristle slips at 20 mm/s: two thirds of its time a step
     wanted = stepped(dahl(force, reach), drive, max(fine, 40))
     effect = wanted - stepped(nothing, drive, 40)
@@ -94,7 +94,7 @@ def test_what_bends_gently_is_of_second_order(tmp_path, monkeypatch):
 def test_what_does_not_bend_with_the_velocity_is_stepped_explicitly(tmp_path):
     drive, k3 = DRIVES["several frequencies"], 4e12
     found, steps = simulated(f"kind = 'stiffening'\nk3 = '{k3} N/m^3'", drive, tmp_path)
-    assert isinstance(steps, integrators.Exponential)
+    assert isinstance(steps, integrators.ExponentialRungeKutta)
     wanted = stepped(lambda z, v, b: (-k3 * z**3, 0.0), drive, 40)
     effect = wanted - stepped(nothing, drive, 40)
     assert np.sqrt(np.mean((found - wanted) ** 2)) < 1e-3 * np.sqrt(np.mean(effect**2))
@@ -134,7 +134,7 @@ def test_an_impact_is_stable_and_right_to_a_hundredth_of_itself(tmp_path, stiffn
     exact, free = stepped(touching, drive, 200), stepped(nothing, drive, 200)
     assert np.ptp(free) > 3 * gap and exact.max() < 1.5 * gap
     assert np.sqrt(np.mean((found - exact) ** 2)) < share * np.sqrt(np.mean((exact - free) ** 2))
-    assert isinstance(steps, integrators.Exponential)
+    assert isinstance(steps, integrators.ExponentialRungeKutta)
 
 
 def test_a_law_that_ends_within_the_typical_travel_is_simulated_inside():
@@ -142,7 +142,7 @@ def test_a_law_that_ends_within_the_typical_travel_is_simulated_inside():
     device = ctrlgen.user_device(
         "stub", parameters={"mass": "1 kg", "spring": "100 N"}, drive={"motor": "1 N"}, axes={"way": "1 m"},
         mass=lambda p: p.mass, force=lambda u, p: u.motor,
-        resistance=lambda d, p: p.spring * (1 - ca.sqrt(1 - d.way / 0.8)),
+        restoring_force=lambda d, p: p.spring * (1 - ca.sqrt(1 - d.way / 0.8)),
     )  # fmt: skip
     model = build_model(device)
     assert not np.isfinite(integrators.home_slope(model, away=1.0)).all()

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.devices.mems_hexapod import matrices
-from ctrlgen.model.discretisation import next_sample
+from ctrlgen.model.discretisation import one_step_map
 from ctrlgen.model.linearisation import equilibrium, linearise
 from ctrlgen.physics import thermal_actuator, xy_stage
 
@@ -45,7 +45,7 @@ def test_a_settled_pose_is_where_a_long_simulation_ends():
     model = build_model(effect_device(*effects))
     P = np.linspace(0.05, 0.3, 6)
     long = simulate(model, np.tile(P, (800, 1)), 1e-3)  # 26 of the longest time constants
-    one = next_sample(model, np.inf)
+    one = one_step_map(model, np.inf)
     f = ca.Function("settled", [model.x, model.z, one.u_next, model.p], [one.x, one.z])
     x, z = model.rest, long.signals["displacement"][-1]
     x, z = f(x, z, P, model.p_nominal)
@@ -56,7 +56,7 @@ def test_a_settled_pose_is_where_a_long_simulation_ends():
 def test_the_map_of_a_sample_goes_where_a_simulation_goes(model):
     """Powers that jump move nothing at once: the temperature is still what the power before has made it."""
     h, u = 1e-3, np.repeat([[0.1] * 6, [0.4, 0.1, 0.3, 0.2, 0.1, 0.5], [0.05] * 6], 7, axis=0)
-    after = next_sample(model, h, newton_steps=8)
+    after = one_step_map(model, h, newton_steps=8)
     one = ca.Function("one", [model.x, model.z, model.u, after.u_next, model.p], [after.x, after.z])
     wanted = simulate(model, u, h)
     x, z = model.rest, wanted.signals["displacement"][0]

@@ -16,7 +16,7 @@ from conftest import ROOT
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.pose_errors import PoseErrors
 from ctrlgen.recordings.reader import load_recordings
 

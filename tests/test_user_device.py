@@ -32,8 +32,8 @@ def pendulum(**other):
         axes={"swing": "60 deg"},
         mass=lambda p: p.inertia,
         force=lambda u, p: p.motor * u.motor,
-        resistance=lambda d, p: p.weight * ca.sin(d.swing),
-        drag=lambda v, p: p.damping * v.swing,
+        restoring_force=lambda d, p: p.weight * ca.sin(d.swing),
+        damping_force=lambda v, p: p.damping * v.swing,
     )
     return ctrlgen.user_device("pendulum", **(words | other))
 
@@ -110,7 +110,7 @@ def rhs() -> ca.Function:
 
 def test_a_casadi_function_serves_as_the_right_hand_side():
     own, drive = pendulum(), drives_of(1, 1.5)["fit"][:300]
-    given = pendulum(force=None, resistance=None, drag=None, acceleration=rhs())
+    given = pendulum(force=None, restoring_force=None, damping_force=None, acceleration=rhs())
     wanted, found = (ctrlgen.simulate(ctrlgen.build_model(d), drive, STEP).signals["reading"] for d in (own, given))
     assert np.allclose(found, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
 
@@ -118,7 +118,7 @@ def test_a_casadi_function_serves_as_the_right_hand_side():
 def test_an_effect_acts_on_a_right_hand_side_as_on_forces():
     effect = [{"kind": "stiffening", "at": "swing", "k3": "0.02 N*m/rad^3"}]
     own, drive = pendulum(effect=effect), drives_of(1, 1.5)["fit"][:300]
-    given = pendulum(force=None, resistance=None, drag=None, acceleration=rhs(), effect=effect)
+    given = pendulum(force=None, restoring_force=None, damping_force=None, acceleration=rhs(), effect=effect)
     wanted, found = (ctrlgen.simulate(ctrlgen.build_model(d), drive, STEP).signals["reading"] for d in (own, given))
     assert np.allclose(found, wanted, rtol=0, atol=1e-8 * np.abs(wanted).max())
 
@@ -128,7 +128,7 @@ def test_states_of_its_own_may_depend_on_everything():
     device = pendulum(
         parameters={"inertia": "2 kg*cm^2", "k": "15 mN*m/A", "R": "3 ohm", "L": "20 mH", "weight": "20 mN*m"},
         state={"current": "1 A"}, rates=lambda x, u, v, p: (u.motor - p.R * x.current - p.k * v.swing) / p.L,
-        force=lambda x, p: p.k * x.current, drag=None,
+        force=lambda x, p: p.k * x.current, damping_force=None,
     )  # fmt: skip
     model = ctrlgen.build_model(device)
     assert model.signals["state"].channels == ("current",)
@@ -172,8 +172,8 @@ def stage():
         drive={"coil_x": "4 V", "coil_y": "4 V"}, axes={"x": "1 mm", "y": "1 mm"},
         mass=lambda p: [p.mass, p.mass],
         force=lambda u, p: {"x": p.coil * u.coil_x, "y": p.coil * u.coil_y},
-        resistance=lambda d, p: [p.kx * d.x + p.coupling * d.y, p.ky * d.y + p.coupling * d.x],
-        drag=lambda v, p: p.c * v.vector,
+        restoring_force=lambda d, p: [p.kx * d.x + p.coupling * d.y, p.ky * d.y + p.coupling * d.x],
+        damping_force=lambda v, p: p.c * v.vector,
     )  # fmt: skip
 
 
@@ -195,7 +195,7 @@ def test_stiffening_of_one_axis_of_two_is_found_there(tmp_path, small_library):
 def test_without_mass_it_stands_in_balance_and_can_be_solved_backward(tmp_path):
     device = ctrlgen.user_device(
         "lever", parameters={"k": "2 N/um", "gain": "0.5 N/V", "ratio": "3"}, drive={"piezo": "100 V"}, axes={"flexure": "25 um"},
-        force=lambda u, p: p.gain * u.piezo, resistance=lambda d, p: p.k * d.flexure,
+        force=lambda u, p: p.gain * u.piezo, restoring_force=lambda d, p: p.k * d.flexure,
         reading={"tip": "75 um"}, pose=lambda d, p: p.ratio * d.flexure,
     )  # fmt: skip
     model = ctrlgen.build_model(device, free=["mechanism.ratio"])
@@ -212,7 +212,7 @@ def test_every_fault_is_said_at_once():
         pendulum(
             parameters={"inertia": "2 kg", "a b": "1", "odd": "1 flub", "weight": ("1 N*m",), "motor": {"value": "1 V", "domain": "moon"}},
             axes={"swing": "60 deg", "slide": "1 um"}, drive={"motor": "0 V"},
-            force=lambda u, q: 1, resistance=lambda d, p: [p.wieght, 0], drag=lambda v: {"swing": 1, "z": 2},
+            force=lambda u, q: 1, restoring_force=lambda d, p: [p.wieght, 0], damping_force=lambda v: {"swing": 1, "z": 2},
             mass=lambda p: [p.inertia, ca.SX.sym("strange")], rates=lambda x: x, effect=[{"kind": "nope", "at": "swing"}],
             reading={"tip": "1 um"}, state={"hot": "20 degC"},
         )  # fmt: skip
@@ -220,7 +220,8 @@ def test_every_fault_is_said_at_once():
     for part in (
         "parameters.a b: is a name", "parameters.odd: 'flub' is not a unit", "parameters.weight", "domain = 'moon'",
         "axes.slide: '1 um' is not of the dimension of '60 deg'", "drive.motor: '0 V' is no size", "state.hot",
-        "force: asks for 'q'", "p has no 'wieght'; did you mean 'weight'?", "drag: returns 'z'", "drag: returns no 'slide'",
+        "force: asks for 'q'", "p has no 'wieght'; did you mean 'weight'?",
+        "damping_force: returns 'z'", "damping_force: returns no 'slide'",
         "mass: contains the symbol 'strange'", "pose: is missing", "'nope' is not an effect",
     ):  # fmt: skip
         assert part in text, part
@@ -229,7 +230,7 @@ def test_every_fault_is_said_at_once():
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        ({"mass": None}, "mass: is missing: drag needs"),
+        ({"mass": None}, "mass: is missing: damping_force needs"),
         ({"force": None}, "force: is missing"),
         ({"acceleration": rhs()}, "force: and acceleration are given"),
         ({"force": lambda u: [u.motor, 1]}, "force: returns 2 numbers; 1 needed: swing"),
@@ -251,7 +252,7 @@ def test_a_wrong_law_is_refused_with_what_to_do(other, said):
 
 def test_it_travels_between_processes_where_its_functions_do():
     device = pendulum(
-        force=None, resistance=None, drag=None, acceleration=rhs(),
+        force=None, restoring_force=None, damping_force=None, acceleration=rhs(),
         mass=ca.Function("mass", [J := ca.SX.sym("J")], [J], ["inertia"], ["m"]),
     )  # fmt: skip
     other = pickle.loads(pickle.dumps(device))

@@ -17,7 +17,7 @@ from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
 from ctrlgen.firmware.folder import CFolder, generate
 from ctrlgen.firmware.toolchains import find_compilers
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting import plots, report
 from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import Build

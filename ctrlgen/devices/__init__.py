@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file is read
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_toml, validate
-from ctrlgen.devices.base import Device, Limit, Links, Signal
+from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics, Limit, Signal
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")
@@ -27,4 +27,13 @@ def load_device(path: Path | str) -> Device:
     return validate(Device.library[kind], table, path)
 
 
-__all__ = ["Device", "Limit", "Links", "Signal", "load_device"]
+__all__ = [
+    "BalancedPhysics",
+    "Device",
+    "DevicePhysics",
+    "ImposedPhysics",
+    "InertialPhysics",
+    "Limit",
+    "Signal",
+    "load_device",
+]

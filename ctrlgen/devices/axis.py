@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import casadi as ca
 
 from ctrlgen.core.units import quantity, written_unit
-from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.devices.base import AxisSignal, Device, FeedbackLoop, InertialPhysics, Limit, Section, Signal
 
 ForceConstant = quantity("N/V", positive=True) | quantity("N/A", positive=True)
 
@@ -59,7 +59,7 @@ class Axis(Device):
     actuator: Actuator
     loop: Loop | None = None
 
-    def links(self, p: SimpleNamespace) -> Links:
+    def physics(self, p: SimpleNamespace) -> InertialPhysics:
         """Newton's second law with the device's numbers."""
         m, a, axes = p.mechanics, p.actuator, ("axis",)
         stroke, largest = self.mechanics.stroke.si, self.actuator.drive_limit.si
@@ -72,7 +72,7 @@ class Axis(Device):
         )
         integral = Signal("integral", "integral of the error", axes, ("um*s",), "i_", ca.SX.sym("i", 1), (stroke,))
 
-        def feedback(r: ca.SX, y: ca.SX, v: ca.SX, x: ca.SX) -> ca.SX:
+        def control_law(r: ca.SX, y: ca.SX, v: ca.SX, x: ca.SX) -> ca.SX:
             g = p.loop
             wanted = g.position_gain * g.velocity_gain * (r - y) - g.velocity_gain * v + g.integral_gain * x
             return ca.fmin(ca.fmax(wanted, -largest), largest)
@@ -84,18 +84,16 @@ class Axis(Device):
                 Limit("stroke", "stage displacement", axes, "um", signal.displacement, -stroke, stroke),
             ]
 
-        return Links(
+        loop = None
+        if self.loop is not None:
+            command = AxisSignal("amplifier drive", unit, "u_", largest)
+            loop = FeedbackLoop(control_law, lambda x, error: error, command, self.loop.measures)
+        return InertialPhysics(
             axes=axes, components=axes, pose_units=("um",), pose_scale=(stroke,), drive=drive,
             state=integral if closed else None, rest=(0.0,) if closed else (),
-            displacement_scale=stroke, force_scale=force_scale,
-            force=lambda drive, x, d: a.force_constant * drive,
-            resistance=lambda d: m.stiffness * d,
-            drag=lambda v: m.damping * v,
-            mass=(m.mass,),
-            pose=lambda d: d,
-            rates=(lambda x, error: error) if closed else (lambda x, heat: ca.SX(0, 1)),
-            feedback=feedback if closed else None,
-            measured=self.loop.measures if closed else "reading",
-            command_signal=("amplifier drive", unit, "u_", largest) if closed else None,
-            limits=limits,
+            displacement_scale=stroke, force_scale=force_scale, mass=(m.mass,),
+            dynamics=lambda drive, x, d, v: (a.force_constant * drive, ca.SX(0, 1)),
+            restoring_force=lambda d: m.stiffness * d,
+            damping_force=lambda v: m.damping * v,
+            pose=lambda d: d, feedback=loop, limits=limits,
         )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 from pydantic import Field
@@ -56,23 +56,46 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Links:
-    """The physics of one device as a chain of symbolic maps; `ctrlgen.model.model` joins them.
+class AxisSignal:
+    """How a signal with one channel an axis is shown: label, unit, prefix of its CSV columns, typical size in SI."""
 
-    drive u -> `heat` -> state x by `rates` -> `force` on the axis == `resistance` of the displacement d -> `pose`.
-    Each map takes and gives SX column vectors in SI. A device whose actuators remember nothing has no `state` and
-    no heat; `force_unit` says in what the balance is: N, or m where displacement itself is commanded.
-    `heat_signal` is (label, unit, column prefix, typical size) of what the drive becomes before it acts.
+    label: str
+    unit: str
+    column: str
+    scale: float
 
-    With a `mass` per axis the displacement has inertia, mass d'' = force - resistance(d) - `drag`(d'), instead of
-    standing in balance. With `feedback` (u, y, d', x) -> drive the loop is closed on y, the reading or the displacement
-    as `measured` says: u is the reference, and `heat` (u - y) drives the states. An `imposed` device is moved by its
-    drive (displacement, velocity, acceleration) and reads the force that takes. `bipolar` says whether the drive has
-    both signs.
-    `moving` (drive, x, d, d') -> force and rates of the states stands instead of `force` and `rates` where they depend
-    on the velocity too, or the states on the displacement.
-    `second_order` is what finite turns of a linear mechanism's links add to `pose`, `yielding` by how much less stages
-    yield to the links' load at d than at home.
+    def signal(self, name: str, axes: tuple[str, ...], expr: ca.SX) -> Signal:
+        """The signal `name` with the value `expr` (n_axes,)."""
+        n = len(axes)
+        return Signal(name, self.label, axes, (self.unit,) * n, self.column, expr, (self.scale,) * n)
+
+
+@dataclass(frozen=True)
+class FeedbackLoop:
+    """A position controller that is part of the device: computed at every sample, its output held until the next.
+
+    `control_law` (r, y, v, x) gives the amplifier's drive, shown as `command`; r is the reference, y what the loop
+    `measures` (the reading, with all its errors, or the displacement), v the velocity, x the controller's states,
+    whose rates are `rates` (x, r - y).
+    """
+
+    control_law: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
+    rates: Callable[[ca.SX, ca.SX], ca.SX]
+    command: AxisSignal
+    measures: Literal["reading", "displacement"] = "reading"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DevicePhysics:
+    """The physics of one device, as symbolic maps from drive to pose; `ctrlgen.model.assembly` joins them to a model.
+
+    This base holds what every kind of device has. Each map takes and gives SX column vectors in SI; there is one
+    displacement d for each of the `axes`, and one pose component for each of the `components`. `state` is the signal
+    of the actuators' states x, whose values at `rest` may hold free parameters; None where they have no memory.
+    `restoring_force` (d) pulls the axes home; `restoring_force_parts` (d) gives its parts by name for plots.
+    `limits` is given the namespace drive, command, state, force, displacement, mechanism_displacement of expressions.
+    `displacement_scale` and `force_scale` are typical sizes in SI, in the units `travel_unit` and `force_unit`.
+    `bipolar` says whether the drive has both signs.
     """
 
     axes: tuple[str, ...]
@@ -80,30 +103,60 @@ class Links:
     pose_units: tuple[str, ...]
     pose_scale: tuple[float, ...]
     drive: Signal
-    state: Signal | None
-    rest: tuple[float, ...]
     displacement_scale: float
     force_scale: float
-    force: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
-    resistance: Callable[[ca.SX], ca.SX]
+    restoring_force: Callable[[ca.SX], ca.SX]
     pose: Callable[[ca.SX], ca.SX]
     limits: Callable[[SimpleNamespace], Sequence[Limit]]
-    force_unit: str = "N"
-    rates: Callable[[ca.SX, ca.SX], ca.SX] = lambda x, heat: ca.SX(0, 1)
-    heat: Callable[[ca.SX], ca.SX] = lambda u: u
-    heat_signal: tuple[str, str, str, float] | None = None
-    resistance_parts: Callable[[ca.SX], dict[str, ca.SX]] = lambda d: {}
+    state: Signal | None = None
+    rest: tuple[float | ca.SX, ...] = ()
+    restoring_force_parts: Callable[[ca.SX], dict[str, ca.SX]] = lambda d: {}
     travel_unit: str = "um"
-    mass: tuple[float | ca.SX, ...] | None = None
-    drag: Callable[[ca.SX], ca.SX] | None = None
-    feedback: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX] | None = None
-    measured: str = "reading"
-    command_signal: tuple[str, str, str, float] | None = None
-    imposed: bool = False
+    force_unit: str = "N"
     bipolar: bool = True
-    moving: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
-    second_order: Callable[[ca.SX], ca.SX] | None = None
-    yielding: Callable[[ca.SX], ca.SX] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class BalancedPhysics(DevicePhysics):
+    """A stage without inertia: the displacement is where the forces balance, force(u, x, d) = restoring_force(d).
+
+    The states follow x' = rates(x, w), w = heating_power(u); `power` shows w where it is a heater's power, and is None
+    where the device has no heaters. `force_unit` is that of the balance: a length where the drive commands the
+    displacement itself.
+    `second_order_kinematics` (d) is what finite rotations of the links add to the pose of a linear mechanism,
+    `tangent_compliance` (d) by how much less the stages yield to the links' load at d than at home.
+    """
+
+    force: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    rates: Callable[[ca.SX, ca.SX], ca.SX] = lambda x, heat: ca.SX(0, 1)
+    heating_power: Callable[[ca.SX], ca.SX] = lambda u: u
+    power: AxisSignal | None = None
+    second_order_kinematics: Callable[[ca.SX], ca.SX] | None = None
+    tangent_compliance: Callable[[ca.SX], ca.SX] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InertialPhysics(DevicePhysics):
+    """A stage with a mass per axis: mass d'' = F - restoring_force(d) - damping_force(d').
+
+    `dynamics` (u, x, d, d') gives F and the rates x' of the actuators' states. With a `feedback` loop u is its
+    reference and the states are the loop's; `dynamics` is then given the amplifier's drive and its rates are not read.
+    """
+
+    mass: tuple[float | ca.SX, ...]
+    dynamics: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]]
+    damping_force: Callable[[ca.SX], ca.SX] | None = None
+    feedback: FeedbackLoop | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImposedPhysics(DevicePhysics):
+    """A stage whose motion is imposed, u = (displacement, velocity, acceleration), and the force that takes is read.
+
+    The reading is force(u, d) + restoring_force(d).
+    """
+
+    force: Callable[[ca.SX, ca.SX], ca.SX]
 
 
 class Device(Section):
@@ -121,11 +174,11 @@ class Device(Section):
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         kinds = getattr(cls.model_fields["kind"].annotation, "__args__", ())
-        if kinds:  # a device that is no file has no word for its kind
+        if kinds:  # a device that is not read from a file has no name for its kind
             Device.library[kinds[0]] = cls
 
-    def links(self, p: SimpleNamespace) -> Links:
-        """The device's physics with the values `p` (numbers, or symbols where they are free)."""
+    def physics(self, p: SimpleNamespace) -> DevicePhysics:
+        """The device's physics with the values `p` (SI numbers, or symbols where they are free)."""
         raise NotImplementedError
 
     def remarks(self) -> list[str]:

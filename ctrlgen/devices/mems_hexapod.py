@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ctrlgen.core.units import quantity
-from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.devices.base import AxisSignal, BalancedPhysics, Device, Limit, Section, Signal
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 
 Length = quantity("um", positive=True)
@@ -143,7 +143,7 @@ class MemsHexapod(Device):
             else []
         )
 
-    def links(self, p: SimpleNamespace) -> Links:
+    def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """Equations of `ctrlgen.physics` with this device's numbers."""
         a, s, h = p.actuator, p.stage, p.hexapod
         C_XY = xy_stage.stage_compliance(s, a)
@@ -166,13 +166,14 @@ class MemsHexapod(Device):
         )
         rotation_scale = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
 
-        def heat(u: ca.SX) -> ca.SX:
+        def heating_power(u: ca.SX) -> ca.SX:
             return u**2 / a.heater_resistance if voltage else u
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
-            d, carried = signal.displacement, signal.carried  # with and without what effects add on the way
+            d = signal.displacement
             # The moment is linear along a strut, so its magnitude is convex: largest at one of the strut's own ends.
             wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ("base_bottom", "platform_top"))
+            wire_stress = hexapod.wire_stress(signal.mechanism_displacement, loads, h)
             outermost = [4 * i + end for i in range(6) for end in (0, 3)]
             return [
                 Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, drive_limit),
@@ -187,12 +188,12 @@ class MemsHexapod(Device):
                     None, self.stage.notch_rotation_limit.si,
                 ),
                 Limit(
-                    "wire_stress", "wire flexure stress", wires, "MPa", hexapod.wire_stress(carried, loads, h)[outermost],
+                    "wire_stress", "wire flexure stress", wires, "MPa", wire_stress[outermost],
                     None, self.hexapod.stress_limit.si,
                 ),
             ]  # fmt: skip
 
-        return Links(
+        return BalancedPhysics(
             axes=self.axes,
             components=("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"),
             pose_units=("rad",) * 3 + ("um",) * 3,
@@ -202,20 +203,20 @@ class MemsHexapod(Device):
             rest=(a.ambient,) * 6,
             displacement_scale=1e-5,
             force_scale=0.05,
-            heat=heat,
-            heat_signal=("heater power", "W", "P_", power_limit),
+            heating_power=heating_power,
+            power=AxisSignal("heater power", "W", "P_", power_limit),
             rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
             force=lambda u, T, d: thermal_actuator.force(T, a),
-            resistance=lambda d: xy_stage.force(d, s, a),
-            resistance_parts=lambda d: {
+            restoring_force=lambda d: xy_stage.force(d, s, a),
+            restoring_force_parts=lambda d: {
                 "linear": xy_stage.linear_force(d, s, a),
                 "nonlinear": xy_stage.nonlinear_force(d, s),
             },
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
             bipolar=False,
-            yielding=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
-            second_order=lambda d: hexapod.second_order(d, h),
+            tangent_compliance=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
+            second_order_kinematics=lambda d: hexapod.second_order(d, h),
         )
 
 

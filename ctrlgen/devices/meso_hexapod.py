@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import quantity
-from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
 from ctrlgen.physics import meso_hexapod
 
 Length = quantity("mm", positive=True)
@@ -64,7 +64,7 @@ class MesoHexapod(Device):
     workspace: Workspace
     travel: Length
 
-    def links(self, p: SimpleNamespace) -> Links:
+    def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """Commanded actuator travel == stage displacement -> pose by the kinematic Jacobian (6)-(10), as printed."""
         J = meso_hexapod.kinematic_jacobian(p.hexapod, p.directions.jacobian)
         travel = self.travel.si
@@ -77,18 +77,16 @@ class MesoHexapod(Device):
             ]
 
         arm = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
-        return Links(
+        return BalancedPhysics(
             axes=self.axes,
             components=("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"),
             pose_units=("urad",) * 3 + ("um",) * 3,
             pose_scale=(arm,) * 3 + (1e-6,) * 3,
             drive=drive,
-            state=None,
-            rest=(),
             displacement_scale=travel,  # far below it the balance could not be met to its last digit
             force_scale=travel,
             force=lambda u, x, d: u,
-            resistance=lambda d: d,
+            restoring_force=lambda d: d,
             force_unit="um",
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ctrlgen.core.units import quantity
-from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.physics import piezo_stack, rrr_stage
 from ctrlgen.physics.rrr_stage import Kinetostatics
@@ -86,7 +86,7 @@ class RrrStage(Device):
         """Which hinge equations stand outside their t/R range."""
         return [f"{name}: {note}" for name, hinge in self.hinges.items() for note in hinge.notes()]
 
-    def links(self, p: SimpleNamespace) -> Links:
+    def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """Equations of `ctrlgen.physics` with this device's numbers.
 
         The stack's own stiffness counts as the stage's, so that its force depends on the voltage alone:
@@ -109,7 +109,7 @@ class RrrStage(Device):
                 Limit("stroke", "input displacement", self.axes, "um", signal.displacement, lowest, stroke),
             ]
 
-        return Links(
+        return BalancedPhysics(
             axes=self.axes,
             components=("delta_x", "delta_y", "theta_z"),
             pose_units=("um", "um", "urad"),
@@ -121,8 +121,8 @@ class RrrStage(Device):
             force_scale=self.piezo.blocking_force.si,
             rates=lambda V, u: piezo_stack.voltage_rate(V, u, p.piezo),
             force=lambda u, V, d: piezo_stack.blocked_force(V, p.piezo),
-            resistance=lambda d: ca.mtimes(K_in, d) + piezo_stack.stiffness(p.piezo) * d,
-            resistance_parts=lambda d: {
+            restoring_force=lambda d: ca.mtimes(K_in, d) + piezo_stack.stiffness(p.piezo) * d,
+            restoring_force_parts=lambda d: {
                 "hinges": ca.mtimes(K_in, d),
                 "stacks": piezo_stack.stiffness(p.piezo) * d,
             },

@@ -8,7 +8,7 @@ from typing import Literal
 import casadi as ca
 
 from ctrlgen.core.units import quantity, written_unit
-from ctrlgen.devices.base import Device, Limit, Links, Signal
+from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Signal
 
 Travel = quantity("deg", positive=True) | quantity("um", positive=True)
 
@@ -19,7 +19,7 @@ class Servo(Device):
     kind: Literal["servo"]
     travel: Travel
 
-    def links(self, p: SimpleNamespace) -> Links:
+    def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """The identity."""
         axes, unit, travel = ("axis",), written_unit(self.travel.text), self.travel.si
         drive = Signal("command", "commanded position", axes, (unit,), "r_", ca.SX.sym("u", 1), (travel,))
@@ -27,8 +27,8 @@ class Servo(Device):
         def limits(signal: SimpleNamespace) -> list[Limit]:
             return [Limit("drive", drive.label, axes, unit, signal.drive, -travel, travel)]
 
-        return Links(
-            axes=axes, components=axes, pose_units=(unit,), pose_scale=(travel,), drive=drive, state=None, rest=(),
+        return BalancedPhysics(
+            axes=axes, components=axes, pose_units=(unit,), pose_scale=(travel,), drive=drive,
             displacement_scale=travel, force_scale=travel, force_unit=unit, travel_unit=unit,
-            force=lambda u, x, d: u, resistance=lambda d: d, pose=lambda d: d, limits=limits,
+            force=lambda u, x, d: u, restoring_force=lambda d: d, pose=lambda d: d, limits=limits,
         )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import casadi as ca
 
 from ctrlgen.core.units import quantity
-from ctrlgen.devices.base import Device, Limit, Links, Section, Signal
+from ctrlgen.devices.base import Device, ImposedPhysics, Limit, Section, Signal
 
 
 class Mechanics(Section):
@@ -31,7 +31,7 @@ class TestedAxis(Device):
     kind: Literal["tested_axis"]
     mechanics: Mechanics
 
-    def links(self, p: SimpleNamespace) -> Links:
+    def physics(self, p: SimpleNamespace) -> ImposedPhysics:
         """Newton's second law, read for the force."""
         m, own = p.mechanics, self.mechanics
         stroke, speed, force = own.stroke.si, own.speed.si, own.force.si
@@ -49,9 +49,9 @@ class TestedAxis(Device):
         def limits(signal: SimpleNamespace) -> list[Limit]:
             return [Limit("stroke", "stage displacement", ("axis",), "um", signal.displacement, -stroke, stroke)]
 
-        return Links(
-            axes=("axis",), components=("force",), pose_units=("N",), pose_scale=(force,), drive=drive, state=None, rest=(),
-            displacement_scale=stroke, force_scale=force, imposed=True,
-            force=lambda motion, x, d: m.mass * motion[2] + m.damping * motion[1],
-            resistance=lambda d: m.stiffness * d, pose=lambda f: f, limits=limits,
+        return ImposedPhysics(
+            axes=("axis",), components=("force",), pose_units=("N",), pose_scale=(force,), drive=drive,
+            displacement_scale=stroke, force_scale=force,
+            force=lambda motion, d: m.mass * motion[2] + m.damping * motion[1],
+            restoring_force=lambda d: m.stiffness * d, pose=lambda f: f, limits=limits,
         )  # fmt: skip

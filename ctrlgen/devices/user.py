@@ -1,6 +1,6 @@
 """A device whose physics its user writes, as functions of named ports: `user_device`.
 
-    mass q'' = force(u, x, d, v) - resistance(d) - drag(v)   or   q'' = acceleration(u, x, d, v);   x' = rates(u, x, d, v)
+    mass q'' = force(u, x, d, v) - restoring_force(d) - damping_force(v)   or   q'' = acceleration(u, x, d, v);   x' = rates(u, x, d, v)
     reading = pose(d)
 
 u drives, x the user's own states, d displacements of the axes, v their velocities, p parameters; all SI.
@@ -20,7 +20,7 @@ from pydantic import create_model
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import Quantity, quantity, read_quantity, same_dimension, to_si, written_unit
-from ctrlgen.devices.base import Device, Limit, Links, Signal
+from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, InertialPhysics, Limit, Signal
 from ctrlgen.devices.ports import Law, Ports, ask
 from ctrlgen.devices.section import Section
 
@@ -31,10 +31,10 @@ SECTIONS = {
     "sensor": "sensing",
 }  # domain -> section
 ASKS = {
-    "force": "uxdvp", "resistance": "dp", "drag": "vp", "mass": "p", "acceleration": "uxdvp", "rates": "uxdvp", "pose": "dp",
+    "force": "uxdvp", "restoring_force": "dp", "damping_force": "vp", "mass": "p", "acceleration": "uxdvp", "rates": "uxdvp", "pose": "dp",
 }  # fmt: skip
 UNREAD = Quantity(1.0, "1")  # stands for what could not be read, so that all else is judged too
-MOVING = ("drag", "acceleration")  # laws that need a mass
+MOVING = ("damping_force", "acceleration")  # laws that need a mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,20 +70,20 @@ class Recipe:
 
 
 class UserDevice(Device):
-    """A device whose links are its user's functions; made by `user_device`, never read from a file."""
+    """A device whose physics is its user's functions; made by `user_device`, never read from a file."""
 
     kind: str = "user"
     recipe: ClassVar[Recipe]
 
-    def links(self, p: SimpleNamespace) -> Links:
-        """The user's functions with the values `p`, as the chain wants them."""
+    def physics(self, p: SimpleNamespace) -> DevicePhysics:
+        """The user's functions with the values `p`. Raises InputError with every fault of the laws."""
         r = self.recipe
         r.faults.clear()
-        size = r.force.si if r.force else _Links(r, _numbers(r, self.values())).size()
-        links = _Links(r, _numbers(r, p)).links(size)
+        size = r.force.si if r.force else _Laws(r, _numbers(r, self.values())).size()
+        physics = _Laws(r, _numbers(r, p)).physics(size)
         if r.faults:
             raise InputError(self.name, r.faults)
-        return links
+        return physics
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Its class is made anew where it is unpickled; its functions must be ones that can be pickled."""
@@ -98,7 +98,7 @@ def _numbers(recipe: Recipe, p: SimpleNamespace) -> Ports:
     return Ports("p", tuple(values), ca.vertcat(ca.SX(0, 1), *map(ca.SX, values.values())))
 
 
-class _Links:
+class _Laws:
     """Puts the laws of a recipe together."""
 
     def __init__(self, recipe: Recipe, p: Ports) -> None:
@@ -108,15 +108,15 @@ class _Links:
         self.mass = recipe.ask("mass", p)
 
     def pushed(self, u: ca.SX, x: ca.SX, d: ca.SX, v: ca.SX) -> ca.SX:
-        """Force on the axes beside `resistance` and `drag`; an acceleration is a force on the mass."""
+        """Force on the axes beside `restoring_force` and `damping_force`; an acceleration is a force on the mass."""
         if "acceleration" not in self.r.laws:
             return self.r.ask("force", self.p, u=u, x=x, d=d, v=v)
-        return self.mass * self.r.ask("acceleration", self.p, u=u, x=x, d=d, v=v) + self.resistance(d)
+        return self.mass * self.r.ask("acceleration", self.p, u=u, x=x, d=d, v=v) + self.restoring_force(d)
 
-    def resistance(self, d: ca.SX) -> ca.SX:
+    def restoring_force(self, d: ca.SX) -> ca.SX:
         """What brings the axes home; of an acceleration, its part at standstill without drive."""
         if "acceleration" not in self.r.laws:
-            return self.r.ask("resistance", self.p, d=d)
+            return self.r.ask("restoring_force", self.p, d=d)
         n = len(self.r.axes)
         still = {"u": ca.SX.zeros(len(self.r.drive), 1), "x": ca.SX.zeros(len(self.r.state), 1), "v": ca.SX.zeros(n, 1)}
         here, home = (self.r.ask("acceleration", self.p, d=at, **still) for at in (d, ca.SX.zeros(n, 1)))
@@ -126,7 +126,7 @@ class _Links:
         """Typical force: what full drive and state give at home, or what the full travel takes."""
         n, r = len(self.r.axes), self.r
         u, d, still = ca.SX.sym("u", len(r.drive)), ca.SX.sym("d", n), ca.SX.zeros(n if self.inertial else 0, 1)
-        laws = [self.pushed(u, self.x, d, still), self.resistance(d)]
+        laws = [self.pushed(u, self.x, d, still), self.restoring_force(d)]
         if r.faults:
             return 1.0
         law = ca.Function("law", [u, self.x, d], laws)
@@ -134,17 +134,17 @@ class _Links:
         held = law(0, 0, _sizes(r.axes))[1].full()
         return float(next((found for f in (pushed, held) if 0 < (found := np.abs(f).max()) < np.inf), 1.0))
 
-    def links(self, size: float) -> Links:
-        """The links; what is wrong with the laws is noted in the recipe."""
+    def physics(self, size: float) -> DevicePhysics:
+        """The laws as a device's physics, `size` the typical force; faults of the laws are noted in the recipe."""
         r, n, axes = self.r, len(self.r.axes), tuple(self.r.axes)
         u, d, v = ca.SX.sym("u", len(r.drive)), ca.SX.sym("d", n), ca.SX.sym("v", n if self.inertial else 0)
         for law, vectors in {
-            "drag": {"v": v},
+            "damping_force": {"v": v},
             "rates": {"u": u, "x": self.x, "d": d, "v": v},
             "pose": {"d": d},
         }.items():
             r.ask(law, self.p, **vectors)  # for its faults, so that all are listed
-        self.pushed(u, self.x, d, v), self.resistance(d)
+        self.pushed(u, self.x, d, v), self.restoring_force(d)
         travel = max(q.si for q in r.axes.values())
         unit = written_unit(next(iter(r.axes.values())).text)
         common = dict(
@@ -153,19 +153,18 @@ class _Links:
             state=Signal("state", "state", tuple(r.state), _units(r.state), "x_", self.x, _sizes(r.state)) if r.state else None,
             rest=(0.0,) * len(r.state), displacement_scale=travel, travel_unit=unit, force_scale=size,
             force_unit=written_unit(r.force.text) if r.force else "N*m" if same_dimension(unit, "rad") else "N",
-            resistance=self.resistance, limits=self.limits,
+            restoring_force=self.restoring_force, limits=self.limits,
             pose=(lambda d: r.ask("pose", self.p, d=d)) if "pose" in r.laws else (lambda d: d),
         )  # fmt: skip
         if not self.inertial:
-            return Links(
+            return BalancedPhysics(
                 **common, force=lambda u, x, d: self.pushed(u, x, d, d[:0]),
                 rates=lambda x, u: r.ask("rates", self.p, u=u, x=x),
             )  # fmt: skip
-        return Links(
-            **common, force=lambda u, x, d: self.pushed(u, x, d, ca.SX.zeros(n, 1)),
-            mass=tuple(ca.vertsplit(self.mass)),
-            drag=(lambda v: r.ask("drag", self.p, v=v)) if "drag" in r.laws else None,
-            moving=lambda u, x, d, v: (self.pushed(u, x, d, v), r.ask("rates", self.p, u=u, x=x, d=d, v=v)),
+        return InertialPhysics(
+            **common, mass=tuple(ca.vertsplit(self.mass)),
+            damping_force=(lambda v: r.ask("damping_force", self.p, v=v)) if "damping_force" in r.laws else None,
+            dynamics=lambda u, x, d, v: (self.pushed(u, x, d, v), r.ask("rates", self.p, u=u, x=x, d=d, v=v)),
         )  # fmt: skip
 
     def limits(self, signal: SimpleNamespace) -> list[Limit]:
@@ -260,11 +259,11 @@ class _Reader:
             "needs the inertia of each axis, on which the forces of effects act",
             "rates": bool(state) and "is missing: a state needs its rate",
             "pose": not same and "is missing: readings that are not the axes themselves need pose(d, p)",
-            "resistance": "mass" not in there and "is missing: an axis without mass stands where resistance = force",
+            "restoring_force": "mass" not in there and "is missing: an axis without mass stands where restoring_force = force",
         }  # fmt: skip
         self.faults += [Fault(name, what) for name, what in need.items() if what and name not in there]
         if "acceleration" in there:
-            for other in ("force", "resistance", "drag"):
+            for other in ("force", "restoring_force", "damping_force"):
                 if other in there:
                     self.faults.append(Fault(other, "and acceleration are given; acceleration is all of it, give one"))
         elif "force" not in there:
@@ -281,8 +280,8 @@ def user_device(
     drive: Mapping[str, str],
     axes: Mapping[str, str],
     force: Law | None = None,
-    resistance: Law | None = None,
-    drag: Law | None = None,
+    restoring_force: Law | None = None,
+    damping_force: Law | None = None,
     mass: Law | None = None,
     acceleration: Law | None = None,
     state: Mapping[str, str] | None = None,
@@ -319,7 +318,7 @@ def user_device(
                 Fault(f"axes.{axis}", f"{q.text!r} is not of the dimension of {first.text!r}; all axes are")
             )
     given = {
-        "force": force, "resistance": resistance, "drag": drag, "mass": mass, "acceleration": acceleration,
+        "force": force, "restoring_force": restoring_force, "damping_force": damping_force, "mass": mass, "acceleration": acceleration,
         "rates": rates, "pose": pose,
     }  # fmt: skip
     laws = read.laws(given, sizes["state"], reading is None or list(reading) == list(axes))
@@ -350,13 +349,15 @@ def _checked(recipe: Recipe, tables: dict[str, Any], plain: dict[str, Any], read
 
 def _at_home(device: Device, read: _Reader) -> None:
     """Notes what is not a number at home and at rest."""
-    links = device.links(device.values())
-    n = len(links.axes)
-    d, v, x, u = ca.SX.sym("d", n), ca.SX.sym("v", n), ca.SX.sym("x", len(links.rest)), links.drive.expr
-    pushed, rates = links.moving(u, x, d, v) if links.moving else (links.force(u, x, d), links.rates(x, u))
-    laws = {"force": pushed, "rates": rates, "resistance": links.resistance(d), "pose": links.pose(d)}
-    laws |= {"drag": links.drag(v)} if links.drag else {}
-    laws |= {"mass": ca.vertcat(*links.mass)} if links.mass else {}
+    physics = device.physics(device.values())
+    n = len(physics.axes)
+    d, v, x, u = ca.SX.sym("d", n), ca.SX.sym("v", n), ca.SX.sym("x", len(physics.rest)), physics.drive.expr
+    inertial = isinstance(physics, InertialPhysics)
+    force, rates = physics.dynamics(u, x, d, v) if inertial else (physics.force(u, x, d), physics.rates(x, u))
+    laws = {"force": force, "rates": rates, "restoring_force": physics.restoring_force(d), "pose": physics.pose(d)}
+    if inertial:
+        laws |= {"damping_force": physics.damping_force(v)} if physics.damping_force else {}
+        laws["mass"] = ca.vertcat(*physics.mass)
     home = ca.Function("home", [u, x, d, v], list(laws.values()))(0, 0, 0, 0)
     for law, value in zip(laws, home, strict=True):
         found = np.array(value).ravel()

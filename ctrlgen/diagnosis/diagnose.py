@@ -23,15 +23,15 @@ from ctrlgen.diagnosis.estimation.profile_likelihood import profiles
 from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence.supporting_analyses import evidence
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_physics
 from ctrlgen.diagnosis.selection.dead_channels import alive
 from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, errors, findings, verdict
 from ctrlgen.diagnosis.selection.direct_detection import read_off
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.settings import NOISE_UPDATE, SIMULATION
+from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
-from ctrlgen.model.model import build_model, movable
 from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
@@ -74,11 +74,11 @@ def _diagnose(
     fitter.recording, spikes = mark_outliers(recording, lambda record: fitter.predict(described, record))
     acting = set(movable(device))
     sample_times = {r.sample_time for r in recording.records}
-    links = nominal_links(device)
+    physics = nominal_physics(device)
     look_back = min(sample_times) if np.isfinite(min(sample_times)) else None
     ambient = any(r.ambient is not None for r in recording.records)
     open_ = [
-        h for h in hypotheses(device, links, recording.channels, look_back, ambient)
+        h for h in hypotheses(device, physics, recording.channels, look_back, ambient)
         if h.effect != PARAMETER or h.path in acting
     ]  # fmt: skip
     step(f"refit of the device as described, {len(open_)} hypotheses")

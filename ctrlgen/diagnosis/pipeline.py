@@ -21,7 +21,7 @@ from ctrlgen.diagnosis.report.diagnosis_json import as_dict
 from ctrlgen.diagnosis.report.html_report import Provenance, page
 from ctrlgen.diagnosis.report.writeback import write_next
 from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.recordings.schema import FILE

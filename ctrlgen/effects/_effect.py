@@ -130,8 +130,8 @@ class Effect:
     displacement), the effect's own states, `ambient` (rise of the surroundings [K]), `sample_time` [s] where it is
     needed and, for axis channels, `displacement` (and `displacements` of all axes), `velocity` (None for a device
     without inertia), `force` (that the stage takes at this displacement) and the actuator's `state`, such as its
-    temperature, with its `rest`; where the device has them, `second_order()` of the pose and `yielding()` of the stages,
-    vectors, see `Links`. `p` gives the parameters in SI.
+    temperature, with its `rest`; where the device has them, `second_order_kinematics()` of the pose and
+    `tangent_compliance()` of the stages, vectors, see `BalancedPhysics`. `p` gives the parameters in SI.
 
     An effect of `pairs` couples two channels: `partner` is the index of the other one; a `mutual` one acts on both.
     `channel_unit` and `partner_unit` restrict it to channels of that dimension (`channel`: that of its own).
@@ -143,7 +143,8 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
-    # of actuator, ambient, bipolar, force, heat, sample_time, second_order, spatial, state, unheated, velocity, yielding
+    # of actuator, ambient, bipolar, force, heat, sample_time, second_order_kinematics, spatial, state, tangent_compliance, unheated,
+    # velocity
     needs: ClassVar[frozenset[str]] = frozenset()
     pairs: ClassVar[bool] = False
     whole: ClassVar[bool] = False  # one law of all channels: suspected at all of them at once

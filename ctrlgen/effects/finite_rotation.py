@@ -10,10 +10,10 @@ class FiniteRotation(Effect):
     """
 
     place = Place.POSE
-    needs = frozenset({"second_order"})
+    needs = frozenset({"second_order_kinematics"})
     whole = True
     source = "J.-P. Merlet, Parallel Robots (2006), chapter 4: loop closure, expanded to second order"
     params = (Param("share", "1", (-2.0, 4.0), "1 for links on ideal pivots", off=0.0),)
 
     def term(self, s, p):
-        return p.share * s.second_order()[s.index]
+        return p.share * s.second_order_kinematics()[s.index]

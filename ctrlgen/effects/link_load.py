@@ -10,10 +10,10 @@ class LinkLoad(Effect):
     """
 
     place = Place.DISPLACEMENT
-    needs = frozenset({"yielding"})
+    needs = frozenset({"tangent_compliance"})
     whole = True
     source = "S1 eq. (12) and (16): stages in series with struts, at the stage's tangent stiffness"
     params = (Param("share", "1", (-2.0, 4.0), "1 for the stage's own law", off=0.0),)
 
     def term(self, s, p):
-        return p.share * s.yielding()[s.index]
+        return p.share * s.tangent_compliance()[s.index]

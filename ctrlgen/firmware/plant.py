@@ -24,8 +24,9 @@ from ctrlgen.devices import Signal
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment, write
-from ctrlgen.model.discretisation import balanced, next_sample
-from ctrlgen.model.model import Model, build_model
+from ctrlgen.model.assembly import build_model
+from ctrlgen.model.discretisation import balanced, one_step_map
+from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Scenario
 
 NEWTON_MOST = 50  # steps, as of the balance in `ctrlgen.model.simulation`
@@ -55,7 +56,7 @@ class Plant:
         """x one sample on; with inertia x and then z."""
         m = self.model
         if self.inertial:
-            after = next_sample(m, self.sample_time)
+            after = one_step_map(m, self.sample_time)
             return self._kernel("advance", ca.vertcat(after.x, after.z))
         return self._kernel("advance", m.step(self.sample_time))
 

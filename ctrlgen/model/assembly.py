@@ -1,338 +1,286 @@
-"""A device's links and its effects' terms, joined place by place into the equations of a model."""
+"""Device -> Model: a device's physics and its effects' terms, joined place by place into one symbolic statement.
+
+u --(drive terms)--> drive --rates--> x --force(terms)--> balance with the stage --> z
+  --(displacement terms)--> pose(terms) --> reading(terms)
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import partial
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.units import base_unit, same_dimension
-from ctrlgen.devices import Device, Links, Signal
+from ctrlgen.core.units import base_unit, show
+from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics, Signal
 from ctrlgen.devices.sensor import mounting_faults
-from ctrlgen.effects import Effect, Place, Where
+from ctrlgen.effects import Place
+from ctrlgen.model.effect_terms import EffectTerms
+from ctrlgen.model.model import Model
 
-REACH = 10.0  # typical travels up to which a law is told the stage's force: beyond, a search may look but no stage goes
-
-
-class Chain:
-    """Joins a device's links and its effects' terms, place by place."""
-
-    def __init__(
-        self, device: Device, links: Links, p: SimpleNamespace, ambient: ca.SX, sample_time: float | None
-    ) -> None:
-        self.device, self.links, self.ambient, self.sample_time = device, links, ambient, sample_time
-        self.z = ca.SX.sym("d", len(links.axes))
-        reach = REACH * links.displacement_scale
-        self.within_reach = ca.fmin(ca.fmax(self.z, -reach), reach)
-        self.resisting = links.resistance(self.within_reach)
-        self.v = ca.SX.sym("v", len(links.axes) if links.mass else 0)
-        self.velocity = links.drive.expr[1] if links.imposed else self.v
-        self.acceleration = ca.SX.sym("a", self.v.numel())
-        self.before: dict[Place, list[tuple[float, ca.SX]]] = {}  # stages, and the signal before each
-        self.held = self.held_value = ca.SX(0, 1)
-        self.rates: ca.SX | None = None
-        self.carried = self.z
-        self.own_force = ca.SX(len(links.axes), 1)
-        self.members: list[_Member] = []
-        self.faults: list[Fault] = mounting_faults(device.sensor, links.components, links.pose_units)
-        for k, effect in enumerate(device.effect):
-            self._place(k, effect, p.effect[k])
-        if self.faults:
-            raise InputError(device.name, self.faults)
-
-    def _place(self, k: int, effect: Effect, values: SimpleNamespace) -> None:
-        """One member per channel on which the effect acts; its faults are noted."""
-        places = channels(self.links, effect.place)
-        names = [where.channel for where in places]
-        for need in sorted(effect.needs - available(self.links, sample_time=self.sample_time)):
-            self.faults.append(Fault(f"effect[{k}].kind", f"{effect.kind} acts on {need}, and this device has none"))
-        chosen = range(len(names)) if effect.at == "all" else [i for i, c in enumerate(names) if c == effect.at]
-        if not chosen:
-            self.faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(names)}, all"))
-        if effect.of is not None and effect.of not in names:
-            self.faults.append(Fault(f"effect[{k}].of", f"{effect.of!r} is not one of {', '.join(names)}"))
-            return
-        other = None if effect.of is None else names.index(effect.of)
-        pairs = [(i, other) for i in chosen]
-        if effect.mutual:
-            pairs += [(other, i) for i in chosen]
-        for i, partner in pairs:
-            where = places[i] if partner is None else places[i].beside(places[partner])
-            if not effect.fits(where):
-                if effect.at != "all":
-                    self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} has no meaning at {names[i]}"))
-                continue
-            self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in effect.faults_at(where)]
-            states = {s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") for s in effect.states}
-            self.members.append(_Member(effect, values, where, i, partner, states))
-
-    def _with_terms(self, place: Place, before: ca.SX) -> ca.SX:
-        """`before` plus every term of the effects at `place`, stage after stage; their rates are noted on the way."""
-        total, here = ca.SX(before), [m for m in self.members if m.effect.place is place]
-        levels = self.before[place] = []
-        for stage in sorted({m.effect.stage for m in here}):
-            levels.append((stage, total[:]))
-            for member in here:
-                if member.effect.stage == stage:
-                    s = self.seen(place, member.index, member.partner, member.states, stage)
-                    total[member.index] += member.act(s)
-        levels.append((float("inf"), total[:]))
-        return total
-
-    def seen(
-        self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX], stage: int = 0
-    ) -> SimpleNamespace:
-        """What the law of an effect at channel `i` and a stage of `place` may read, with the effect's own `states`."""
-        before = next(signal for level, signal in self.before[place] if level >= stage)
-        s = SimpleNamespace(
-            value=before[i], all=before, index=i, partner=partner, ambient=self.ambient, sample_time=self.sample_time,
-            **states,
-        )  # fmt: skip
-        s.second_order, s.yielding = (lambda: self.second_order), (lambda: self.yielding)
-        if place not in (Place.POSE, Place.SENSOR):
-            i = min(i, len(self.links.axes) - 1)
-            s.displacement, s.displacements = self.z[i], self.z
-            s.velocity = self.velocity[i] if self.velocity.numel() else None
-            heated = self.links.state is not None and self.links.heat_signal is not None
-            s.state = self.links.state.expr[i] if heated else None
-            s.rest = self.links.rest[i] if heated else None
-            s.force = self.resisting[i]
-        known = place in (Place.POSE, Place.SENSOR) and self.v.numel() and not self.links.imposed
-        s.rate = ca.jtimes(s.value, self.z, self.v) if known else None
-        s.second_rate = None
-        if known:
-            s.second_rate = ca.jtimes(s.rate, self.z, self.v) + ca.jtimes(s.rate, self.v, self.acceleration)
-        where = channels(self.links, place)[s.index]
-        s.scale, s.travel = where.scale, where.travel_scale
-        return s
-
-    @cached_property
-    def second_order(self) -> ca.SX:
-        """What finite turns add to the pose at the displacement carried; built when an effect asks."""
-        return self.links.second_order(self.carried)
-
-    @cached_property
-    def yielding(self) -> ca.SX:
-        """How much less the stages yield to the links' load than at home; built when an effect asks."""
-        return self.links.yielding(self.within_reach)
-
-    def parts(self, p: ca.SX, p_nominal: np.ndarray) -> dict[str, Any]:
-        """The fields of `ctrlgen.model.model.Model`."""
-        links, n = self.links, len(self.links.axes)
-        z = self.z
-        x = ca.SX(0, 1) if links.state is None else links.state.expr
-        signals, balance, arriving, heat, produced = self._imposed(x) if links.imposed else self._driven(x)
-        state = links.state
-        memories = [
-            (m, s, symbol) for m in self.members for s, symbol in zip(m.effect.states, m.states.values(), strict=True)
-        ]
-        memory_rates = ca.vertcat(ca.SX(0, 1), *(m.rates[s.name] for m, s, _ in memories))
-        acceleration = balance / ca.vertcat(*links.mass) if links.mass else ca.SX(0, 1)
-        first = x.numel()
-        own = links.rates(x, arriving) if self.rates is None else self.rates
-        rates = ca.vertcat(own, memory_rates, acceleration)
-        following = {first + k: m.stepped[s.name] for k, (m, s, _) in enumerate(memories) if s.stepped}
-        sampled = ca.substitute(rates, heat, produced)
-
-        def closed(expr: ca.SX) -> ca.SX:
-            moving = ca.substitute(ca.SX(expr), self.acceleration, acceleration)
-            return ca.substitute(moving, self.held, self.held_value)
-
-        signals = {role: replace(signal, expr=closed(signal.expr)) for role, signal in signals.items()}
-        return dict(
-            name=self.device.name,
-            device=self.device,
-            x=ca.vertcat(x, *(symbol for *_, symbol in memories), self.v),
-            n_states=first,
-            z=z,
-            v=self.v,
-            u=links.drive.expr,
-            p=p,
-            p_nominal=p_nominal,
-            ambient=self.ambient,
-            stepped={i: closed(value) for i, value in following.items()},
-            sticking=self._sticking(),
-            bristles=tuple(first + k for k, (m, s, _) in enumerate(memories) if m.effect.sticks and not s.stepped),
-            acceleration=self.acceleration,
-            held=self.held,
-            held_value=self.held_value,
-            sampled_rates=sampled,
-            clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
-            x_names=(
-                *(() if state is None else (f"{state.name}_{channel}" for channel in state.channels)),
-                *(symbol.name() for *_, symbol in memories),
-                *(f"velocity_{axis}" for axis in links.axes[: self.v.numel()]),
-            ),
-            x_units=tuple(
-                base_unit(u)
-                for u in (
-                    *(() if state is None else state.units),
-                    *(m.where.unit_of(s) for m, s, _ in memories),
-                    *(f"({links.travel_unit})/s",) * self.v.numel(),
-                )
-            ),
-            heat=heat,
-            heat_of_drive=closed(produced),
-            rates_of_heat=closed(rates),
-            balance=closed(balance),
-            signals=signals,
-            force_parts=links.resistance_parts(z),
-            limits=tuple(
-                links.limits(
-                    SimpleNamespace(
-                        drive=links.drive.expr,
-                        state=x,
-                        force=signals["force"].expr,
-                        displacement=z,
-                        carried=signals["displacement"].expr,
-                        command=signals.get("command", links.drive).expr,
-                    )
-                )
-            ),
-            rest=np.concatenate([_numbers(links.rest, p, p_nominal), np.zeros(len(memories) + self.v.numel())]),
-            x_scale=np.array(
-                [
-                    *(() if state is None else state.scale),
-                    *(m.where.si(s.scale, s) for m, s, _ in memories),
-                    *(100 * links.displacement_scale,) * self.v.numel(),
-                ]
-            ),
-            z_scale=np.full(n, links.displacement_scale),
-            u_scale=np.array(links.drive.scale),
-            force_scale=links.force_scale,
-            seen=self.seen,
-        )
-
-    def _driven(self, x: ca.SX) -> tuple[dict[str, Signal], ca.SX, ca.SX, ca.SX, ca.SX]:
-        """Signals, force balance, arriving heat, the symbol of heat and what it is of the drive."""
-        links, z, n = self.links, self.z, len(self.links.axes)
-        displacement = self._with_terms(Place.DISPLACEMENT, z)
-        self.carried = displacement
-        pose = self._with_terms(Place.POSE, links.pose(displacement))
-        reading = self._with_terms(Place.SENSOR, pose)
-        u = links.drive.expr
-        measured = reading if links.measured == "reading" else z
-        command = links.feedback(u, measured, self.v, x) if links.feedback else u
-        if links.feedback:  # computed at every sample and held until the next
-            self.held, self.held_value = ca.SX.sym("held", n), command
-        drive = self._with_terms(Place.DRIVE, self.held if links.feedback else u)
-        produced = u - measured if links.feedback else links.heat(drive)
-        heat = ca.SX.sym("heat", produced.numel())  # an unknown of its own: the inverse need not take squares apart
-        arriving = self._with_terms(Place.HEAT, heat)
-        if links.moving:
-            pushed, self.rates = links.moving(drive, x, z, self.v)
-        else:
-            pushed = links.force(drive, x, z)
-        drag = links.drag(self.v) if links.drag else ca.SX(n, 1)
-        self.own_force = pushed - drag
-        balance = self._with_terms(Place.FORCE, pushed) - links.resistance(z) - drag
-        signals = {"drive": links.drive}
-        if links.command_signal is not None:
-            label, unit, column, size = links.command_signal
-            signals["command"] = Signal("command", label, links.axes, (unit,) * n, column, command, (size,) * n)
-        if links.heat_signal is not None:
-            label, unit, column, size = links.heat_signal
-            arrived = ca.substitute(arriving, heat, produced)
-            signals["power"] = Signal("power", label, links.axes, (unit,) * n, column, arrived, (size,) * n)
-        if links.state is not None:
-            signals["state"] = links.state
-        signals |= self._mechanical(pushed, displacement, pose, reading)
-        return signals, balance, arriving, heat, produced
-
-    def _sticking(self) -> tuple[int, ...]:
-        """Axes with inertia on which an effect sticks, or whose own force bends with their velocity."""
-        slopes = (
-            [ca.jacobian(self.own_force[i], v) for i, v in enumerate(ca.vertsplit(self.v))] if self.v.numel() else []
-        )
-        bent = {i for i, slope in enumerate(slopes) if ca.depends_on(slope, self.v[i])}
-        stuck = {m.index for m in self.members if m.effect.sticks and m.effect.place is Place.FORCE}
-        return tuple(sorted((bent | stuck) if slopes else ()))
-
-    def _imposed(self, x: ca.SX) -> tuple[dict[str, Signal], ca.SX, ca.SX, ca.SX, ca.SX]:
-        """The same where the motion is given and the force that takes is read."""
-        links, n = self.links, len(self.links.axes)
-        drive = self._with_terms(Place.DRIVE, links.drive.expr)
-        displacement = self._with_terms(Place.DISPLACEMENT, self.z)
-        taken = links.force(drive, x, displacement) + links.resistance(displacement)
-        helped = self._with_terms(Place.FORCE, ca.SX(n, 1))
-        force = self._with_terms(Place.POSE, taken - helped)
-        reading = self._with_terms(Place.SENSOR, force)
-        signals = {"drive": links.drive, **self._mechanical(taken - helped, displacement, force, reading)}
-        heat = ca.SX.sym("heat", n)
-        return signals, drive[:n] - self.z, heat, heat, drive[:n]
-
-    def _mechanical(self, force: ca.SX, displacement: ca.SX, pose: ca.SX, reading: ca.SX) -> dict[str, Signal]:
-        links, axes, n = self.links, self.links.axes, len(self.links.axes)
-        posed, travel = (links.components, links.pose_units), (links.displacement_scale,) * n
-        units, sizes = (links.force_unit,) * n, (links.force_scale,) * n
-        moved = (links.travel_unit,) * n
-        return {
-            "force": Signal("force", "actuator force", axes, units, "F_", force, sizes),
-            "displacement": Signal("displacement", "stage displacement", axes, moved, "d_", displacement, travel),
-            "pose": Signal("pose", "platform pose", *posed, "", pose, links.pose_scale),
-            "reading": Signal("reading", "sensor reading", *posed, "reading_", reading, links.pose_scale),
-        }
+TYPICAL_RATE = 100.0  # 1/s: a typical velocity is a typical displacement times this
+STROKE_POINTS = 65  # points of the stroke, ends included, at which the tangent stiffness is checked
+NONE = ca.SX(0, 1)  # a vector without components
+NO_RISE = ca.SX(0)  # the surroundings as they are described
 
 
-@dataclass
-class _Member:
-    """One effect on one channel, with what its law said when it was asked."""
+def build_model(
+    device: Device, free: Sequence[str] = (), ambient: ca.SX | None = None, sample_time: float | None = None
+) -> Model:
+    """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
 
-    effect: Effect
-    values: SimpleNamespace
-    where: Where
-    index: int
-    partner: int | None
-    states: dict[str, ca.SX]
-    rates: dict[str, ca.SX] = field(default_factory=dict)
-    stepped: dict[str, ca.SX] = field(default_factory=dict)
+    `free` are dotted paths as in `device.quantities()`; `ambient` is a symbol for the rise of the surroundings [K],
+    where that is not zero; `sample_time` [s] is needed by effects that look back by samples. Raises InputError for a
+    path that is no parameter or acts on nothing, an effect that does not fit the device, and a restoring force that
+    does not rise over the stroke.
+    """
+    nominal = dict(device.quantities())
+    unknown = [path for path in free if path not in nominal]
+    if unknown:
+        raise InputError(device.name, [Fault(path, "is not a parameter of this device") for path in unknown])
+    counts = [path for path in free if nominal[path].whole]
+    if counts:
+        raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
+    model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time)
+    idle = [path for path in free if path not in model.moved_by]
+    if idle:
+        what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
+        raise InputError(device.name, [Fault(path, what) for path in idle])
+    _check_stiffness(model)
+    return model
 
-    def act(self, s: SimpleNamespace) -> ca.SX:
-        """The term; the states' rates and new values are kept."""
-        self.stepped = {name: ca.SX(value) for name, value in self.effect.update(s, self.values).items()}
-        s.__dict__.update(self.stepped)
-        idle = {state.name: ca.SX(float(state.clock)) for state in self.effect.states}
-        self.rates = {**idle, **self.effect.rates(s, self.values)}
-        return self.effect.term(s, self.values)
+
+def movable(device: Device) -> tuple[str, ...]:
+    """Paths of the parameters that act on motion or readings, not only on limits."""
+    paths = [path for path, number in device.quantities() if not number.whole]
+    model = _assemble(device, paths, NO_RISE, sample_time=1.0)
+    return tuple(path for path in paths if path in model.moved_by)
 
 
-def channels(links: Links, place: Place) -> list[Where]:
-    """Where an effect of `place` can act on a device."""
-    if place in (Place.POSE, Place.SENSOR):
-        rows = zip(links.components, links.pose_units, links.pose_scale, strict=True)
-    elif place is Place.DRIVE and links.command_signal is not None:
-        rows = ((axis, links.command_signal[1], links.command_signal[3]) for axis in links.axes)
-    elif place is Place.DRIVE:
-        rows = zip(links.drive.channels, links.drive.units, links.drive.scale, strict=True)
+@dataclass(frozen=True)
+class Assembly:
+    """The equations of a device with its effects.
+
+    `rates` of the device's own states and `balance`, zero or mass times acceleration, in terms of the symbol `heat`,
+    whose value is `heat_of_drive`, and of `held`, the output of a feedback loop, whose value is `held_value`.
+    `own_force` is the device's force on the axes, damping included, without its effects.
+    """
+
+    signals: dict[str, Signal]
+    rates: ca.SX
+    balance: ca.SX
+    heat: ca.SX
+    heat_of_drive: ca.SX
+    held: ca.SX = NONE
+    held_value: ca.SX = NONE
+    own_force: ca.SX = NONE
+
+
+def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: float | None) -> Model:
+    """The model of `device` with the parameters `free` as symbols: the one place where a Model is made."""
+    nominal = dict(device.quantities())
+    symbols = {path: ca.SX.sym(path) for path in free}
+    values = device.values(symbols)
+    p, p_nominal = ca.vertcat(NONE, *symbols.values()), np.array([nominal[path].si for path in free])
+    physics = device.physics(values)
+    n = len(physics.axes)
+    inertial = isinstance(physics, InertialPhysics)
+    z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n if inertial else 0), ca.SX.sym("a", n if inertial else 0)
+    velocity = physics.drive.expr[1] if isinstance(physics, ImposedPhysics) else v
+    terms = EffectTerms(device, physics, values, z, velocity, a, ambient, sample_time)
+    faults = mounting_faults(device.sensor, physics.components, physics.pose_units) + terms.faults
+    if faults:
+        raise InputError(device.name, faults)
+    join = {BalancedPhysics: _balanced, InertialPhysics: partial(_inertial, v=v), ImposedPhysics: _imposed}
+    parts = join[type(physics)](physics, terms, z)
+
+    state, memories = physics.state, terms.memories()
+    own_x = NONE if state is None else state.expr
+    first = own_x.numel()  # place in x of the effects' states
+    acceleration = parts.balance / ca.vertcat(*physics.mass) if inertial else NONE
+    memory_rates = ca.vertcat(NONE, *(m.rates[s.name] for m, s, _ in memories))
+    rates = ca.vertcat(parts.rates, memory_rates, acceleration)
+
+    def closed(expr: ca.SX) -> ca.SX:
+        """`expr` without the symbols of the acceleration and of a held drive."""
+        return ca.substitute(ca.substitute(ca.SX(expr), a, acceleration), parts.held, parts.held_value)
+
+    signals = {name: replace(signal, expr=closed(signal.expr)) for name, signal in parts.signals.items()}
+    return Model(
+        name=device.name,
+        device=device,
+        x=ca.vertcat(own_x, *(symbol for *_, symbol in memories), v),
+        n_states=first,
+        z=z,
+        v=v,
+        u=physics.drive.expr,
+        p=p,
+        p_nominal=p_nominal,
+        ambient=ambient,
+        acceleration=a,
+        held=parts.held,
+        held_value=parts.held_value,
+        heat=parts.heat,
+        heat_of_drive=closed(parts.heat_of_drive),
+        rates_of_heat=closed(rates),
+        sampled_rates=ca.substitute(rates, parts.heat, parts.heat_of_drive),
+        balance=closed(parts.balance),
+        stepped={first + k: closed(m.stepped[s.name]) for k, (m, s, _) in enumerate(memories) if s.stepped},
+        clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
+        set_valued_axes=_set_valued_axes(terms, v, parts.own_force),
+        bristles=tuple(first + k for k, (m, s, _) in enumerate(memories) if m.effect.sticks and not s.stepped),
+        signals=signals,
+        force_parts=physics.restoring_force_parts(z),
+        limits=tuple(physics.limits(_limited(physics, signals, own_x, z))),
+        law_inputs=terms.law_inputs,
+        x_names=(
+            *(() if state is None else (f"{state.name}_{channel}" for channel in state.channels)),
+            *(symbol.name() for *_, symbol in memories),
+            *(f"velocity_{axis}" for axis in physics.axes[: v.numel()]),
+        ),
+        x_units=tuple(
+            base_unit(unit)
+            for unit in (
+                *(() if state is None else state.units),
+                *(m.where.unit_of(s) for m, s, _ in memories),
+                *(f"({physics.travel_unit})/s",) * v.numel(),
+            )
+        ),
+        rest=np.concatenate([_numbers(physics.rest, p, p_nominal), np.zeros(len(memories) + v.numel())]),
+        x_scale=np.array([
+            *(() if state is None else state.scale),
+            *(m.where.si(s.scale, s) for m, s, _ in memories),
+            *(TYPICAL_RATE * physics.displacement_scale,) * v.numel(),
+        ]),
+        z_scale=np.full(n, physics.displacement_scale),
+        u_scale=np.array(physics.drive.scale),
+        force_scale=physics.force_scale,
+    )  # fmt: skip
+
+
+def _balanced(physics: BalancedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
+    """Forces in balance: 0 = force - restoring force."""
+    displacement, pose, reading = _carried(physics, terms, z)
+    u, x = physics.drive.expr, NONE if physics.state is None else physics.state.expr
+    drive = terms.added(Place.DRIVE, u)
+    produced = physics.heating_power(drive)
+    heat = ca.SX.sym("heat", produced.numel())  # an unknown of its own, so that the inverse need not solve for squares
+    arriving = terms.added(Place.HEAT, heat)
+    force = physics.force(drive, x, z)
+    balance = terms.added(Place.FORCE, force) - physics.restoring_force(z)
+    signals = {"drive": physics.drive}
+    if physics.power is not None:
+        signals["power"] = physics.power.signal("power", physics.axes, ca.substitute(arriving, heat, produced))
+    if physics.state is not None:
+        signals["state"] = physics.state
+    signals |= _mechanical(physics, force, displacement, pose, reading)
+    return Assembly(signals, physics.rates(x, arriving), balance, heat, produced)
+
+
+def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) -> Assembly:
+    """Newton's second law, with the feedback loop if there is one: mass a = force - restoring force - damping force."""
+    displacement, pose, reading = _carried(physics, terms, z)
+    u, x, n = physics.drive.expr, NONE if physics.state is None else physics.state.expr, len(physics.axes)
+    loop, signals, held, command = physics.feedback, {"drive": physics.drive}, NONE, NONE
+    if loop is None:
+        drive = produced = terms.added(Place.DRIVE, u)
     else:
-        heat = ("1", 1.0) if links.heat_signal is None else (links.heat_signal[1], links.heat_signal[3])
-        unit, scale = {
-            Place.HEAT: heat,
-            Place.FORCE: (links.force_unit, links.force_scale),
-            Place.DISPLACEMENT: (links.travel_unit, links.displacement_scale),
-        }[place]
-        rows = ((axis, unit, scale) for axis in links.axes)
-    return [Where(*row, links.travel_unit, links.displacement_scale) for row in rows]
+        measured = reading if loop.measures == "reading" else z
+        command, held = loop.control_law(u, measured, v, x), ca.SX.sym("held", n)
+        drive, produced = terms.added(Place.DRIVE, held), u - measured
+        signals["command"] = loop.command.signal("command", physics.axes, command)
+    heat = ca.SX.sym("heat", produced.numel())
+    arriving = terms.added(Place.HEAT, heat)
+    force, rates = physics.dynamics(drive, x, z, v)
+    damping = physics.damping_force(v) if physics.damping_force else ca.SX(n, 1)
+    balance = terms.added(Place.FORCE, force) - physics.restoring_force(z) - damping
+    if physics.state is not None:
+        signals["state"] = physics.state
+    signals |= _mechanical(physics, force, displacement, pose, reading)
+    rates = rates if loop is None else loop.rates(x, arriving)
+    return Assembly(signals, rates, balance, heat, produced, held, command, force - damping)
 
 
-def available(links: Links, sample_time: float | None = None) -> frozenset[str]:
-    """What a device gives an effect's law to read, in the words of `Effect.needs`."""
-    present = {
-        "unheated": links.heat_signal is None, "bipolar": links.bipolar, "actuator": not links.imposed,
-        "velocity": links.mass is not None or links.imposed, "state": links.heat_signal is not None,
-        "heat": links.heat_signal is not None, "ambient": True, "sample_time": sample_time is not None,
-        "force": any(same_dimension(links.force_unit, unit) for unit in ("N", "N*m")), "spatial": len(links.components) == 6,
-        "second_order": links.second_order is not None, "yielding": links.yielding is not None,
-    }  # fmt: skip
-    return frozenset(name for name, there in present.items() if there)
+def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
+    """Motion imposed, force read: the displacement is the first component of the drive."""
+    n = len(physics.axes)
+    drive = terms.added(Place.DRIVE, physics.drive.expr)
+    displacement = terms.added(Place.DISPLACEMENT, z)
+    needed = physics.force(drive, displacement) + physics.restoring_force(displacement)
+    applied = needed - terms.added(Place.FORCE, ca.SX(n, 1))  # forces of effects act on the axis beside the machine
+    force = terms.added(Place.POSE, applied)
+    reading = terms.added(Place.SENSOR, force)
+    signals = {"drive": physics.drive, **_mechanical(physics, applied, displacement, force, reading)}
+    return Assembly(signals, NONE, drive[:n] - z, ca.SX.sym("heat", n), drive[:n])
+
+
+def _carried(physics: DevicePhysics, terms: EffectTerms, z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """What follows the stages' displacement: that of the mechanism, the platform's pose and the reading, with effects."""
+    displacement = terms.added(Place.DISPLACEMENT, z)
+    pose = terms.added(Place.POSE, physics.pose(displacement))
+    return displacement, pose, terms.added(Place.SENSOR, pose)
+
+
+def _mechanical(
+    physics: DevicePhysics, force: ca.SX, displacement: ca.SX, pose: ca.SX, reading: ca.SX
+) -> dict[str, Signal]:
+    axes, n = physics.axes, len(physics.axes)
+    at_platform, travel = (physics.components, physics.pose_units), (physics.displacement_scale,) * n
+    units, sizes, lengths = (physics.force_unit,) * n, (physics.force_scale,) * n, (physics.travel_unit,) * n
+    return {
+        "force": Signal("force", "actuator force", axes, units, "F_", force, sizes),
+        "displacement": Signal("displacement", "stage displacement", axes, lengths, "d_", displacement, travel),
+        "pose": Signal("pose", "platform pose", *at_platform, "", pose, physics.pose_scale),
+        "reading": Signal("reading", "sensor reading", *at_platform, "reading_", reading, physics.pose_scale),
+    }
+
+
+def _limited(physics: DevicePhysics, signals: dict[str, Signal], state: ca.SX, z: ca.SX) -> SimpleNamespace:
+    """What `DevicePhysics.limits` reads."""
+    return SimpleNamespace(
+        drive=physics.drive.expr,
+        command=signals.get("command", physics.drive).expr,
+        state=state,
+        force=signals["force"].expr,
+        displacement=z,
+        mechanism_displacement=signals["displacement"].expr,
+    )
+
+
+def _set_valued_axes(terms: EffectTerms, v: ca.SX, own_force: ca.SX) -> tuple[int, ...]:
+    """Axes with inertia whose force has a set of values at standstill, by an effect, or is not linear in the velocity."""
+    if not v.numel():
+        return ()
+    nonlinear = {i for i in range(v.numel()) if ca.depends_on(ca.jacobian(own_force[i], v[i]), v[i])}
+    by_effect = {m.index for m in terms.members if m.effect.sticks and m.effect.place is Place.FORCE}
+    return tuple(sorted(nonlinear | by_effect))
 
 
 def _numbers(values: Sequence[float | ca.SX], p: ca.SX, p_nominal: np.ndarray) -> np.ndarray:
     """Values that may hold free parameters, at their nominal ones."""
-    return ca.Function("rest", [p], [ca.vertcat(*map(ca.SX, values), ca.SX(0, 1))])(p_nominal).full().ravel()
+    return ca.Function("rest", [p], [ca.vertcat(*map(ca.SX, values), NONE)])(p_nominal).full().ravel()
+
+
+def _check_stiffness(model: Model) -> None:
+    """Refuses a device whose restoring force does not rise over the whole stroke: several displacements would balance one
+    force."""
+    if model.inertial:
+        return
+    stiffness = ca.Function(
+        "stiffness", [model.x, model.z, model.u, model.p], [ca.diag(ca.jacobian(model.balance, model.z))]
+    )
+    low, high = model.z_bounds
+    if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
+        return
+    for share in np.linspace(0, 1, STROKE_POINTS):
+        z = low + share * (high - low)
+        value = stiffness(model.rest, z, 0, model.p_nominal).full().ravel()
+        bad = np.flatnonzero(~(value < 0))  # NaN too
+        if bad.size:
+            axis, displacement = model.axes[bad[0]], show(z[bad[0]], "um")
+            what = f"the restoring force of {axis} does not rise at {displacement}; soften less, or lower the stroke"
+            raise InputError(model.name, [Fault("stiffness", what)])

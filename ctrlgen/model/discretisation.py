@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 import scipy
 
-from ctrlgen.model.integrators import steps_of
+from ctrlgen.model.integrators import integrator_of
 from ctrlgen.model.model import Model
 
 CHAINED = 3  # memories on memories on heaters whose power depends on their temperature
@@ -29,7 +29,7 @@ class Sample(NamedTuple):
     z: ca.SX
 
 
-def next_sample(model: Model, sample_time: float, linear: bool = False, newton_steps: int = 4) -> Sample:
+def one_step_map(model: Model, sample_time: float, linear: bool = False, newton_steps: int = 4) -> Sample:
     """x and z one `sample_time` [s] on, with the drive held, or `linear` between samples.
 
     An infinite sample time gives the settled pose (clocks then count poses). Raises InputError where the sample
@@ -111,7 +111,7 @@ def _together(A: ca.SX) -> list[list[int]]:
 def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) -> tuple[ca.SX, ca.SX]:
     """x and z one sample on, with inertia."""
     state = ca.vertcat(model.x, model.z)
-    steps = steps_of(model, sample_time)
+    steps = integrator_of(model, sample_time)
     own = [model.held, model.p, model.ambient_symbol]
     rest = ca.Function("N", [state, model.u, *own], [steps.rest(model)])
     y, drives = state, steps.drives(model.u, u_next, linear)

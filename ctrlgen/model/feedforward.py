@@ -14,8 +14,9 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
-from ctrlgen.model.model import Limit, Model, build_model
+from ctrlgen.model.model import Limit, Model
 from ctrlgen.numerics.interval_arithmetic import bounds
 
 SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for

@@ -25,9 +25,9 @@ SOLVING = 2  # iterations for a velocity: from standstill they come from one sid
 Rest = Callable[[ca.SX, ca.SX], ca.SX]  # y, u -> N, its rows `acting`
 
 
-def steps_of(model: Model, sample_time: float) -> Exponential | Sticking:
+def integrator_of(model: Model, sample_time: float) -> ExponentialRungeKutta | ImplicitRadau:
     """The steps that suit the model."""
-    return Sticking(model, sample_time) if model.sticking else Exponential(model, sample_time)
+    return ImplicitRadau(model, sample_time) if model.set_valued_axes else ExponentialRungeKutta(model, sample_time)
 
 
 class Steps:
@@ -63,7 +63,7 @@ class Steps:
         return _sparse(M[:, self.acting])
 
 
-class Exponential(Steps):
+class ExponentialRungeKutta(Steps):
     """Explicit steps, N to fourth order.
 
     S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430, eqs. (26)-(29): a step is from y to E y + sum_i W_i N_i,
@@ -95,7 +95,7 @@ class Exponential(Steps):
         return after, [(y, u), (a, middle), (b, middle), (c, u_end)]
 
 
-class Sticking(Steps):
+class ImplicitRadau(Steps):
     """Steps implicit in the velocities of the axes that stick and in the bristles that hold them; N to second order, also
     across a reversal that takes no time.
 
@@ -118,7 +118,7 @@ class Sticking(Steps):
         self.W = self._acting(h * (phi_1 - phi_2) / (1 - c))
         self.V = self._acting(h * (phi_2 - c * phi_1) / (1 - c))
         first = model.x.numel() - model.v.numel()
-        self.places = [first + i for i in model.sticking]  # in y
+        self.places = [first + i for i in model.set_valued_axes]  # in y
         self.own = [self.acting.index(i) for i in self.places]  # in N
         self.bent = [self.acting.index(i) for i in self.bristles]
 

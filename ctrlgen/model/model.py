@@ -1,11 +1,8 @@
-"""Device -> Model: one symbolic statement of the physics that everything else reads.
+"""The symbolic statement of a device's physics that simulation, inversion, optimisation, generated C and diagnosis read.
 
-    u --(drive terms)--> drive --rates--> x --force(terms)--> balance with the stage --> z
-      --(displacement terms)--> pose(terms) --> reading(terms)
-
-x are the states (temperatures, the effects' memories, velocities), z the stage displacements, held by
-the algebraic force balance 0 = g(x, z), u the drives. Where the stage has inertia, g accelerates it instead.
-All SX, SI inside.
+x are the states (temperatures, the effects' memories, velocities), z the stage displacements, u the drives, p the free
+parameters. A stage in balance: x' = f(x, z, u, p), 0 = g(x, z, u, p). A stage with inertia: its velocities are states,
+z' = v. All SX, SI inside. `ctrlgen.model.assembly` builds it.
 """
 
 from __future__ import annotations
@@ -20,65 +17,67 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.units import show
 from ctrlgen.devices import Device, Limit, Signal
-from ctrlgen.model.assembly import Chain
 from ctrlgen.numerics.phi_functions import driven, driven_lags, held_gain
 
 LONGEST_STEP = 1024.0  # times the fastest of coupled states' rates
 LONGEST_RAMP = 2.0**20  # the same where the displacement couples the lags: 20 doublings leave 1e-10 of rounding
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Model:
-    """The physics of one device, symbolic.
-
-    `x` (n_x,), `z` (n_axes,), `u` (n_u,), `p` (n_free,): symbols. The first `n_states` of x are the actuators'
-    (temperatures), then come the effects' memories, then the velocities `v` (n_axes,; none without inertia: z' = v).
-    `rates_of_heat` dx/dt (n_x,) in terms of the `heat` that `heat_of_drive` (u) produces, and `balance` 0 = g(x, z, u)
-    (n_axes,). `stepped` gives, for states that change once a sample, the new value by their place in x; `clocks` are
-    the places of those that count time. `sticking`: axes with inertia where dry friction may hold; `bristles`: places
-    in x of its states. `ambient` is the rise of the surroundings [K], zero unless it was asked for.
-    `acceleration`: the symbol of v', for what `seen` gives.
-    With a loop the drive is computed at every sample and `held`: its symbol, its `held_value`, and the rates in its terms.
-    `seen` (place, channel, partner, states, stage) is what an effect's law would read there.
-    `signals` by their role, in the order of the chain: drive, what the device adds (power), state where there
-    is one, force, displacement, pose, reading. `rest` and the scales are SI numbers per component.
-    """
+    """The physics of one device, symbolic; made by `build_model`."""
 
     name: str
     device: Device
-    x: ca.SX
+
+    # Symbols
+    x: ca.SX  # (n_x,) states: first `n_states` of the actuators, then those of the effects, then the velocities
     n_states: int
-    z: ca.SX
-    v: ca.SX
-    u: ca.SX
-    p: ca.SX
-    p_nominal: np.ndarray
-    ambient: ca.SX
-    stepped: dict[int, ca.SX]
-    clocks: tuple[int, ...]
-    sticking: tuple[int, ...]
-    bristles: tuple[int, ...]
-    acceleration: ca.SX
-    held: ca.SX
-    held_value: ca.SX
-    sampled_rates: ca.SX
-    x_names: tuple[str, ...]
-    x_units: tuple[str, ...]
+    z: ca.SX  # (n_axes,) stage displacements [m] or [rad]
+    v: ca.SX  # (n_axes,) their velocities, the last of x; none without inertia
+    u: ca.SX  # (n_u,) drives, or the references of a feedback loop
+    p: ca.SX  # (n_free,) free parameters
+    p_nominal: np.ndarray  # (n_free,) their nominal values
+    ambient: ca.SX  # rise of the surroundings [K]: a symbol, or zero where none was asked for
+    acceleration: ca.SX  # (n_axes,) stands for v' in what `law_inputs` gives; none without inertia
+
+    # A feedback loop is evaluated at every sample and its output held until the next; without one the three are empty,
+    # empty and the rates themselves
+    held: ca.SX  # symbol of the output
+    held_value: ca.SX  # its value at the beginning of a sample
+    sampled_rates: ca.SX  # dx/dt in terms of `held`
+
+    # Equations; `heat` stands for what the drive produces in the actuators, so that the inverse can solve for it first
     heat: ca.SX
     heat_of_drive: ca.SX
-    rates_of_heat: ca.SX
-    balance: ca.SX
-    signals: dict[str, Signal]
-    force_parts: dict[str, ca.SX]
+    rates_of_heat: ca.SX  # dx/dt (n_x,) in terms of `heat`
+    balance: ca.SX  # (n_axes,) 0 = g(x, z, u) of a stage in balance, or the net force on each mass
+
+    # Places in x of states that are not integrated, and of those that need an implicit integrator
+    stepped: dict[int, ca.SX]  # change once a sample: place -> new value
+    clocks: tuple[int, ...]  # count time
+    set_valued_axes: tuple[int, ...]  # axes with inertia on which dry friction may hold the stage at rest
+    bristles: tuple[int, ...]  # the states of that friction
+
+    # What is read from the equations
+    signals: dict[
+        str, Signal
+    ]  # drive, power, state where there are some, force, displacement, pose, reading; in this order
+    force_parts: dict[str, ca.SX]  # parts of the restoring force by name
     limits: tuple[Limit, ...]
-    rest: np.ndarray
+    law_inputs: Callable[
+        ..., SimpleNamespace
+    ]  # (place, channel, partner, states, stage) -> what an effect's law reads there
+
+    # Names and typical sizes, SI, per component
+    x_names: tuple[str, ...]
+    x_units: tuple[str, ...]
+    rest: np.ndarray  # x of the device at rest
     x_scale: np.ndarray
     z_scale: np.ndarray
     u_scale: np.ndarray
     force_scale: float
-    seen: Callable[..., SimpleNamespace]
 
     @cached_property
     def rates(self) -> ca.SX:
@@ -245,63 +244,3 @@ def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:
     place = {symbol[i].element_hash(): i for i in range(symbol.numel())}
     pairs = ((k, limit.expr[k].element_hash()) for k in range(limit.expr.numel()) if limit.expr[k].is_symbolic())
     return [(k, place[key]) for k, key in pairs if key in place]
-
-
-def build_model(
-    device: Device, free: Sequence[str] = (), ambient: ca.SX | None = None, sample_time: float | None = None
-) -> Model:
-    """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
-
-    `free` are dotted paths as in `device.quantities()`; `ambient` is a symbol for the rise of the surroundings [K],
-    where that is not zero; `sample_time` [s] is needed by effects that look back by samples. Raises InputError for a path or an effect's
-    channel that the device does not have.
-    """
-    nominal = dict(device.quantities())
-    unknown = [path for path in free if path not in nominal]
-    if unknown:
-        raise InputError(device.name, [Fault(path, "is not a parameter of this device") for path in unknown])
-    counts = [path for path in free if nominal[path].whole]
-    if counts:
-        raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
-    symbols = {path: ca.SX.sym(path) for path in free}
-    p = device.values(symbols)
-    links = device.links(p)
-    chain = Chain(device, links, p, ca.SX(0) if ambient is None else ambient, sample_time)
-    chosen = ca.vertcat(*symbols.values()) if symbols else ca.SX(0, 1)
-    model = Model(**chain.parts(chosen, np.array([nominal[f].si for f in free])))
-    idle = [path for path in free if path not in model.moved_by]
-    if idle:
-        what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
-        raise InputError(device.name, [Fault(path, what) for path in idle])
-    _check_stiffness(model)
-    return model
-
-
-def movable(device: Device) -> tuple[str, ...]:
-    """Paths of the numbers that act on motion or readings, not only on limits."""
-    paths = [path for path, number in device.quantities() if not number.whole]
-    symbols = {path: ca.SX.sym(path) for path in paths}
-    p = device.values(symbols)
-    parts = Chain(device, device.links(p), p, ca.SX(0), 1.0).parts(
-        ca.vertcat(*symbols.values()), np.array([dict(device.quantities())[k].si for k in paths])
-    )
-    model = Model(**parts)
-    return tuple(path for path in paths if path in model.moved_by)
-
-
-def _check_stiffness(model: Model) -> None:
-    """Refuses a device whose restoring force does not rise over the whole stroke: its displacement would have no one value."""
-    if model.inertial:
-        return
-    slope = ca.Function("slope", [model.x, model.z, model.u, model.p], [ca.diag(ca.jacobian(model.balance, model.z))])
-    low, high = model.z_bounds
-    if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
-        return
-    for share in np.linspace(0, 1, 65):
-        z = low + share * (high - low)
-        value = slope(model.rest, z, 0, model.p_nominal).full().ravel()
-        bad = np.flatnonzero(~(value < 0))
-        if bad.size:
-            axis, where = model.axes[bad[0]], show(z[bad[0]], "um")
-            what = f"the restoring force of {axis} does not rise at {where}; soften less, or lower the stroke"
-            raise InputError(model.name, [Fault("stiffness", what)])

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import SolverError
-from ctrlgen.model.discretisation import next_sample
+from ctrlgen.model.discretisation import one_step_map
 from ctrlgen.model.model import Model
 
 
@@ -81,7 +81,7 @@ def _simulate_inertial(
     """The same for a stage with inertia, from standstill at home."""
     n = model.x.numel()
     start = np.concatenate([model.rest if x_0 is None else x_0, 0 * model.z_scale if z_0 is None else z_0])
-    after = next_sample(model, sample_time)
+    after = one_step_map(model, sample_time)
     state = ca.vertcat(model.x, model.z)
     one = ca.Function("one", [state, model.u, model.p], [ca.vertcat(after.x, after.z)])
     states = one.mapaccum(len(u))(start, u.T, np.tile(model.p_nominal[:, None], (1, len(u)))).full()

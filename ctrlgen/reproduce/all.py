@@ -10,7 +10,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 
 from ctrlgen.core.files import write_text
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import STYLE, draw_path, draw_signal, draw_stage_force, svg
 from ctrlgen.reproduce import s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges

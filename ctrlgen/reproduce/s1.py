@@ -9,8 +9,9 @@ import numpy as np
 from ctrlgen.core.shipped_files import shipped
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mems_hexapod import MemsHexapod, matrices
+from ctrlgen.model.assembly import build_model
 from ctrlgen.model.feedforward import Controller
-from ctrlgen.model.model import Model, build_model
+from ctrlgen.model.model import Model
 from ctrlgen.physics import hexapod, xy_stage
 from ctrlgen.reproduce.row import PrintedNumber, half_unit
 from ctrlgen.trajectory.workspace import Workspace

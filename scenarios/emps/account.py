@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import ctrlgen
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 
 HERE = Path(__file__).parent

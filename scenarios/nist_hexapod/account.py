@@ -12,7 +12,7 @@ import numpy as np
 import ctrlgen
 from ctrlgen import Diagnosis
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.calibration import calibrate_jacobian
 from ctrlgen.recordings.pose_errors import PoseErrors
 from ctrlgen.recordings.reader import load_recordings

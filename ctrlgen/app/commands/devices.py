@@ -17,7 +17,7 @@ from ctrlgen.core.units import show
 from ctrlgen.devices import load_device
 from ctrlgen.devices.sensor import describe
 from ctrlgen.firmware.package import MANIFEST, verify_package
-from ctrlgen.model.model import build_model
+from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.schema import FILE as RECORDING
 from ctrlgen.trajectory.paths import Frame

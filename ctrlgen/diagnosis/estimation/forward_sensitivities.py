@@ -13,7 +13,7 @@ from itertools import pairwise
 import casadi as ca
 
 from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations
-from ctrlgen.model.integrators import Sticking
+from ctrlgen.model.integrators import ImplicitRadau
 
 POINTS = 4  # of an explicit step
 Step = Callable[
@@ -49,7 +49,7 @@ def forward_sensitivities(
 
 def takes_several_steps(q: SampleEquations) -> bool:
     """Whether a sample takes more than one explicit step, or implicit ones: not to be differentiated whole."""
-    return q.steps is not None and (isinstance(q.steps, Sticking) or q.steps.count > 1)
+    return q.steps is not None and (isinstance(q.steps, ImplicitRadau) or q.steps.count > 1)
 
 
 def _slopes(values: list[ca.SX], by: list[ca.SX]) -> list[ca.SX]:
@@ -61,7 +61,7 @@ def _steps(q: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: 
     """y and T after all steps of a sample; `seed` by what keeps its value meanwhile: `held`, then the constants."""
     y, u, u_next, e, c = given
     free = seed.size2() > held.numel()
-    on = _implicitly(q, free) if isinstance(q.steps, Sticking) else _explicitly(q, free)
+    on = _implicitly(q, free) if isinstance(q.steps, ImplicitRadau) else _explicitly(q, free)
     for begin, end in pairwise(q.steps.drives(u, u_next, q.linear)):
         y, T = on(T, seed, [y, begin, end, held, e, c])
     return y, T

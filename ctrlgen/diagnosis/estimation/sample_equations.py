@@ -12,8 +12,8 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.diagnosis.settings import SIMULATION
-from ctrlgen.model.discretisation import Sample, next_sample
-from ctrlgen.model.integrators import Exponential, Sticking, steps_of
+from ctrlgen.model.discretisation import Sample, one_step_map
+from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau, integrator_of
 from ctrlgen.model.model import Model
 
 
@@ -24,7 +24,7 @@ class SampleEquations:
 
     constants: ca.Function
     model: Model
-    steps: Exponential | Sticking | None
+    steps: ExponentialRungeKutta | ImplicitRadau | None
     linear: bool
     following: ca.SX
     y: ca.SX
@@ -56,12 +56,12 @@ def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: b
         following, y = moving
     following, y = ca.cse([following, y])  # before they are differentiated: afterwards it takes ten times as long
     given = [ca.vertcat(model.x, model.z), model.u, after.u_next, model.ambient_symbol, c]
-    steps = steps_of(model, sample_time) if model.inertial else None
+    steps = integrator_of(model, sample_time) if model.inertial else None
     return SampleEquations(constants, model, steps, linear, following, y, given)
 
 
 def _after(model: Model, sample_time: float, linear: bool) -> Sample:
-    return next_sample(
+    return one_step_map(
         model,
         sample_time,
         linear,

@@ -18,8 +18,9 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.forward_sensitivities import forward_sensitivities, takes_several_steps
 from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations, build_sample_equations
 from ctrlgen.diagnosis.settings import SIMULATION
+from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import balanced
-from ctrlgen.model.model import Model, build_model
+from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
 from ctrlgen.recordings.recording import Record
 

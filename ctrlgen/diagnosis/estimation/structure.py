@@ -17,15 +17,15 @@ from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.hypotheses import (
     PARAMETER,
     Hypothesis,
-    nominal_links,
+    nominal_physics,
     nuisances,
     numbers,
     written,
 )
 from ctrlgen.diagnosis.settings import FIT
 from ctrlgen.effects import Param, Where
-from ctrlgen.model.assembly import channels
-from ctrlgen.model.model import movable
+from ctrlgen.model.assembly import movable
+from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Recording
 
 
@@ -92,7 +92,7 @@ class Structure:
 
     def channel_of(self, cause: Hypothesis) -> Where:
         """The channel at which a cause acts; the first one where it acts at all of them."""
-        where = channels(nominal_links(self.device), cause.law.place)
+        where = channels(nominal_physics(self.device), cause.law.place)
         here = where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
         return here if cause.of is None else here.beside(next(w for w in where if w.channel == cause.of))
 

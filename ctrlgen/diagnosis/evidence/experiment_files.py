@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import difference
+from ctrlgen.devices import BalancedPhysics
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment
@@ -31,7 +32,7 @@ def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dic
 
 def _solved(m: Model) -> bool:
     """Whether the solver knows the device: it stands in balance and carries something in space."""
-    return not m.inertial and not m.device.links(m.device.values()).imposed and len(m.signals["pose"].channels) > 1
+    return isinstance(m.device.physics(m.device.values()), BalancedPhysics) and len(m.signals["pose"].channels) > 1
 
 
 def _csv(header: list[str], columns: np.ndarray) -> str:

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.devices import Links
+from ctrlgen.devices import BalancedPhysics, DevicePhysics
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
-from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
 from ctrlgen.diagnosis.settings import LTV_MODEL
 from ctrlgen.effects import Place
 from ctrlgen.recordings.recording import Record
@@ -78,15 +78,15 @@ class Along:
         return np.where(np.abs(self.velocity) > LTV_MODEL.standing * fastest, np.sign(self.velocity), 0.0)
 
 
-def acts_at(links: Links) -> Place:
+def acts_at(physics: DevicePhysics) -> Place:
     """Where unknown physics is sought: a force, where one moves a mass or is read; else a displacement."""
-    return Place.FORCE if links.mass is not None or links.imposed else Place.DISPLACEMENT
+    return Place.DISPLACEMENT if isinstance(physics, BalancedPhysics) else Place.FORCE
 
 
 def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
     """The linearisation of `fit` along `record`."""
-    links = nominal_links(fit.structure.device)
-    place = acts_at(links)
+    physics = nominal_physics(fit.structure.device)
+    place = acts_at(physics)
     simulator, p, chosen = _probed(fitter, fit, record, place)
     start = _start(fitter, fit, record)
     before, after, y = motion(simulator, record, p, start)
@@ -104,7 +104,7 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
     sd[list(simulator.free_initial_states)] = start_sizes(simulator)
     return Along(
         record, place, tuple(probe.at for probe in placed),
-        tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), links.travel_unit,
+        tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), physics.travel_unit,
         residual,
         noise.whiten(residual, record.valid), noise.usable(record.valid), z, _velocity(simulator, record, at, z),
         F_S, F_f, H_S, H_f, sd, np.concatenate([m.x_scale, m.z_scale]),
@@ -114,7 +114,7 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
 def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Simulator, np.ndarray, list[int]]:
     """The response with probes, its parameters, and which of them are the probes at `place`."""
     known = [unknown.path for unknown in fit.structure.free_parameters]
-    device, probes = with_probes(fit.structure.device_with_causes, nominal_links(fit.structure.device))
+    device, probes = with_probes(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
     key = ("along", fit.structure.causes, record.sample_time, record.linear)
     if key not in fitter.cache:

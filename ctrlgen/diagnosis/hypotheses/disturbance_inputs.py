@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import casadi as ca
 
 from ctrlgen.core.units import Quantity
-from ctrlgen.devices import Device, Links
+from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.effects import Effect, Param, Place
-from ctrlgen.model.assembly import channels
+from ctrlgen.model.effect_terms import available, channels
 
 
 class _Probe(Effect, listed=False):
@@ -26,13 +26,13 @@ class _Probe(Effect, listed=False):
         return p.delta
 
 
-def with_probes(device: Device, links: Links) -> tuple[Device, dict[tuple[Place, int], str]]:
+def with_probes(device: Device, physics: DevicePhysics) -> tuple[Device, dict[tuple[Place, int], str]]:
     """The device with a probe everywhere, and the path of each by place and channel."""
     probes, paths = [], {}
     for place in Place:
-        if place is Place.HEAT and links.heat_signal is None:
+        if place is Place.HEAT and "heat" not in available(physics):
             continue
-        for i, where in enumerate(channels(links, place)):
+        for i, where in enumerate(channels(physics, place)):
             paths[place, i] = f"effect[{len(device.effect) + len(probes)}].delta"
             probes.append(_Probe(place, where.channel, where.unit))
     return device.model_copy(update={"effect": (*device.effect, *probes)}), paths

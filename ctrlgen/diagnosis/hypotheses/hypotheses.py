@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 from ctrlgen.core.units import Quantity, from_si
-from ctrlgen.devices import Device, Links
+from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.base import Section
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect, Param, Place, Where
-from ctrlgen.model.assembly import available, channels
+from ctrlgen.model.effect_terms import available, channels
 
 DOMAIN = {
     Place.DRIVE: "actuator", Place.HEAT: "actuator", Place.FORCE: "stage", Place.DISPLACEMENT: "stage",
@@ -108,28 +108,28 @@ class Hypothesis:
 
 
 def hypotheses(
-    device: Device, links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+    device: Device, physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
 ) -> list[Hypothesis]:
     """All that can act on `device` and be seen in the channels `observed`."""
-    found = [h for law in Effect.library.values() for h in _of_law(law, links, observed, sample_time, ambient)]
+    found = [h for law in Effect.library.values() for h in _of_law(law, physics, observed, sample_time, ambient)]
     return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
 
 
 def _of_law(
-    law: type[Effect], links: Links, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+    law: type[Effect], physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
 ) -> Iterator[Hypothesis]:
-    there = available(links, sample_time) - (frozenset() if ambient else {"ambient"})
-    if not law.needs <= there or (law.place is Place.HEAT and links.heat_signal is None):
+    there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
+    if not law.needs <= there or (law.place is Place.HEAT and "heat" not in there):
         return
     domain = law.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
-    places = channels(links, law.place)
+    places = channels(physics, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
         places = [where for where in places if where.channel in seen]
     if law.pairs:
         for k, where in enumerate(places):
-            for j, other in enumerate(channels(links, law.place)):
+            for j, other in enumerate(channels(physics, law.place)):
                 if law.fits(where.beside(other)) and not (law.mutual and j < k):
                     yield Hypothesis(
                         law.kind, f"{domain}:{where.channel}", where.channel, other.channel, highest=highest
@@ -166,15 +166,15 @@ def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
     yield from walk(device, "", device)
 
 
-_LINKS: dict[int, tuple[Device, Links]] = {}
+_PHYSICS: dict[int, tuple[Device, DevicePhysics]] = {}
 
 
-def nominal_links(device: Device) -> Links:
-    """The links of a device with its own numbers, chained once: a hexapod's take a tenth of a second."""
-    if id(device) not in _LINKS:
-        _LINKS.clear()
-        _LINKS[id(device)] = (device, device.links(device.values()))
-    return _LINKS[id(device)][1]
+def nominal_physics(device: Device) -> DevicePhysics:
+    """The physics of a device with its own numbers, made once: a hexapod's takes a tenth of a second."""
+    if id(device) not in _PHYSICS:
+        _PHYSICS.clear()
+        _PHYSICS[id(device)] = (device, device.physics(device.values()))
+    return _PHYSICS[id(device)][1]
 
 
 def nuisances(device: Device) -> dict[str, float]:

@@ -16,10 +16,10 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, Seen, nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, Seen, nominal_physics
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect, Place
-from ctrlgen.model.assembly import channels
+from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.phi_functions import phis
 
 Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
@@ -43,14 +43,14 @@ class Column:
 def peaks(fitter: Fitter, fit: Fit) -> Peaks:
     """How far the signals at every place go in the records to fit."""
     found: Peaks = {}
-    links = nominal_links(fit.structure.device)
+    physics = nominal_physics(fit.structure.device)
     simulators = fit.structure.simulators(fitter.recording, fitter.cache)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
-    places = [(place, i) for place in reached for i in range(len(channels(links, place)))]
+    places = [(place, i) for place in reached for i in range(len(channels(physics, place)))]
     for record, start in zip(fitter.fit_records, fit.initial_states, strict=True):
         simulator = simulators[record.sample_time, record.linear]
         m, n = simulator.model, len(record.time)
-        seen = [m.seen(place, i, None, {}) for place, i in places]
+        seen = [m.law_inputs(place, i, None, {}) for place, i in places]
         still = ca.SX.zeros(1)
         given = [(s.value, s.displacement, still if s.velocity is None else s.velocity) for s in seen]
         rows = m.closed(ca.vertcat(*(value for values in given for value in values)))
@@ -101,7 +101,7 @@ class Laws:
         seen: Callable[[Place, int], Seen],
     ) -> Iterator[Column]:
         law, where = h.law, structure.channel_of(h)
-        names = [w.channel for w in channels(nominal_links(structure.device), law.place)]
+        names = [w.channel for w in channels(nominal_physics(structure.device), law.place)]
         partner = names.index(h.of) if h.of else None
         at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
         if law.mutual:
@@ -128,7 +128,7 @@ class Laws:
             states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
-            s = self.simulator.model.seen(law.place, i, partner, states, law.stage)
+            s = self.simulator.model.law_inputs(law.place, i, partner, states, law.stage)
             new = law.update(s, p)
             s.__dict__.update(new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)

@@ -11,12 +11,12 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import difference, show
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
 from ctrlgen.diagnosis.selection.diagnosis import Finding
 from ctrlgen.diagnosis.selection.direct_detection import named
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Effect, Place, Where
-from ctrlgen.model.assembly import channels
+from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Recording
 
 
@@ -49,7 +49,7 @@ def alive(device: Device, recording: Recording) -> Alive:
     structure = Structure(device)
     simulators = structure.simulators(recording, {})
     foreseen = [simulators[r.sample_time, r.linear].simulate(r, structure.start) for r in moving]
-    places = {f"reading.{w.channel}": w for w in channels(nominal_links(device), Place.SENSOR)}
+    places = {f"reading.{w.channel}": w for w in channels(nominal_physics(device), Place.SENSOR)}
     findings, said = [], []
     for i, level in dead.items():
         name, unit = recording.channels[i], recording.units[i]

@@ -9,12 +9,12 @@ import numpy as np
 
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_model import Search
 from ctrlgen.diagnosis.selection.diagnosis import Estimate, Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Effect, Place, Where
-from ctrlgen.model.assembly import channels
+from ctrlgen.model.effect_terms import channels
 
 
 def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
@@ -24,7 +24,7 @@ def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
         return ()
     known = {(e.kind, e.at) for e in structure.device.effect} | {(c.effect, c.at) for c in structure.causes}
     found = []
-    for where in channels(nominal_links(structure.device), Place.SENSOR):
+    for where in channels(nominal_physics(structure.device), Place.SENSOR):
         name = f"reading.{where.channel}"
         if name not in recording.channels:
             continue

@@ -14,7 +14,7 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import Column, Laws
 from ctrlgen.diagnosis.selection.ltv_propagation import Spread
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
@@ -54,7 +54,7 @@ class Slopes:
         seen: Callable[[Place, int], Seen],
     ) -> None:
         self.fitter, self.record = fitter, record
-        probed, probes = with_probes(fit.structure.device_with_causes, nominal_links(fit.structure.device))
+        probed, probes = with_probes(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
         known = [u.path for u in fit.structure.free_parameters]
         numbers = [h for h in hypotheses if h.effect == PARAMETER]
         number_paths = [h.path for h in numbers if h.path not in known]

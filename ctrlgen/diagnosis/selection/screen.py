@@ -17,14 +17,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_links
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import Column, Peaks, peaks
 from ctrlgen.diagnosis.selection.score_gradient import Slopes, Sums
 from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
 from ctrlgen.diagnosis.selection.subset_search import Suspect, Together
 from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
-from ctrlgen.model.assembly import channels
+from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
 
 
@@ -123,7 +123,7 @@ class Screen:
         record = max(records, key=lambda r: r.valid.size)
         foreseen, behind = (self.fitter.predict(each, record) for each in (fit, _read_truly(fit)))
         left = record.observed - foreseen
-        names = [w.channel for w in channels(nominal_links(fit.structure.device), Place.SENSOR)]
+        names = [w.channel for w in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         return {
             (Place.SENSOR, names.index(name)): {

@@ -1,0 +1,192 @@
+"""The terms of a device's effects at each place between command and reading, and what an effect's law may read there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import SimpleNamespace
+
+import casadi as ca
+
+from ctrlgen.core.errors import Fault
+from ctrlgen.core.units import same_dimension
+from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
+from ctrlgen.effects import Effect, Place, State, Where
+
+REACH = 10.0  # typical displacements beyond which a law reads the stage's force at that end: a search may try values
+# that far, no stage goes there, and restoring forces may have no value (a root of a negative number)
+
+
+@dataclass
+class Member:
+    """One effect on one channel, with the symbols of its states; `rates` and `stepped` are its law's answers."""
+
+    effect: Effect
+    values: SimpleNamespace
+    where: Where
+    index: int
+    partner: int | None
+    states: dict[str, ca.SX]
+    rates: dict[str, ca.SX] = field(default_factory=dict)
+    stepped: dict[str, ca.SX] = field(default_factory=dict)
+
+    def apply(self, s: SimpleNamespace) -> ca.SX:
+        """The term for the inputs `s`; keeps the states' rates and the new values of those that change once a sample."""
+        self.stepped = {name: ca.SX(value) for name, value in self.effect.update(s, self.values).items()}
+        s.__dict__.update(self.stepped)
+        by_default = {state.name: ca.SX(float(state.clock)) for state in self.effect.states}
+        self.rates = {**by_default, **self.effect.rates(s, self.values)}
+        return self.effect.term(s, self.values)
+
+
+class EffectTerms:
+    """Adds the effects' terms place by place, in the order of `Effect.stage`, and collects their states.
+
+    `displacement` (n_axes,), `velocity` (n_axes, or none where it is not known) and `acceleration` are the model's
+    symbols, `ambient` the rise of the surroundings [K]. Raises InputError with every effect or sensor that does not fit
+    the device.
+    """
+
+    def __init__(
+        self, device: Device, physics: DevicePhysics, p: SimpleNamespace, displacement: ca.SX, velocity: ca.SX,
+        acceleration: ca.SX, ambient: ca.SX, sample_time: float | None,
+    ) -> None:  # fmt: skip
+        self.physics, self.ambient, self.sample_time = physics, ambient, sample_time
+        self.displacement, self.velocity, self.acceleration = displacement, velocity, acceleration
+        reach = REACH * physics.displacement_scale
+        self.within_reach = ca.fmin(ca.fmax(displacement, -reach), reach)
+        self.restoring_force = physics.restoring_force(self.within_reach)
+        self.mechanism_displacement = displacement  # with the effects' terms, once these are added
+        self.signals_before: dict[Place, list[tuple[float, ca.SX]]] = {}  # (stage, the signal before its terms)
+        self.members: list[Member] = []
+        self.faults: list[Fault] = []
+        for k, effect in enumerate(device.effect):
+            self._place(k, effect, p.effect[k])
+
+    def _place(self, k: int, effect: Effect, values: SimpleNamespace) -> None:
+        """Adds one member per channel on which the effect acts; notes its faults."""
+        places = channels(self.physics, effect.place)
+        names = [where.channel for where in places]
+        for need in sorted(effect.needs - available(self.physics, sample_time=self.sample_time)):
+            self.faults.append(
+                Fault(f"effect[{k}].kind", f"{effect.kind} needs {need}, which this device does not have")
+            )
+        chosen = range(len(names)) if effect.at == "all" else [i for i, c in enumerate(names) if c == effect.at]
+        if not chosen:
+            self.faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(names)}, all"))
+        if effect.of is not None and effect.of not in names:
+            self.faults.append(Fault(f"effect[{k}].of", f"{effect.of!r} is not one of {', '.join(names)}"))
+            return
+        other = None if effect.of is None else names.index(effect.of)
+        pairs = [(i, other) for i in chosen]
+        if effect.mutual:
+            pairs += [(other, i) for i in chosen]
+        for i, partner in pairs:
+            where = places[i] if partner is None else places[i].beside(places[partner])
+            if not effect.fits(where):
+                if effect.at != "all":
+                    self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} cannot act on {names[i]}: wrong unit"))
+                continue
+            self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in effect.faults_at(where)]
+            states = {s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") for s in effect.states}
+            self.members.append(Member(effect, values, where, i, partner, states))
+
+    def added(self, place: Place, before: ca.SX) -> ca.SX:
+        """`before` (channels,) plus every term of the effects at `place`."""
+        total, members = ca.SX(before), [m for m in self.members if m.effect.place is place]
+        levels = self.signals_before[place] = []
+        for stage in sorted({m.effect.stage for m in members}):
+            levels.append((stage, total[:]))
+            for member in members:
+                if member.effect.stage == stage:
+                    s = self.law_inputs(place, member.index, member.partner, member.states, stage)
+                    total[member.index] += member.apply(s)
+        levels.append((float("inf"), total[:]))
+        if place is Place.DISPLACEMENT:
+            self.mechanism_displacement = total
+        return total
+
+    def law_inputs(
+        self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX], stage: int = 0
+    ) -> SimpleNamespace:
+        """What the law of an effect on channel `i` of `place` may read (see `Effect`), with the effect's own `states`."""
+        before = next(signal for level, signal in self.signals_before[place] if level >= stage)
+        s = SimpleNamespace(
+            value=before[i], all=before, index=i, partner=partner, ambient=self.ambient, sample_time=self.sample_time,
+            **states,
+        )  # fmt: skip
+        s.second_order_kinematics = lambda: self.second_order_kinematics
+        s.tangent_compliance = lambda: self.tangent_compliance
+        at_platform = place in (Place.POSE, Place.SENSOR)
+        if not at_platform:
+            i = min(i, len(self.physics.axes) - 1)
+            s.displacement, s.displacements = self.displacement[i], self.displacement
+            s.velocity = self.velocity[i] if self.velocity.numel() else None
+            heated = self.physics.state is not None and _has_heaters(self.physics)
+            s.state = self.physics.state.expr[i] if heated else None
+            s.rest = self.physics.rest[i] if heated else None
+            s.force = self.restoring_force[i]
+        s.rate = s.second_rate = None
+        if at_platform and isinstance(self.physics, InertialPhysics):
+            z, v = self.displacement, self.velocity
+            s.rate = ca.jtimes(s.value, z, v)
+            s.second_rate = ca.jtimes(s.rate, z, v) + ca.jtimes(s.rate, v, self.acceleration)
+        where = channels(self.physics, place)[s.index]
+        s.scale, s.travel = where.scale, where.travel_scale
+        return s
+
+    @cached_property
+    def second_order_kinematics(self) -> ca.SX:
+        """What finite rotations of the links add to the pose; large, hence built only when an effect asks for it."""
+        return self.physics.second_order_kinematics(self.mechanism_displacement)
+
+    @cached_property
+    def tangent_compliance(self) -> ca.SX:
+        """By how much less the stages yield to the links' load than at home; built only when an effect asks for it."""
+        return self.physics.tangent_compliance(self.within_reach)
+
+    def memories(self) -> list[tuple[Member, State, ca.SX]]:
+        """(member, state, its symbol) of every state of the effects, in the order in which they stand in the model's x."""
+        return [
+            (m, state, symbol)
+            for m in self.members
+            for state, symbol in zip(m.effect.states, m.states.values(), strict=True)
+        ]
+
+
+def channels(physics: DevicePhysics, place: Place) -> list[Where]:
+    """Where an effect of `place` can act on a device."""
+    feedback = physics.feedback if isinstance(physics, InertialPhysics) else None
+    if place in (Place.POSE, Place.SENSOR):
+        rows = zip(physics.components, physics.pose_units, physics.pose_scale, strict=True)
+    elif place is Place.DRIVE and feedback is not None:  # u is the loop's reference, the amplifier's drive its command
+        rows = ((axis, feedback.command.unit, feedback.command.scale) for axis in physics.axes)
+    elif place is Place.DRIVE:
+        rows = zip(physics.drive.channels, physics.drive.units, physics.drive.scale, strict=True)
+    else:
+        unit, scale = {
+            Place.HEAT: (physics.power.unit, physics.power.scale) if _has_heaters(physics) else ("1", 1.0),
+            Place.FORCE: (physics.force_unit, physics.force_scale),
+            Place.DISPLACEMENT: (physics.travel_unit, physics.displacement_scale),
+        }[place]
+        rows = ((axis, unit, scale) for axis in physics.axes)
+    return [Where(*row, physics.travel_unit, physics.displacement_scale) for row in rows]
+
+
+def available(physics: DevicePhysics, sample_time: float | None = None) -> frozenset[str]:
+    """What a device offers to an effect's law, in the words of `Effect.needs`."""
+    heated, balanced = _has_heaters(physics), isinstance(physics, BalancedPhysics)
+    present = {
+        "unheated": not heated, "heat": heated, "state": heated,
+        "bipolar": physics.bipolar, "actuator": not isinstance(physics, ImposedPhysics),
+        "velocity": not balanced, "ambient": True, "sample_time": sample_time is not None,
+        "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
+        "spatial": len(physics.components) == 6,
+        "second_order_kinematics": balanced and physics.second_order_kinematics is not None,
+        "tangent_compliance": balanced and physics.tangent_compliance is not None,
+    }  # fmt: skip
+    return frozenset(name for name, given in present.items() if given)
+
+
+def _has_heaters(physics: DevicePhysics) -> bool:
+    return isinstance(physics, BalancedPhysics) and physics.power is not None
