@@ -114,7 +114,7 @@ def test_all_faults_of_a_file_are_listed_at_once(tmp_path, model):
     assert "'other' is not 'mems_hexapod'" in found["device"]
     assert "wrong dimension; um" in found["columns.'reading.delta_x'"]
     assert "did you mean 'reading.delta_y'" in found["columns.'reading.detla_y'"]
-    assert "does not rise from row 49" in found["record[0].time"]
+    assert "does not increase from row 49" in found["record[0].time"]
     assert "1.2 W at" in found["record[0].columns.'drive.3X'"]
     assert "has no column 'z'" in found["record[0].columns.'reading.delta_z'"]
     assert "does not exist" in found["record[1].file"]
@@ -130,7 +130,7 @@ def test_faults_of_the_data_are_listed_at_once_for_all_records(tmp_path, model):
     found = refused([tmp_path], model)
     assert "1.2 W at 0.007 s, the device allows 0 W to 1 W (1 of 400" in found["record[0].columns.'drive.3X'"]
     assert "no number at all" in found["record[0].columns.'drive.1Y'"]
-    assert "does not rise from row 49 (0.049 s)" in found["record[1].time"]
+    assert "does not increase from row 49 (0.049 s)" in found["record[1].time"]
 
 
 def test_rounding_at_a_limit_is_no_excess(tmp_path, model):
@@ -181,7 +181,7 @@ def test_a_record_in_which_nothing_happens_is_refused(tmp_path, model):
 def test_a_drive_that_never_moves_is_noted(tmp_path, model):
     fit = {**samples(), **{f"u{a}": np.full(N, 0.2) for a in AXES}}
     assert load_recordings([two(tmp_path, fit)], model).notes == (
-        "fit.csv: no drive moves; what the reading does is drift, noise, or what came before.",
+        "fit.csv: no drive moves; the readings show only drift, noise, or the effect of earlier motion.",
     )
 
 
@@ -189,7 +189,7 @@ def test_rest_is_the_drive_at_rest(tmp_path, model):
     two(tmp_path, samples())
     records = [{"file": "fit.csv", "role": "rest"}, {"file": "held.csv", "role": "fit"}]
     described(tmp_path, *records)
-    assert "called rest, but drive." in refused([tmp_path], model)["record[0].role"]
+    assert 'has role "rest", but drive.' in refused([tmp_path], model)["record[0].role"]
     rest = {**samples(), **{f"u{a}": np.full(N, 0.2) for a in AXES}}
     (tmp_path / "fit.csv").write_text(csv_text(rest))
     assert [r.role for r in load_recordings([tmp_path], model).records] == ["rest", "fit", "hold_out"]
@@ -254,7 +254,7 @@ def test_spikes_are_marked(tmp_path, model):
     recording = load_recordings([two(tmp_path, fit)], model)
     assert np.array_equal(np.flatnonzero(~recording.records[0].valid[:, 0]), [100, 200, 201, 202])
     assert np.isnan(recording.records[0].observed[[100, 200, 201, 202], 0]).all()
-    assert "4 of 400 samples are spikes" in recording.notes[0]
+    assert "4 of 400 samples are outliers" in recording.notes[0]
 
 
 def test_frozen_stretches_are_marked(tmp_path, model):
@@ -262,7 +262,7 @@ def test_frozen_stretches_are_marked(tmp_path, model):
     fit["x"][60:90] = fit["x"][60]
     recording = load_recordings([two(tmp_path, fit)], model)
     assert np.array_equal(np.flatnonzero(~recording.records[0].valid[:, 0]), np.arange(60, 90))
-    assert "30 of 400 samples are in stretches that repeat themselves" in recording.notes[0]
+    assert "30 of 400 samples are in stretches that repeat one value" in recording.notes[0]
 
 
 def test_a_dead_channel_is_kept_and_named(tmp_path, model):
@@ -272,7 +272,7 @@ def test_a_dead_channel_is_kept_and_named(tmp_path, model):
     columns = {**COLUMNS, "reading.theta_y": {"column": "tilt", "unit": "rad"}}
     described(tmp_path, {"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}, columns=columns)
     recording = load_recordings([tmp_path], model)
-    assert recording.notes == ("fit.csv, reading.theta_y: reads 0.0002 rad throughout; a dead channel?",)
+    assert recording.notes == ("fit.csv, reading.theta_y: reads 0.0002 rad throughout; the channel may be dead.",)
     assert recording.records[0].valid.all()
 
 

@@ -1,9 +1,10 @@
-"""Step 0 of the diagnosis: what a recording is worth. Faults refuse it; the rest is marked in `valid` and said in a note.
+"""Validation of a recording before it is diagnosed: faults refuse it, doubtful samples are marked in `valid` and noted.
 
-Refused: time that does not rise or is sampled unevenly, drives that are missing or beyond the device's limits, channels
-of few numbers, records in which nothing happens, held-out data that were fitted, too little to hold anything out.
-Marked or noted: gaps, missing samples, spikes, stuck and clipped stretches, dead channels, jitter below 1 %.
-Nothing is filled in: where the drive is not known a record ends and another begins.
+Refused: time that does not increase or is unevenly sampled, drives that are missing or beyond the device's limits, channels
+with too few numbers, records in which nothing changes, held-out data that are fitted as well, too few samples to hold any
+out.
+Marked or noted: gaps, missing samples, outliers, stuck and clipped stretches, dead channels, jitter below 1 %.
+Nothing is filled in: where the drive is not known one record ends and another begins.
 """
 
 from __future__ import annotations
@@ -21,18 +22,23 @@ from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
 
 JITTER = 0.01  # of the sample time, rms
+NOTED_JITTER = 0.001  # of the sample time, rms: from here on it is noted
 BREAK = 1.5  # sample times without a sample: a gap
-SHORTEST = {"series": 20, "poses": 3}  # rows without which a record says nothing
+SHORTEST = {"series": 20, "poses": 3}  # rows below which a record says nothing
 DIVISIBLE = {"series": 200, "poses": 12}  # rows from which a part can be held out
 HELD_OUT = 0.3  # of a series, at its end: random samples would leak through the device's memory
 EVERY = 3  # of poses, the third, sixth, ... are held out
 OVER_LIMIT = 1e-6  # of the drive's range: rounding of the file
 RESTLESS = 0.01  # of the drive's range: more is no rest
+REST_SAMPLES = 5  # on each side of a gap, over which the drive must be at rest
+WHOLE_SAMPLES = 0.1  # sample times: how far a gap may be off a whole number of them
+REPEAT_BLOCKS = 10  # into which a held-out record is cut to be looked for among the fitted ones
+LISTED_CUTS = 5  # places at which a record was cut that a note names
 
 
 @dataclass(frozen=True)
 class ChannelNames:
-    """What a reader calls things: the drives and observed channels of a record, and their units."""
+    """Names of the drives and observed channels of a record, and the reader's unit of each."""
 
     drives: tuple[str, ...]
     drive_units: tuple[str, ...]
@@ -42,7 +48,7 @@ class ChannelNames:
 
 @dataclass(frozen=True)
 class Validated:
-    """What became of a record: its usable stretches, what was marked, why it is refused."""
+    """The result of validation: usable records, notes on what was marked, and the faults that refuse the recording."""
 
     records: tuple[Record, ...] = ()
     notes: tuple[str, ...] = ()
@@ -50,89 +56,90 @@ class Validated:
 
 
 def validate_record(record: Record, kind: str, model: Model, names: ChannelNames, where: str) -> Validated:
-    """One record as read -> its stretches without a break, each sample marked.
+    """One record as read -> its uninterrupted stretches with every doubtful sample marked.
 
-    `record.valid` says which channels it has columns for; `where` is its place in recording.toml.
+    `record.valid` is False in channels that this record has no column for; `kind` is "series" or "poses"; `where` is the
+    record's place in recording.toml, such as "record[0]".
     """
-    spoken = record.valid.any(0)
-    faults = _empty(record, kind, names, where, spoken) + _beyond_limits(record, kind, model, names, where)
+    recorded = record.valid.any(0)
+    faults = _missing_numbers(record, kind, names, where, recorded) + _beyond_limits(record, kind, model, names, where)
     notes: list[str] = []
-    pieces = [record]
+    stretches = [record]
     if kind == "series" and len(record.time) >= SHORTEST[kind]:
-        period, said, wrong = _clock(record, where)
-        faults += wrong
+        sample_time, clock_notes, clock_faults = _sample_time(record, where)
+        faults += clock_faults
         if not faults:
-            pieces, notes = _stretches(replace(record, sample_time=period))
-            notes = said + notes
-            if not pieces:
-                faults = [Fault(where, f"{record.name}: {notes[-1]} Nothing is left; record without gaps")]
-    faults = faults or _nothing_happens(record, where)
+            stretches, gap_notes = _stretches(replace(record, sample_time=sample_time))
+            notes = clock_notes + gap_notes
+            if not stretches:
+                faults = [Fault(where, f"{record.name}: {notes[-1]} No usable stretch remains; record without gaps")]
+    faults = faults or _nothing_changes(record, where)
     if faults:
         return Validated(faults=tuple(faults))
     if record.role != "rest" and (record.drive == record.drive[0]).all():
-        notes.append(f"{record.name}: no drive moves; what the reading does is drift, noise, or what came before.")
+        notes.append(
+            f"{record.name}: no drive moves; the readings show only drift, noise, or the effect of earlier motion."
+        )
     marked = []
-    for piece in pieces:
-        piece, said = _mark(piece, kind, names, spoken)
-        marked.append(piece)
-        notes += said
+    for stretch in stretches:
+        stretch, mark_notes = _mark(stretch, kind, names, recorded)
+        marked.append(stretch)
+        notes += mark_notes
     return Validated(tuple(marked), tuple(notes))
 
 
-def _empty(record: Record, kind: str, names: ChannelNames, where: str, spoken: np.ndarray) -> list[Fault]:
+def _missing_numbers(record: Record, kind: str, names: ChannelNames, where: str, recorded: np.ndarray) -> list[Fault]:
     """Faults of channels without numbers and of records too short."""
     n = len(record.drive)
     if n < SHORTEST[kind]:
         what = "samples" if kind == "series" else "poses"
-        return [Fault(where, f"{record.name} has {n} {what}; {SHORTEST[kind]} or more are needed: record longer")]
+        return [Fault(where, f"{record.name} has {n} {what}; at least {SHORTEST[kind]} are needed: record longer")]
     faults = []
     for i, name in enumerate(names.drives):
-        lost = np.flatnonzero(~np.isfinite(record.drive[:, i]))
-        if len(lost) == n:
+        missing = np.flatnonzero(~np.isfinite(record.drive[:, i]))
+        if len(missing) == n:
             faults.append(Fault(f"{where}.columns.{name!r}", "holds no number at all; name the column of this drive"))
-        elif len(lost) and kind == "poses":
-            what = f"has no number in row {lost[0]} ({len(lost)} of {n}); leave those poses out of the file or by rows"
+        elif len(missing) and kind == "poses":
+            what = f"has no number in row {missing[0]} ({len(missing)} of {n} rows); leave those poses out of the file, or out with `rows`"
             faults.append(Fault(f"{where}.columns.{name!r}", what))
     for i, name in enumerate(names.observed):
         count = int(np.isfinite(record.observed[:, i]).sum())
-        if spoken[i] and count < SHORTEST[kind]:
-            what = (
-                f"has {count} numbers in {n} rows of {record.name}, {SHORTEST[kind]} are needed; leave this channel out"
-            )
+        if recorded[i] and count < SHORTEST[kind]:
+            what = f"has {count} numbers in {n} rows of {record.name}, but {SHORTEST[kind]} are needed; leave this channel out"
             faults.append(Fault(f"{where}.columns.{name!r}", what))
     if record.ambient is not None and not np.isfinite(record.ambient).all():
         k = int(np.flatnonzero(~np.isfinite(record.ambient))[0])
-        what = f"has no number in row {k}; give a constant, or a column without holes"
+        what = f"has no number in row {k}; give a constant temperature, or a column without missing numbers"
         faults.append(Fault(f"{where}.conditions.ambient", what))
     return faults
 
 
 def _beyond_limits(record: Record, kind: str, model: Model, names: ChannelNames, where: str) -> list[Fault]:
-    """Drives that the device's own limits exclude: a wrong unit, sign or device."""
+    """Faults of drives that the device's own limits exclude: the unit, the sign or the device is wrong."""
     faults = []
     for i, (low, high) in enumerate(zip(*model.u_bounds, strict=True)):
         u, unit = record.drive[:, i], names.drive_units[i]
         span = high - low if np.isfinite(high - low) else max(abs(b) for b in (low, high, 0.0) if np.isfinite(b))
-        over = np.fmax(u - high, low - u)
-        count = int((over > OVER_LIMIT * span).sum())
+        excess = np.fmax(u - high, low - u)
+        count = int((excess > OVER_LIMIT * span).sum())
         if not count:
             continue
-        k = int(np.nanargmax(over))
+        k = int(np.nanargmax(excess))
         row = f"{record.time[k]:.6g} s" if kind == "series" and np.isfinite(record.time[k]) else f"row {k}"
-        sides = " to ".join("no limit" if not np.isfinite(b) else show(b, unit) for b in (low, high))
+        limits = " to ".join("no limit" if not np.isfinite(b) else show(b, unit) for b in (low, high))
         what = (
-            f"reaches {show(u[k], unit)} at {row}, the device allows {sides} ({count} of {len(u)} samples beyond); "
+            f"reaches {show(u[k], unit)} at {row}, the device allows {limits} ({count} of {len(u)} samples beyond); "
             "check the column's unit and sign, or the limit in the device file"
         )
         faults.append(Fault(f"{where}.columns.{names.drives[i]!r}", what))
     return faults
 
 
-def _nothing_happens(record: Record, where: str) -> list[Fault]:
-    """Records in which drive and channels are constant."""
+def _nothing_changes(record: Record, where: str) -> list[Fault]:
+    """A fault where every drive and every channel is constant."""
     still = np.all(record.drive == record.drive[:1]) and all(_constant(y) for y in record.observed.T)
     if still and record.role != "rest":
-        what = f"{record.name}: every drive and every channel is constant, nothing can be learnt; check the columns"
+        what = f"{record.name}: every drive and every channel is constant, nothing can be learnt from it; check the columns"
         return [Fault(where, what)]
     return []
 
@@ -142,95 +149,105 @@ def _constant(y: np.ndarray) -> bool:
     return bool(len(finite) == 0 or (finite == finite[0]).all())
 
 
-def _clock(record: Record, where: str) -> tuple[float, list[str], list[Fault]]:
+def _sample_time(record: Record, where: str) -> tuple[float, list[str], list[Fault]]:
     """The sample time [s], notes and faults of the time stamps."""
     t = record.time
-    lost = np.flatnonzero(~np.isfinite(t))
-    if len(lost):
-        what = (
-            f"has no number in row {lost[0]} ({len(lost)} of {len(t)} rows); repair the file or leave them out by rows"
-        )
+    missing = np.flatnonzero(~np.isfinite(t))
+    if len(missing):
+        what = f"has no number in row {missing[0]} ({len(missing)} of {len(t)} rows); repair the file, or leave them out with `rows`"
         return np.nan, [], [Fault(f"{where}.time", what)]
     step = np.diff(t)
-    back = np.flatnonzero(step <= 0)
-    if len(back):
-        k = int(back[0])
+    backward = np.flatnonzero(step <= 0)
+    if len(backward):
+        k = int(backward[0])
         what = (
-            f"does not rise from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {len(back)} such in all; "
-            "sort the rows, remove doubled ones, or give sample_rate if the samples are evenly spaced"
+            f"does not increase from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {len(backward)} such steps in "
+            "all; sort the rows, remove repeated ones, or give sample_rate if the samples are evenly spaced"
         )
         return np.nan, [], [Fault(f"{where}.time", what)]
-    period = float(np.median(step))
-    regular = step[step <= BREAK * period]
-    period = float(f"{regular.mean():.9g}")  # the same for records that differ by rounding
-    jitter = float(np.sqrt(np.mean((regular / period - 1) ** 2)))
+    median = float(np.median(step))
+    regular = step[step <= BREAK * median]
+    sample_time = float(f"{regular.mean():.9g}")  # the same for records that differ by rounding
+    jitter = float(np.sqrt(np.mean((regular / sample_time - 1) ** 2)))
     if jitter > JITTER:
         what = (
-            f"is uneven: steps differ from {period:.6g} s by {100 * jitter:.2g} % (rms; 1 % is allowed); resample to an even "
-            "grid and say how in `source`, or give sample_rate if only the time stamps are rounded"
+            f"is uneven: steps differ from {sample_time:.6g} s by {100 * jitter:.2g} % (rms; {100 * JITTER:g} % is allowed); "
+            "resample to an even grid and say how in `source`, or give sample_rate if only the time stamps are rounded"
         )
         return np.nan, [], [Fault(f"{where}.time", what)]
     notes = []
-    if jitter > JITTER / 10:
+    if jitter > NOTED_JITTER:
         notes.append(
-            f"{record.name}: time stamps jitter by {100 * jitter:.2g} % of the sample time (rms); taken as even."
+            f"{record.name}: time stamps jitter by {100 * jitter:.2g} % of the sample time (rms); samples are taken as evenly spaced."
         )
-    return period, notes, []
+    return sample_time, notes, []
 
 
 def _stretches(record: Record) -> tuple[list[Record], list[str]]:
-    """The record cut at gaps in time and where a drive is missing; joined over what is missing while the drive rests."""
+    """The record cut at gaps in time and where a drive is missing, but joined across a gap in which the drive rests."""
     known = np.isfinite(record.drive).all(1)
     breaks = (np.flatnonzero(np.diff(record.time) > BREAK * record.sample_time) + 1).tolist()
     edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
     bounds = [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
-    cuts = [(a, b) for lo, hi in bounds for a, b in _split(lo, hi, breaks)]
+    cuts = [(a, b) for low, high in bounds for a, b in _split(low, high, breaks)]
     if len(cuts) == 1 and cuts[0] == (0, len(known)):
         return [record], []
-    notes, parts = [], []
+    notes: list[str] = []
+    stretches: list[Record] = []
     for a, b in cuts:
-        part = _rows(record, a, b)
-        bridged = parts and _bridge(parts[-1], part)
-        if bridged:
-            missing = len(bridged.time) - len(parts[-1].time) - len(part.time)
-            at = f"{parts[-1].time[-1]:.6g} s"
-            notes.append(f"{record.name}: {missing} samples are missing after {at} while the drive rests; marked.")
-            parts[-1] = bridged
+        stretch = _rows(record, a, b)
+        joined = _joined(stretches[-1], stretch) if stretches else None
+        if joined:
+            missing = len(joined.time) - len(stretches[-1].time) - len(stretch.time)
+            after = f"{stretches[-1].time[-1]:.6g} s"
+            notes.append(
+                f"{record.name}: {missing} samples are missing after {after} while the drive rests; marked, not used."
+            )
+            stretches[-1] = joined
         else:
-            parts.append(part)
-    kept = [part for part in parts if len(part.time) >= SHORTEST["series"]]
-    dropped = sum(len(part.time) for part in parts) - sum(len(part.time) for part in kept)
-    if not notes and len(parts) == 1:
-        count = len(known) - len(parts[0].time)
-        notes.append(f"{record.name}: a drive is missing in {count} samples at its begin or end; they are left out.")
-    if len(parts) > 1:
-        at = ", ".join(f"{part.time[0]:.6g} s" for part in parts[1:6]) + (", ..." if len(parts) > 6 else "")
+            stretches.append(stretch)
+    kept = [stretch for stretch in stretches if len(stretch.time) >= SHORTEST["series"]]
+    dropped = sum(len(stretch.time) for stretch in stretches) - sum(len(stretch.time) for stretch in kept)
+    if not notes and len(stretches) == 1:
+        count = len(known) - len(stretches[0].time)
         notes.append(
-            f"{record.name}: the drive is not known across gaps, so it is read as {len(kept)} records, cut before {at}"
-            + (f"; {dropped} samples in stretches below {SHORTEST['series']} are left out." if dropped else ".")
+            f"{record.name}: a drive is missing in {count} samples at its beginning or end; they are left out."
         )
-        kept = [replace(part, name=f"{part.name} from {part.time[0]:.6g} s") for part in kept]
+    if len(stretches) > 1:
+        more = ", ..." if len(stretches) > LISTED_CUTS + 1 else ""
+        at = ", ".join(f"{stretch.time[0]:.6g} s" for stretch in stretches[1 : LISTED_CUTS + 1]) + more
+        notes.append(
+            f"{record.name}: the drive is not known across gaps, so the record is used as {len(kept)} records, cut before {at}"
+            + (f"; {dropped} samples in stretches shorter than {SHORTEST['series']} are left out." if dropped else ".")
+        )
+        kept = [replace(stretch, name=f"{stretch.name} from {stretch.time[0]:.6g} s") for stretch in kept]
     return kept, notes
 
 
 def _split(a: int, b: int, breaks: list[int]) -> list[tuple[int, int]]:
+    """The half-open range a to b cut at the `breaks` inside it."""
     edges = [a, *(k for k in breaks if a < k < b), b]
     return list(pairwise(edges))
 
 
 def _rows(record: Record, a: int, b: int) -> Record:
-    """Rows a to b of a record."""
-    fields = {name: getattr(record, name)[a:b] for name in ("time", "drive", "observed", "valid")}
-    return replace(record, **fields, ambient=None if record.ambient is None else record.ambient[a:b])
+    """Rows a to b, half open, of a record."""
+    ambient = None if record.ambient is None else record.ambient[a:b]
+    return replace(
+        record, time=record.time[a:b], drive=record.drive[a:b], observed=record.observed[a:b], valid=record.valid[a:b],
+        ambient=ambient,
+    )  # fmt: skip
 
 
-def _bridge(before: Record, after: Record) -> Record | None:
-    """Both with marked rows between, if the drive was at rest on both sides and the gap is a whole number of samples."""
-    rest = np.vstack([before.drive[-5:], after.drive[:5]])
+def _joined(before: Record, after: Record) -> Record | None:
+    """Both records with rows marked not valid between; None unless the drive rests on both sides at the same values and the
+    gap is a whole number of samples, no more than the shorter of the two records has."""
+    around = np.vstack([before.drive[-REST_SAMPLES:], after.drive[:REST_SAMPLES]])
     steps = (after.time[0] - before.time[-1]) / before.sample_time
     missing = round(steps) - 1
     shortest = min(len(before.time), len(after.time))
-    if len(rest) < 10 or (rest != rest[0]).any() or abs(steps - round(steps)) > 0.1 or missing > shortest:
+    moves = len(around) < 2 * REST_SAMPLES or (around != around[0]).any()
+    if moves or abs(steps - round(steps)) > WHOLE_SAMPLES or missing > shortest:
         return None
     time = before.time[-1] + before.sample_time * np.arange(1, missing + 1)
     blank = np.full((missing, before.observed.shape[1]), np.nan)
@@ -241,41 +258,45 @@ def _bridge(before: Record, after: Record) -> Record | None:
     return replace(
         before,
         time=np.r_[before.time, time, after.time],
-        drive=np.vstack([before.drive, np.tile(rest[0], (missing, 1)), after.drive]),
+        drive=np.vstack([before.drive, np.tile(around[0], (missing, 1)), after.drive]),
         observed=np.vstack([before.observed, blank, after.observed]),
         valid=np.vstack([before.valid, np.zeros(blank.shape, dtype=bool), after.valid]),
         ambient=ambient,
     )
 
 
-def _mark(record: Record, kind: str, names: ChannelNames, spoken: np.ndarray) -> tuple[Record, list[str]]:
-    """Spikes and stuck stretches made NaN and invalid; a sentence for each kind of mark and for dead channels."""
-    observed, valid, notes = record.observed.copy(), record.valid.copy(), []
+def _mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -> tuple[Record, list[str]]:
+    """The record with outliers and stuck stretches NaN and not valid; a note for each kind of mark and for dead channels."""
+    observed, valid = record.observed.copy(), record.valid.copy()
+    notes: list[str] = []
     for i, name in enumerate(names.observed):
-        if not spoken[i]:
+        if not recorded[i]:
             continue
         title, y = f"{record.name}, {name}", record.observed[:, i]
-        found = {"missing": ~np.isfinite(y) & record.valid[:, i]}
+        marks = {"missing": ~np.isfinite(y) & record.valid[:, i]}
         if _constant(y):
             value = y[np.isfinite(y)]
-            reads = "has no valid sample" if not len(value) else f"reads {show(value[0], names.units[i])} throughout"
+            state = "has no valid sample" if not len(value) else f"reads {show(value[0], names.units[i])} throughout"
             if record.role != "rest":
-                notes.append(f"{title}: {reads}; a dead channel?")
+                notes.append(f"{title}: {state}; the channel may be dead.")
         elif kind == "series":
-            frozen = stuck_samples(y, record.drive)
-            found["in stretches that repeat themselves to the last bit (stuck or clipped)"] = frozen
-            found["spikes"] = outliers(np.where(frozen, np.nan, y), record.drive)
-        for what, where in found.items():
-            if where.any():
-                first = f"{record.time[where.argmax()]:.6g} s" if kind == "series" else f"row {where.argmax()}"
-                notes.append(f"{title}: {where.sum()} of {len(y)} samples are {what} (first at {first}); not used.")
-                valid[where, i] = False
+            stuck = stuck_samples(y, record.drive)
+            marks["in stretches that repeat one value to the last bit (stuck or clipped)"] = stuck
+            marks["outliers"] = outliers(np.where(stuck, np.nan, y), record.drive)
+        for what, chosen in marks.items():
+            if chosen.any():
+                first = f"{record.time[chosen.argmax()]:.6g} s" if kind == "series" else f"row {chosen.argmax()}"
+                notes.append(f"{title}: {chosen.sum()} of {len(y)} samples are {what} (first at {first}); not used.")
+                valid[chosen, i] = False
         observed[~valid[:, i], i] = np.nan
     return replace(record, observed=observed, valid=valid), notes
 
 
 def compare_records(records: Sequence[Record], wheres: Sequence[str], names: ChannelNames) -> list[Fault]:
-    """Faults between records: rest that moves, and held-out data that were fitted. `wheres` are their places."""
+    """Faults between records: drives that move in a record at rest, and held-out data that are fitted as well.
+
+    `wheres` are the records' places in recording.toml.
+    """
     faults = []
     span = np.max([np.nanmax(r.drive, 0) for r in records], 0) - np.min([np.nanmin(r.drive, 0) for r in records], 0)
     for record, where in zip(records, wheres, strict=True):
@@ -284,7 +305,7 @@ def compare_records(records: Sequence[Record], wheres: Sequence[str], names: Cha
         if record.role == "rest" and moves[worst] > RESTLESS * span[worst]:
             unit = names.drive_units[worst]
             size = f"{from_si(moves[worst], unit) - from_si(0.0, unit):.4g} {unit}"
-            what = f'{record.name} is called rest, but {names.drives[worst]} moves by {size}; write role = "fit"'
+            what = f'{record.name} has role "rest", but {names.drives[worst]} moves by {size}; write role = "fit"'
             faults.append(Fault(f"{where}.role", what))
         for other in records:
             if record.role == "hold_out" and other.role == "fit" and _repeats(record, other):
@@ -293,56 +314,52 @@ def compare_records(records: Sequence[Record], wheres: Sequence[str], names: Cha
     return faults
 
 
-def _repeats(held: Record, fitted: Record) -> bool:
-    """Whether most of `held` stands in `fitted` number for number."""
-    a, b = (np.nan_to_num(np.hstack([r.drive, r.observed]), nan=0.0) for r in (fitted, held))
-    text, size = a.tobytes(), max(1, len(b) // 10)
+def _repeats(held_out: Record, fitted: Record) -> bool:
+    """Whether most of `held_out` occurs in `fitted` number for number."""
+    a, b = (np.nan_to_num(np.hstack([r.drive, r.observed]), nan=0.0) for r in (fitted, held_out))
+    content, size = a.tobytes(), max(1, len(b) // REPEAT_BLOCKS)
     blocks = [b[k : k + size] for k in range(0, len(b), size)]
-    telling = [block.tobytes() for block in blocks if len(b) < 20 or np.ptp(block, axis=0).max() > 0]
-    return bool(telling) and 2 * sum(block in text for block in telling) > len(telling)
+    telling = [block.tobytes() for block in blocks if len(b) < 2 * REPEAT_BLOCKS or np.ptp(block, axis=0).max() > 0]
+    return bool(telling) and 2 * sum(block in content for block in telling) > len(telling)
 
 
 def with_hold_out(records: Sequence[Record], kind: str) -> Validated:
     """The records with a held-out part: as given, else the end of the longest series, or every third of its poses.
 
     Held-out poses keep their place: both parts have every row, with the other part's samples marked not valid, so that
-    a device with a memory sees the whole sequence.
+    a device with a memory is simulated over the whole sequence.
     """
     fits = [record for record in records if record.role == "fit"]
     if not fits:
-        return Validated(faults=(Fault("record", 'has none with role = "fit"; there is nothing to learn from'),))
+        return Validated(faults=(Fault("record", 'none has role = "fit"; give at least one record to fit'),))
     if any(record.role == "hold_out" for record in records):
         return Validated(tuple(records))
     longest = max(fits, key=lambda record: len(record.time))
     n, least = len(longest.time), DIVISIBLE[kind]
     if n < least:
-        what = (
-            f'has none with role = "hold_out", and {longest.name} is too short to divide ({n} rows, {least} are needed)'
-        )
+        what = f'none has role = "hold_out", and {longest.name} is too short to divide ({n} rows, {least} are needed)'
         return Validated(faults=(Fault("record", f"{what}; record a second run"),))
     if kind == "series":
         cut = round((1 - HELD_OUT) * n)
-        parts = (_rows(longest, 0, cut), replace(_rows(longest, cut, n), role="hold_out"))
+        parts = [_rows(longest, 0, cut), replace(_rows(longest, cut, n), role="hold_out")]
         labels = (f"first {cut} of {n}", f"last {n - cut} of {n}")
         how = f"its last {n - cut} of {n} samples"
     else:
         third = np.arange(n) % EVERY == EVERY - 1
-        parts = (_only(longest, ~third), replace(_only(longest, third), role="hold_out"))
+        parts = [_only(longest, ~third), replace(_only(longest, third), role="hold_out")]
         labels, how = ("two of three", "every third"), f"every third of its {n} poses"
-    parts = tuple(replace(part, name=f"{part.name} ({label})") for part, label in zip(parts, labels, strict=True))
-    note = (
-        f"No record is held out: {how} are held out of {longest.name}; a second run of another kind would prove more."
-    )
-    still = kind == "series" and (parts[1].drive == parts[1].drive[0]).all()
-    rests = (
-        ("In what is held out no drive moves, so it proves little: name a record that moves hold_out.",)
-        if still
-        else ()
-    )
-    return Validated(tuple(p for r in records for p in (parts if r is longest else (r,))), (note, *rests))
+    parts = [replace(part, name=f"{part.name} ({label})") for part, label in zip(parts, labels, strict=True)]
+    notes = [
+        f'No record has role = "hold_out": of {longest.name}, {how} are held out; a second run of another kind would prove more.'
+    ]
+    if kind == "series" and (parts[1].drive == parts[1].drive[0]).all():
+        notes.append(
+            'In the held-out part no drive moves, so it proves little: give a record that moves role = "hold_out".'
+        )
+    return Validated(tuple(p for r in records for p in (parts if r is longest else [r])), tuple(notes))
 
 
 def _only(record: Record, rows: np.ndarray) -> Record:
-    """The record with the samples outside `rows` (n,) marked."""
+    """The record with the samples outside `rows` (n,) bool marked not valid."""
     valid = record.valid & rows[:, None]
     return replace(record, valid=valid, observed=np.where(valid, record.observed, np.nan))
