@@ -134,6 +134,17 @@ def test_a_lattice_needs_every_reading_on_it():
     assert quantisation_step(np.full(400, 2.0)) == 0.0
 
 
+def test_levels_that_differ_by_rounding_are_one():
+    on = 0.07 * np.random.default_rng(0).integers(-500, 500, 400)
+    on[:2] = on.min(), on.min() * (1 + 1e-15)
+    assert quantisation_step(on) == pytest.approx(0.07)
+
+
+def test_a_few_readings_have_a_step_only_where_few_are_enough():
+    on = 0.07 * np.arange(20)
+    assert quantisation_step(on) == 0.0 and quantisation_step(on, fewest=20) == pytest.approx(0.07)
+
+
 def test_a_push_on_a_mass_is_no_spike():
     left = 0.1 * np.random.default_rng(0).standard_normal((900, 1))
     spikes, pushed = left.copy(), left.copy()

@@ -22,10 +22,11 @@ def quantisation_step(values: np.ndarray, fewest: int = FEWEST) -> float:
     if not len(gaps):
         return 0.0
     step, distance = float(gaps.min()), levels - levels[0]
-    reach = max(step, distance[1])
-    while (
-        True
-    ):  # a longer distance tells the step more precisely, and a preciser step can be counted over a longer distance
+    reach = distance[distance > step / 2][
+        0
+    ]  # the first level that is another one, not the lowest one rounded otherwise
+    # the longer the distance, the more precise the step, and the farther it can be counted without an error of one
+    while True:
         near = distance[distance <= reach]
         count = np.round(near / step)
         if np.abs(near - count * step).max() > OFF_STEP * step:

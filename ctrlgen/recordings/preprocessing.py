@@ -1,7 +1,6 @@
-"""Columns as measured -> columns as judged: low-pass without phase, derivatives that nobody recorded, fewer rows.
+"""Preprocessing of recorded columns before validation: zero-phase low-pass, derivatives that nobody recorded, delays.
 
-What is derived from a position and what it is compared with go through the same filter, so that a linear law between
-them stays what it was.
+A position and what is derived from it pass the same filter, so that a linear law between them keeps its parameters.
 """
 
 from __future__ import annotations
@@ -10,26 +9,26 @@ import numpy as np
 import scipy  # its parts take a while to import, and come when they are used
 
 ORDER = 4  # of the Butterworth filter, run forward and backward
-WIDEST = 0.9  # of the highest frequency that the kept rows can hold
+HIGHEST = 0.9  # of half the rate of the kept rows: room for the filter's edge
 
 
 def low_passed(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
-    """`values` (n,) without what is above `cutoff` [Hz], without phase: 6 dB down there, 48 dB an octave beyond."""
+    """`values` (n,) low-passed at `cutoff` [Hz] without phase shift: 6 dB at the cut-off, 48 dB an octave beyond."""
     return scipy.signal.sosfiltfilt(scipy.signal.butter(ORDER, cutoff, fs=1 / sample_time, output="sos"), values)
 
 
-def shifted(values: np.ndarray, time: np.ndarray, lag: float) -> np.ndarray:
-    """`values` (n,) at `time` (n,), taken `lag` [s] before; straight between samples, NaN before the first."""
+def delayed(values: np.ndarray, time: np.ndarray, lag: float) -> np.ndarray:
+    """`values` (n,) of `lag` [s] before each `time` (n,): linear between samples, NaN before the first."""
     return np.interp(time - lag, time, values, left=np.nan, right=np.nan)
 
 
-def derived(values: np.ndarray, sample_time: float, order: int) -> np.ndarray:
-    """The first or second derivative in time of `values` (n,) by central differences; one-sided at the ends."""
+def derivative(values: np.ndarray, sample_time: float, order: int) -> np.ndarray:
+    """The derivative of `order` 1 or 2 in time of `values` (n,) by central differences, one-sided at the ends."""
     for _ in range(order):
         values = np.gradient(values, sample_time)
     return values
 
 
-def widest(sample_time: float, keep_every: int) -> float:
-    """The highest cut-off [Hz] that leaves room below half the rate of the kept rows."""
-    return WIDEST / (2 * sample_time * keep_every)
+def highest_cutoff(sample_time: float, keep_every: int) -> float:
+    """The highest cut-off [Hz] that half the rate of the kept rows can hold."""
+    return HIGHEST / (2 * sample_time * keep_every)

@@ -11,12 +11,12 @@ import numpy as np
 class Record:
     """One uninterrupted run, SI; n samples of n_u drives and n_y observed channels.
 
-    `name` file with rows; `role` fit, hold_out or rest; `time` (n,) [s] on the clock common to the records of one
-    recording.toml, k for settled poses; `sample_time` [s], inf for settled poses; `drive` (n, n_u) in the order of
-    `model.signals["drive"].channels`, always finite; `observed` (n, n_y) in the order of `Recording.channels`, NaN
-    where not `valid` (n, n_y): missing, in a gap, spike, stuck, or a pose that belongs to the other part. `linear`:
-    the drive goes straight between samples, else it is held. `ambient` (n,) [K], None where not given. `period` [s] after
-    which the run is stated to repeat itself.
+    `name`: file and rows. `role`: fit, hold_out or rest. `time` (n,) [s] on the clock common to the records of one
+    recording.toml; the pose's number for settled poses. `sample_time` [s], inf for settled poses. `drive` (n, n_u) in the
+    order of `model.signals["drive"].channels`, always finite. `observed` (n, n_y) in the order of `Recording.channels`, NaN
+    where not `valid` (n, n_y): missing, in a gap, an outlier, stuck, or belonging to the other part of a divided record.
+    `linear`: the drive is linear between samples; otherwise it is held. `ambient` (n,) [K], None where not given. `period`
+    [s] after which the drive is stated to repeat, None where it is not.
     """
 
     name: str
@@ -33,8 +33,11 @@ class Record:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Records of one device. `channels` observed, such as 'reading.delta_x', with the reader's `units` and the stated
-    standard deviation of the `noise` in SI (None where nobody stated one); `notes` what the gate marked or could not do."""
+    """Records of one device.
+
+    `kind`: "series" or "poses". `channels` observed, such as 'reading.delta_x', with the reader's `units` and the stated
+    standard deviation of their `noise` in SI, None where none is stated. `notes`: what validation marked or could not do.
+    """
 
     title: str
     device: str

@@ -1,4 +1,4 @@
-"""recording.toml as written, and what is wrong with it before any data are read."""
+"""The schema of recording.toml, and the faults that show against the model before any data are read."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
 
 FILE = "recording.toml"
-ENDLESS = 1 << 62
+LAST_ROW = 1 << 62  # stands for the end of a file whose length is not known yet
 
 
 class Column(Section):
-    """A column of a measurement file: its name or number from 0, its unit, the stated standard deviation of its noise.
+    """A column of a measurement file: its name or its number from 0, its unit, the standard deviation of its noise.
 
-    `file` where it stands in another file than the record's, row by row the same samples. Its numbers times `scale`
-    are in `unit`: newtons per volt of an amplifier that was read in volt, -1 for a wire the other way round. They belong
-    `later` than their row's time: a command of which the effect comes a cycle after it was recorded.
+    `file` names another file than the record's, with the same samples row by row. The column's numbers times `scale` are in
+    `unit`: newtons per volt of an amplifier whose voltage was recorded, -1 for reversed polarity. `later`: by how much they
+    act after their row's time, such as the one cycle after which a recorded command takes effect.
     """
 
     column: str | Annotated[int, Field(strict=True, ge=0)]
@@ -34,23 +34,23 @@ class Column(Section):
 
 
 class Derivative(Section):
-    """A signal that was not recorded: the `order`-th derivative in time of another one, by central differences."""
+    """A signal that was not recorded: the derivative of given `order` in time `of` another one, by central differences."""
 
     of: str
     order: Literal[1, 2]
 
 
 class Conditions(Section):
-    """What surrounds the device: the ambient temperature, constant or recorded."""
+    """The surroundings of the device: the ambient temperature, constant or recorded."""
 
     ambient: str | Column | None = None
 
 
 class RecordTable(Section):
-    """One [[record]] as written.
+    """One [[record]] of recording.toml.
 
-    `lead_in` of its `rows`, the first, only bring the device's memories up to date and are not judged; after `period`
-    the run repeats itself, as far as its noise lets it.
+    `rows`: the half-open range of the file's rows that is used. The first `lead_in` of them only set the device's states and
+    memories; their readings are not compared. `period`: after it the drive repeats. `dwell`: time from pose to pose.
     """
 
     file: str
@@ -67,20 +67,18 @@ class RecordTable(Section):
     columns: dict[str, Column] = {}
 
     @property
-    def judged(self) -> tuple[int, int]:
-        """The rows that count, half open; without an end where the file has it."""
-        a, b = self.rows or (0, ENDLESS)
+    def used_rows(self) -> tuple[int, int]:
+        """The half-open range of rows whose readings are used; ends at `LAST_ROW` where `rows` is not given."""
+        a, b = self.rows or (0, LAST_ROW)
         return a + self.lead_in, b
 
 
 class RecordingFile(Section):
-    """recording.toml as written; `columns` are every record's, which may override single ones.
+    """recording.toml; its `columns` hold for every record, which may override single ones.
 
-    `source`: who measured it and where it is published. `sha256` of files by their names without folders: of those that are
-    not kept beside this file, so that whoever needs one knows which.
-
-    Of a series, `low_pass` is a cut-off that all columns and `derivatives` get alike, without phase, and `keep_every`
-    the rows that are kept after it.
+    `source`: who measured it and where it is published. `sha256`: of files that are not kept beside this one, by their names
+    without folders, so that a reader can tell the right file. `low_pass`: of a series, the cut-off of a zero-phase filter
+    that all columns and `derivatives` pass. `keep_every`: one row in so many is kept after it.
     """
 
     title: str
@@ -95,12 +93,12 @@ class RecordingFile(Section):
     record: Annotated[tuple[RecordTable, ...], Field(min_length=1)]
 
     def columns_of(self, record: RecordTable) -> dict[str, Column]:
-        """The columns of one record by signal: its own, and the file's where it has none of its own."""
+        """The columns of one record by signal: its own, else those of the whole file."""
         return {**self.columns, **record.columns}
 
 
 def deviation(text: str, unit: str) -> float:
-    """A standard deviation in SI: of a temperature, the difference. Raises ValueError."""
+    """A standard deviation in SI; of a temperature, as a difference. Raises ValueError for text that is none."""
     temperature = same_dimension(unit, "K")
     value = parse(text.replace(" degC", " delta_degC") if temperature else text, "delta_degC" if temperature else unit)
     if value < 0:
@@ -109,12 +107,12 @@ def deviation(text: str, unit: str) -> float:
 
 
 def check(written: RecordingFile, model: Model) -> list[Fault]:
-    """Every fault of the file against the model: device, timing, signals, units, rows."""
+    """Every fault of the file against the model: device, clock, signals, units, rows, filter."""
     return _Check(written, model).faults
 
 
 def fits(name: str, column: Column, model: Model) -> bool:
-    """Whether a column's name is a signal of the model and its unit of that signal's dimension."""
+    """Whether a column's name is a signal of the model and its unit has that signal's dimension."""
     try:
         return name in signal_units(model) and same_dimension(column.unit, signal_units(model)[name])
     except ValueError:
@@ -122,7 +120,7 @@ def fits(name: str, column: Column, model: Model) -> bool:
 
 
 def signal_units(model: Model) -> dict[str, str]:
-    """Every channel of the model as a recording names it, with the reader's unit: 'drive.1X': 'W'."""
+    """The unit of every channel of the model by its name in a recording: {'drive.1X': 'W', ...}."""
     return {
         f"{role}.{channel}": unit
         for role, signal in model.signals.items()
@@ -137,7 +135,9 @@ class _Check:
         self.written, self.model = written, model
         self.faults: list[Fault] = []
         if written.device != model.device.name:
-            what = f"{written.device!r} is not {model.device.name!r}, the device given; give the one it was made on"
+            what = (
+                f"{written.device!r} is not {model.device.name!r}, the device given; give the device it was recorded on"
+            )
             self._fault("device", what)
         for k, record in enumerate(written.record):
             self._check_time(f"record[{k}]", record)
@@ -157,13 +157,13 @@ class _Check:
             self.faults.append(fault)
 
     def _check_time(self, where: str, record: RecordTable) -> None:
-        """How the record is timed must fit the kind of recording."""
+        """The record has a clock that fits the kind of recording: one for a series, none for poses."""
         if self.written.kind == "series":
             if (record.time is None) == (record.sample_rate is None):
                 what = 'give either time = { column = "...", unit = "s" } or sample_rate = "1 kHz"'
                 self._fault(f"{where}.time", what)
             if record.dwell is not None:
-                self._fault(f"{where}.dwell", 'belongs to poses; leave it out, or write kind = "poses"')
+                self._fault(f"{where}.dwell", 'is for poses only; leave it out, or write kind = "poses"')
         elif record.time is not None or record.sample_rate is not None:
             self._fault(
                 f"{where}.time", 'poses have no clock; leave it out and give dwell = "2 s" if they did not settle'
@@ -180,29 +180,32 @@ class _Check:
                 self._fault(f"{where}.conditions.ambient", str(error))
 
     def _check_channels(self, where: str, columns: dict[str, Column]) -> None:
-        """Every drive there, something observed, each name a signal of the model, each unit of its dimension."""
+        """Every drive has a column, a reading is observed, names are signals of the model, units of their dimension."""
         units = signal_units(self.model)
         for name, column in columns.items():
-            own = "columns" if column is self.written.columns.get(name) else f"{where}.columns"
+            place = "columns" if column is self.written.columns.get(name) else f"{where}.columns"
             if name not in units:
                 near = difflib.get_close_matches(name, units, n=1)
                 hint = f"did you mean {near[0]!r}?" if near else f"its signals are {', '.join(self.model.signals)}"
-                self._fault(f"{own}.{name!r}", f"is no signal of {self.model.device.name}; {hint}")
+                self._fault(f"{place}.{name!r}", f"is no signal of {self.model.device.name}; {hint}")
             else:
-                self._check_unit(f"{own}.{name!r}", column, units[name])
+                self._check_unit(f"{place}.{name!r}", column, units[name])
         for name, unit in units.items():
             if name.startswith("drive.") and name not in columns and name not in self.written.derivatives:
-                what = f'is missing, and the device cannot be simulated without; add "{name}" = {{ column = "...", unit = "{unit}" }}'
+                what = f'is missing, and the device cannot be simulated without it; add "{name}" = {{ column = "...", unit = "{unit}" }}'
                 self._fault(f"{where}.columns", f"{name} {what}")
         if all(name.startswith("drive.") for name in columns):
             known = next((name for name in units if name.startswith("reading.")), "reading")
-            self._fault(f"{where}.columns", f'nothing is observed; add "{known}" = {{ column = "...", unit = "..." }}')
+            self._fault(
+                f"{where}.columns",
+                f'name drives only, no reading to compare with; add "{known}" = {{ column = "...", unit = "..." }}',
+            )
 
     def _check_unit(self, where: str, column: Column, unit: str) -> None:
         try:
             if not same_dimension(column.unit, unit):
                 self._fault(
-                    where, f"unit = {column.unit!r} is the wrong dimension; {unit} or a multiple of it is needed"
+                    where, f"unit = {column.unit!r} is of the wrong dimension; {unit} or a multiple of it is needed"
                 )
                 return
         except ValueError as error:
@@ -218,38 +221,41 @@ class _Check:
         return {name for name in self.written.columns_of(record) if not name.startswith("drive.")}
 
     def _check_rows(self, k: int, record: RecordTable) -> None:
-        """Rows are a stretch, and none is both fitted and held out."""
-        if record.rows and record.judged[0] >= record.judged[1]:
+        """The rows are not empty, and no sample is both fitted and held out."""
+        if record.rows and record.used_rows[0] >= record.used_rows[1]:
             what = f"{list(record.rows)} is empty" + (f" after a lead-in of {record.lead_in}" if record.lead_in else "")
             self._fault(f"record[{k}].rows", f"{what}; write [first, one past the last]")
         for i, other in enumerate(self.written.record[:k]):
-            a, b = record.judged, other.judged
+            a, b = record.used_rows, other.used_rows
             if (
                 record.file == other.file
                 and max(a[0], b[0]) < min(a[1], b[1])
                 and "rest" not in (record.role, other.role)
                 and self._observed(record) & self._observed(other)
             ):
-                what = f"share rows of {record.file} with record[{i}]; no sample may be fitted twice, or fitted and held out"
+                what = f"share samples of {record.file} with record[{i}]; no sample may be fitted twice, or fitted and held out"
                 self._fault(f"record[{k}].rows", what)
 
     def _check_filter(self) -> None:
-        """Derivatives are of recorded columns, in time, and need a clock; so does a cut-off."""
+        """Filter and derivatives are for series only; a derivative is of a recorded column and has the right dimension."""
         w, units = self.written, signal_units(self.model)
-        timed = {"derivatives": w.derivatives, "low_pass": w.low_pass, "keep_every": w.keep_every > 1}
+        series_only = {"derivatives": w.derivatives, "low_pass": w.low_pass, "keep_every": w.keep_every > 1}
         if w.kind == "poses":
-            for key in (key for key, given in timed.items() if given):
-                self._fault(key, 'belongs to a series; leave it out, or write kind = "series"')
+            for key in (key for key, given in series_only.items() if given):
+                self._fault(key, 'is for series only; leave it out, or write kind = "series"')
         for name, derivative in w.derivatives.items():
             where = f"derivatives.{name!r}"
             if name not in units or not all(derivative.of in w.columns_of(r) for r in w.record):
-                what = f"a signal of {self.model.device.name}, `of` a column of every record, is needed"
+                what = (
+                    f"must be a signal of {self.model.device.name} and `of` a signal that every record has a column for"
+                )
                 self._fault(where, f"{what}; got {name} of {derivative.of}")
             elif derivative.of in units and not same_dimension(
                 f"({units[derivative.of]})/s^{derivative.order}", units[name]
             ):
                 self._fault(
-                    where, f"derivative {derivative.order} of {derivative.of} is not of the dimension of {name}"
+                    where,
+                    f"derivative {derivative.order} of {derivative.of} does not have the dimension of {name}; check `order` and `of`",
                 )
             if any(name in w.columns_of(r) for r in w.record):
-                self._fault(where, "is a column as well; give one of the two")
+                self._fault(where, "is given as a column as well; keep one of the two")
