@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any
+from typing import Any
 
 import pint
+from annotated_types import GroupedMetadata
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf)\s*(.*?)\s*$", re.IGNORECASE)
@@ -185,20 +186,29 @@ def read_quantity(unit: str | None, given: Any) -> Quantity:
     return _reader(unit, None, None, False)(given)
 
 
-def quantity(
-    unit: str, *, low: float | None = None, high: float | None = None, positive: bool = False, whole: bool = False
-) -> Any:
-    """The pydantic type of a number in `unit`, with bounds given in SI.
+@dataclass(frozen=True)
+class In(GroupedMetadata):
+    """What a number of a file must be: `Annotated[Quantity, In("um", positive=True)]`, with bounds given in SI.
 
     `positive` means strictly above zero, `whole` a count.
     """
-    lowest = 0.0 if positive else low
-    read = _reader(unit, lowest, high, positive, whole)
-    schema = {"type": ["string", "number", "object"], "title": "quantity", "x-unit": unit}
-    bounds = _bounds_text(unit, lowest, high, positive)
-    schema |= {"x-bounds": bounds} if bounds else {}
-    schema |= {"x-whole": True} if whole else {}
-    return Annotated[Quantity, BeforeValidator(read), PlainSerializer(lambda q: q.text), WithJsonSchema(schema)]
+
+    unit: str
+    low: float | None = None
+    high: float | None = None
+    positive: bool = False
+    whole: bool = False
+
+    def __iter__(self) -> Iterator[object]:
+        """Pydantic's annotations: how it is read, written and described in the JSON schema."""
+        lowest = 0.0 if self.positive else self.low
+        schema: dict[str, Any] = {"type": ["string", "number", "object"], "title": "quantity", "x-unit": self.unit}
+        bounds = _bounds_text(self.unit, lowest, self.high, self.positive)
+        schema |= {"x-bounds": bounds} if bounds else {}
+        schema |= {"x-whole": True} if self.whole else {}
+        yield BeforeValidator(_reader(self.unit, lowest, self.high, self.positive, self.whole))
+        yield PlainSerializer(lambda q: q.text)
+        yield WithJsonSchema(schema)
 
 
 def show(si: float, unit: str, digits: int = 4) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 
-from ctrlgen.core.units import quantity, written_unit
+from ctrlgen.core.units import In, Quantity, written_unit
 from ctrlgen.devices.base import AxisSignal, Device, FeedbackLoop, InertialPhysics, Limit, Section, Signal
 
-ForceConstant = quantity("N/V", positive=True) | quantity("N/A", positive=True)
+ForceConstant = Annotated[Quantity, In("N/V", positive=True)] | Annotated[Quantity, In("N/A", positive=True)]
 
 
 class Mechanics(Section):
@@ -19,10 +19,10 @@ class Mechanics(Section):
     domain: ClassVar[str] = "stage"
     tolerance: ClassVar[float | None] = 0.1
 
-    mass: quantity("kg", positive=True)
-    damping: quantity("N*s/m", low=0.0)
-    stiffness: quantity("N/um", low=0.0)
-    stroke: quantity("um", positive=True)
+    mass: Annotated[Quantity, In("kg", positive=True)]
+    damping: Annotated[Quantity, In("N*s/m", low=0.0)]
+    stiffness: Annotated[Quantity, In("N/um", low=0.0)]
+    stroke: Annotated[Quantity, In("um", positive=True)]
 
 
 class Actuator(Section):
@@ -32,7 +32,7 @@ class Actuator(Section):
     tolerance: ClassVar[float | None] = 0.1
 
     force_constant: ForceConstant
-    drive_limit: quantity("V", positive=True) | quantity("A", positive=True)
+    drive_limit: Annotated[Quantity, In("V", positive=True)] | Annotated[Quantity, In("A", positive=True)]
 
 
 class Loop(Section):
@@ -46,9 +46,9 @@ class Loop(Section):
     tolerance: ClassVar[float | None] = 0.0
 
     measures: Literal["reading", "displacement"] = "reading"
-    position_gain: quantity("1/s", positive=True)
-    velocity_gain: quantity("V/(m/s)", low=0.0)
-    integral_gain: quantity("V/(m*s)", low=0.0)
+    position_gain: Annotated[Quantity, In("1/s", positive=True)]
+    velocity_gain: Annotated[Quantity, In("V/(m/s)", low=0.0)]
+    integral_gain: Annotated[Quantity, In("V/(m*s)", low=0.0)]
 
 
 class Axis(Device):

@@ -6,16 +6,16 @@ hinge = { kind = "circular", R = "1.1 mm", t = "0.84 mm", equation = "auto" }
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from ctrlgen.core.units import quantity
+from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Section
 from ctrlgen.physics import circular_hinge_table as table
 from ctrlgen.physics.screw import Matrix, Scalar
 
-Length = quantity("mm", positive=True)
+Length = Annotated[Quantity, In("mm", positive=True)]
 Group = Literal[
     "auto",
     "paros_weisbord",
@@ -61,10 +61,10 @@ class Hinge(Section):
     t: Length
     equation: HingeEquations = HingeEquations()
     outside: table.Outside = "refuse"
-    shear_factor: quantity("1", low=0.0, high=2.0) | None = None
+    shear_factor: Annotated[Quantity, In("1", low=0.0, high=2.0)] | None = None
     b: Length | None = Field(default=None, description="width")
-    young: quantity("GPa", positive=True) | None = None
-    poisson: quantity("1", low=0.0, high=0.5) | None = None
+    young: Annotated[Quantity, In("GPa", positive=True)] | None = None
+    poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)] | None = None
 
     @model_validator(mode="after")
     def _equations_hold(self) -> Hinge:

@@ -9,13 +9,13 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
-from ctrlgen.core.units import quantity
+from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import AxisSignal, BalancedPhysics, Device, Limit, Section, Signal
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 
-Length = quantity("um", positive=True)
-Angle = quantity("deg")
-Count = quantity("1", positive=True, whole=True)
+Length = Annotated[Quantity, In("um", positive=True)]
+Angle = Annotated[Quantity, In("deg")]
+Count = Annotated[Quantity, In("1", positive=True, whole=True)]
 Axis = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
 
 
@@ -24,24 +24,24 @@ class Actuator(Section):
 
     domain: ClassVar[str] = "actuator"
 
-    beams: quantity("1", low=1, whole=True)
+    beams: Annotated[Quantity, In("1", low=1, whole=True)]
     beam_length: Length
     beam_width: Length
     beam_gap: Length
     bar_width: Length
     bar_half_height: Length
-    beam_angle: quantity("rad", positive=True, high=0.5)
+    beam_angle: Annotated[Quantity, In("rad", positive=True, high=0.5)]
     thickness: Length
-    young: quantity("GPa", positive=True)
-    poisson: quantity("1", low=0.0, high=0.5)
-    expansion: quantity("1/K", positive=True)
-    expansion_slope: quantity("1/K^2", low=0.0)
-    ambient: quantity("degC", low=200.0, high=400.0)
-    temperature_limit: quantity("degC", positive=True)
-    thermal_resistance: quantity("K/W", positive=True)
-    time_constant: quantity("ms", positive=True)
-    power_limit: quantity("W", positive=True)
-    heater_resistance: quantity("ohm", positive=True)
+    young: Annotated[Quantity, In("GPa", positive=True)]
+    poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
+    expansion: Annotated[Quantity, In("1/K", positive=True)]
+    expansion_slope: Annotated[Quantity, In("1/K^2", low=0.0)]
+    ambient: Annotated[Quantity, In("degC", low=200.0, high=400.0)]
+    temperature_limit: Annotated[Quantity, In("degC", positive=True)]
+    thermal_resistance: Annotated[Quantity, In("K/W", positive=True)]
+    time_constant: Annotated[Quantity, In("ms", positive=True)]
+    power_limit: Annotated[Quantity, In("W", positive=True)]
+    heater_resistance: Annotated[Quantity, In("ohm", positive=True)]
     drive: Literal["power", "voltage"]
 
 
@@ -50,16 +50,16 @@ class Notch(Section):
 
     domain: ClassVar[str] = "stage"
 
-    theta_x_per_M_x: quantity("rad/(N*um)", positive=True)
-    theta_y_per_F_z: quantity("rad/N")
-    theta_y_per_M_y: quantity("rad/(N*um)", positive=True)
-    theta_z_per_F_y: quantity("rad/N")
-    theta_z_per_M_z: quantity("rad/(N*um)", positive=True)
-    delta_x_per_F_x: quantity("um/N", positive=True)
-    delta_y_per_F_y: quantity("um/N", positive=True)
-    delta_y_per_M_z: quantity("um/(N*um)")
-    delta_z_per_F_z: quantity("um/N", positive=True)
-    delta_z_per_M_y: quantity("um/(N*um)")
+    theta_x_per_M_x: Annotated[Quantity, In("rad/(N*um)", positive=True)]
+    theta_y_per_F_z: Annotated[Quantity, In("rad/N")]
+    theta_y_per_M_y: Annotated[Quantity, In("rad/(N*um)", positive=True)]
+    theta_z_per_F_y: Annotated[Quantity, In("rad/N")]
+    theta_z_per_M_z: Annotated[Quantity, In("rad/(N*um)", positive=True)]
+    delta_x_per_F_x: Annotated[Quantity, In("um/N", positive=True)]
+    delta_y_per_F_y: Annotated[Quantity, In("um/N", positive=True)]
+    delta_y_per_M_z: Annotated[Quantity, In("um/(N*um)")]
+    delta_z_per_F_z: Annotated[Quantity, In("um/N", positive=True)]
+    delta_z_per_M_y: Annotated[Quantity, In("um/(N*um)")]
 
 
 class Stage(Section):
@@ -73,12 +73,12 @@ class Stage(Section):
     notch_radius: Length
     notches: Count
     notch: Notch
-    half_stage_stiffness: quantity("N/um", positive=True)
+    half_stage_stiffness: Annotated[Quantity, In("N/um", positive=True)]
     plate_half_length: Length
     plate_half_width: Length
     centre_offset: Length
     stroke: Length
-    notch_rotation_limit: quantity("deg", positive=True)
+    notch_rotation_limit: Annotated[Quantity, In("deg", positive=True)]
 
 
 class Hexapod(Section):
@@ -94,9 +94,9 @@ class Hexapod(Section):
     wire_length: Length
     wire_diameter: Length
     rod_diameter: Length
-    young: quantity("GPa", positive=True)
-    poisson: quantity("1", low=0.0, high=0.5)
-    stress_limit: quantity("MPa", positive=True)
+    young: Annotated[Quantity, In("GPa", positive=True)]
+    poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
+    stress_limit: Annotated[Quantity, In("MPa", positive=True)]
 
 
 class MemsHexapod(Device):

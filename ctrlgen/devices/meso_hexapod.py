@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Literal
+from typing import Annotated, Literal
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.core.units import quantity
+from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
 from ctrlgen.physics import meso_hexapod
 
-Length = quantity("mm", positive=True)
-Angle = quantity("deg")
+Length = Annotated[Quantity, In("mm", positive=True)]
+Angle = Annotated[Quantity, In("deg")]
 Six = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
 
@@ -49,8 +49,8 @@ class Cube(Section):
 class Workspace(Section):
     """Largest rotation and translation of any axis that the paper states; no limit of the model, `travel` is."""
 
-    rotation: quantity("deg", positive=True)
-    translation: quantity("um", positive=True)
+    rotation: Annotated[Quantity, In("deg", positive=True)]
+    translation: Annotated[Quantity, In("um", positive=True)]
 
 
 class MesoHexapod(Device):

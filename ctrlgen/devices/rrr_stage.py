@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Literal
+from typing import Annotated, Literal
 
 import casadi as ca
 import numpy as np
 from pydantic import model_validator
 
-from ctrlgen.core.units import quantity
+from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.physics import piezo_stack, rrr_stage
 from ctrlgen.physics.rrr_stage import Kinetostatics
 from ctrlgen.physics.screw import Matrix
 
-Length = quantity("mm", positive=True)
+Length = Annotated[Quantity, In("mm", positive=True)]
 
 
 class Lengths(Section):
@@ -24,27 +24,27 @@ class Lengths(Section):
 
     l1: Length
     l2: Length
-    l3: quantity("mm", low=0.0)
+    l3: Annotated[Quantity, In("mm", low=0.0)]
     l4: Length
-    l5: quantity("mm", low=0.0)
-    l6: quantity("mm", low=0.0)
+    l5: Annotated[Quantity, In("mm", low=0.0)]
+    l6: Annotated[Quantity, In("mm", low=0.0)]
 
 
 class Material(Section):
     """Material and width of the sheet the stage is cut from."""
 
-    young: quantity("GPa", positive=True)
-    poisson: quantity("1", low=0.0, high=0.5)
+    young: Annotated[Quantity, In("GPa", positive=True)]
+    poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
     width: Length
 
 
 class Piezo(Section):
     """The stack behind each input and its amplifier."""
 
-    stroke: quantity("um", positive=True)
-    blocking_force: quantity("N", positive=True)
-    voltage_limit: quantity("V", positive=True)
-    time_constant: quantity("ms", positive=True)
+    stroke: Annotated[Quantity, In("um", positive=True)]
+    blocking_force: Annotated[Quantity, In("N", positive=True)]
+    voltage_limit: Annotated[Quantity, In("V", positive=True)]
+    time_constant: Annotated[Quantity, In("ms", positive=True)]
 
 
 class RrrStage(Device):
@@ -56,7 +56,7 @@ class RrrStage(Device):
 
     kind: Literal["rrr_stage"]
     axes: tuple[str, str, str]
-    frame_angle: quantity("deg")
+    frame_angle: Annotated[Quantity, In("deg")]
     inputs: Literal["whole", "printed"] = "whole"
     lengths: Lengths
     material: Material

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from ctrlgen.core.errors import Fault
-from ctrlgen.core.units import from_si, quantity, same_dimension
+from ctrlgen.core.units import In, Quantity, from_si, same_dimension
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import sensor_models as chain
 
@@ -24,8 +24,8 @@ NUMBERS = (
     "sensitivity", "gain", "bandwidth", "noise", "filtered_noise", "filter_cutoff", "offset_rate", "calibrated_at",
     "low", "high",
 )  # fmt: skip
-Volt = quantity("V")
-Positive = quantity("V", positive=True)
+Volt = Annotated[Quantity, In("V")]
+Positive = Annotated[Quantity, In("V", positive=True)]
 
 
 def _given(section: Section) -> dict[str, Any]:
@@ -39,8 +39,8 @@ class Converter(Section):
 
     low: Volt | None = None
     high: Volt | None = None
-    bits: quantity("1", low=1, high=32, whole=True) | None = None
-    rate: quantity("Hz", positive=True) | None = None
+    bits: Annotated[Quantity, In("1", low=1, high=32, whole=True)] | None = None
+    rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
 
     @model_validator(mode="after")
     def _has_a_range(self) -> Converter:
@@ -74,7 +74,7 @@ class _Mounted(Section):
     """`at` the channel of the pose. A rotation is read at the end of an `arm`: displacement = arm * angle."""
 
     at: str
-    arm: quantity("mm", positive=True) | None = None
+    arm: Annotated[Quantity, In("mm", positive=True)] | None = None
     adc: Converter = Converter()
 
     @property
@@ -91,15 +91,15 @@ class DisplacementSensor(_Mounted):
 
     kind: Literal["displacement"]
     model: Literal["3316", "3317", "3338", "fibre"] | None = None
-    home: quantity("um", low=0.0) | None = None
-    sensitivity: quantity("um/V") | None = None
-    gain: quantity("1", positive=True) | None = None
-    bandwidth: quantity("Hz", positive=True) | None = None
+    home: Annotated[Quantity, In("um", low=0.0)] | None = None
+    sensitivity: Annotated[Quantity, In("um/V")] | None = None
+    gain: Annotated[Quantity, In("1", positive=True)] | None = None
+    bandwidth: Annotated[Quantity, In("Hz", positive=True)] | None = None
     noise: Positive | None = None
     filtered_noise: Positive | None = None
-    filter_cutoff: quantity("Hz", positive=True) | None = None
-    offset_rate: quantity("V/delta_degC") | None = None
-    calibrated_at: quantity("degC") | None = None
+    filter_cutoff: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    offset_rate: Annotated[Quantity, In("V/delta_degC")] | None = None
+    calibrated_at: Annotated[Quantity, In("degC")] | None = None
     low: Volt | None = None
     high: Volt | None = None
 
@@ -162,10 +162,10 @@ class InterferometerSensor(_Mounted):
     """Michelson interferometer with a photodiode, S2 A.3.4; what is not given is S2's. Its reading is the fringe voltage."""
 
     kind: Literal["interferometer"]
-    wavelength: quantity("nm", positive=True) | None = None
+    wavelength: Annotated[Quantity, In("nm", positive=True)] | None = None
     mean: Volt | None = None
     amplitude: Positive | None = None
-    noise: quantity("V", low=0.0) | None = None
+    noise: Annotated[Quantity, In("V", low=0.0)] | None = None
 
     def interferometer(self) -> chain.Interferometer:
         """The interferometer of the measuring chain with these numbers."""

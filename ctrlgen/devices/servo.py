@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Literal
+from typing import Annotated, Literal
 
 import casadi as ca
 
-from ctrlgen.core.units import quantity, written_unit
+from ctrlgen.core.units import In, Quantity, written_unit
 from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Signal
 
-Travel = quantity("deg", positive=True) | quantity("um", positive=True)
+Travel = Annotated[Quantity, In("deg", positive=True)] | Annotated[Quantity, In("um", positive=True)]
 
 
 class Servo(Device):

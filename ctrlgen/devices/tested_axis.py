@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 
-from ctrlgen.core.units import quantity
+from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Device, ImposedPhysics, Limit, Section, Signal
 
 
@@ -17,12 +17,12 @@ class Mechanics(Section):
     domain: ClassVar[str] = "stage"
     tolerance: ClassVar[float | None] = 1.0
 
-    mass: quantity("kg", low=0.0)
-    damping: quantity("N*s/m", low=0.0)
-    stiffness: quantity("N/um", low=0.0)
-    stroke: quantity("um", positive=True)
-    speed: quantity("um/s", positive=True)
-    force: quantity("N", positive=True)
+    mass: Annotated[Quantity, In("kg", low=0.0)]
+    damping: Annotated[Quantity, In("N*s/m", low=0.0)]
+    stiffness: Annotated[Quantity, In("N/um", low=0.0)]
+    stroke: Annotated[Quantity, In("um", positive=True)]
+    speed: Annotated[Quantity, In("um/s", positive=True)]
+    force: Annotated[Quantity, In("N", positive=True)]
 
 
 class TestedAxis(Device):

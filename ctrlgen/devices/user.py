@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -19,7 +19,7 @@ from pydantic import create_model
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
-from ctrlgen.core.units import Quantity, quantity, read_quantity, same_dimension, to_si, written_unit
+from ctrlgen.core.units import In, Quantity, read_quantity, same_dimension, to_si, written_unit
 from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, InertialPhysics, Limit, Signal
 from ctrlgen.devices.ports import Law, Ports, ask
 from ctrlgen.devices.section import Section
@@ -189,7 +189,9 @@ def _class(recipe: Recipe) -> type[UserDevice]:
     """The device's class: one section of parameters a domain."""
     fields: dict[str, Any] = {}
     for domain in dict.fromkeys(recipe.domains.values()):
-        numbers = {n: (quantity(recipe.units[n]), ...) for n, where in recipe.domains.items() if where == domain}
+        numbers = {
+            n: (Annotated[Quantity, In(recipe.units[n])], ...) for n, where in recipe.domains.items() if where == domain
+        }
         section = create_model(f"{domain.title()}Numbers", __base__=Section, **numbers)
         section.domain = domain
         fields[SECTIONS[domain]] = (section, ...)

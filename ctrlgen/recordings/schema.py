@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ctrlgen.core.errors import Fault
-from ctrlgen.core.units import parse, quantity, same_dimension
+from ctrlgen.core.units import In, Quantity, parse, same_dimension
 from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
 
@@ -30,7 +30,7 @@ class Column(Section):
     noise: str | None = None
     file: str | None = None
     scale: float = 1.0
-    later: quantity("s") | None = None
+    later: Annotated[Quantity, In("s")] | None = None
 
 
 class Derivative(Section):
@@ -56,13 +56,13 @@ class RecordTable(Section):
     file: str
     role: Literal["fit", "hold_out", "rest"]
     time: Column | None = None
-    sample_rate: quantity("Hz", positive=True) | None = None
-    dwell: quantity("s", positive=True) | None = None
-    start: quantity("s") | None = None
+    sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    dwell: Annotated[Quantity, In("s", positive=True)] | None = None
+    start: Annotated[Quantity, In("s")] | None = None
     between_samples: Literal["held", "linear"] = "held"
     rows: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
     lead_in: Annotated[int, Field(ge=0)] = 0
-    period: quantity("s", positive=True) | None = None
+    period: Annotated[Quantity, In("s", positive=True)] | None = None
     conditions: Conditions = Conditions()
     columns: dict[str, Column] = {}
 
@@ -86,7 +86,7 @@ class RecordingFile(Section):
     source: str = ""
     sha256: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]] = {}
     kind: Literal["series", "poses"]
-    low_pass: quantity("Hz", positive=True) | None = None
+    low_pass: Annotated[Quantity, In("Hz", positive=True)] | None = None
     keep_every: Annotated[int, Field(ge=1)] = 1
     columns: dict[str, Column] = {}
     derivatives: dict[str, Derivative] = {}

@@ -19,10 +19,10 @@ from pydantic import Field
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
-from ctrlgen.core.units import parse, quantity
+from ctrlgen.core.units import In, Quantity, parse, read_quantity
 from ctrlgen.devices.base import Section
 
-Length = quantity("um", positive=True)
+Length = Annotated[Quantity, In("um", positive=True)]
 Point = dict[str, str | int | float]
 
 
@@ -176,7 +176,7 @@ class Lissajous(Path_):
     kind: Literal["lissajous"]
     amplitudes: tuple[Length, Length]
     periods: tuple[Annotated[int, Field(ge=1, le=1000)], Annotated[int, Field(ge=1, le=1000)]]
-    phase: quantity("deg") = quantity("deg").__metadata__[0].func("90 deg")
+    phase: Annotated[Quantity, In("deg")] = read_quantity("deg", "90 deg")
     centre: Point = {}
     plane: tuple[str, str] = ("delta_x", "delta_y")
 

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import quantity
+from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices import Device, load_device
 from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
@@ -36,8 +36,8 @@ class ScenarioFile(Section):
     title: str
     device: str
     follow: Literal["pose", "displacement"] = "pose"
-    sample_rate: quantity("Hz", positive=True) | None = None
-    duration: quantity("s", positive=True) | None = None
+    sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    duration: Annotated[Quantity, In("s", positive=True)] | None = None
     points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
     path: PathKind
     outcome: Literal["solved", "unreachable"] = "solved"
