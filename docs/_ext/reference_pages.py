@@ -1,0 +1,305 @@
+"""Writes the reference pages from what the program itself reads and prints: schemas, laws, settings, `--help`."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+from conventions_figure import draw_conventions
+from pydantic import BaseModel
+
+OUT = Path(__file__).resolve().parents[1] / "reference" / "generated"
+PASSED_OVER = ("effect", "sensor")  # tables that every device file may have: on their own page
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Sphinx calls this once; the pages are written before it looks for them."""
+    app.connect("config-inited", lambda *_: (write_all(), draw_conventions(OUT.parents[1] / "_static")))
+    return {"parallel_read_safe": True}
+
+
+def write_all() -> None:
+    """Every generated page."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    pages = {
+        "devices": device_page(), "scenario": scenario_page(), "recording": recording_page(), "effects": effects_page(),
+        "commands": commands_page(), "results": results_page(), "settings": settings_page(), "python": python_page(),
+        "equations": equations_page(), "priors": priors_page(),
+    }  # fmt: skip
+    for name, text in pages.items():
+        path = OUT / f"{name}.md"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:  # so that Sphinx reads only what is new
+            path.write_text(text, encoding="utf-8")
+
+
+def type_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """What a value may be, in words: 'quantity, such as "1 um", > 0 um', 'one of "held", "linear"', 'table, see Loop'."""
+    if "$ref" in schema:
+        name = schema["$ref"].rpartition("/")[2]
+        section = definitions.get("prefix", "") + name
+        return f"table, see [{name}](#{re.sub(r'[^a-z0-9_-]', '', section.lower().replace(' ', '-'))})"
+    if "anyOf" in schema or "oneOf" in schema:
+        options = schema.get("anyOf") or schema["oneOf"]
+        return " or ".join(dict.fromkeys(type_of(o, definitions) for o in options if o.get("type") != "null"))
+    if "allOf" in schema:
+        return type_of(schema["allOf"][0], definitions)
+    if "x-unit" in schema:
+        unit = schema["x-unit"]
+        number = "count" if schema.get("x-whole") else "number" if unit == "1" else f'quantity, such as `"1 {unit}"`'
+        bounds = re.sub(r" 1\b(?! )", "", schema.get("x-bounds", "")) if unit == "1" else schema.get("x-bounds", "")
+        return number + (f", {bounds}" if bounds else "")
+    if "const" in schema:
+        return f'`"{schema["const"]}"`'
+    if "enum" in schema:
+        return "one of " + ", ".join(f'`"{value}"`' for value in schema["enum"])
+    if schema.get("type") == "array":
+        members = schema.get("prefixItems")
+        if members:
+            return f"list of {len(members)}: {type_of(members[0], definitions)}"
+        return f"list of {type_of(schema.get('items', {}), definitions)}"
+    if schema.get("type") == "object" and isinstance(schema.get("additionalProperties"), dict):
+        return f"table of names, each {type_of(schema['additionalProperties'], definitions)}"
+    limits = [f"{sign} {schema[key]}" for key, sign in (("minimum", ">="), ("maximum", "<=")) if key in schema]
+    word = {"string": "text", "integer": "whole number", "boolean": "true or false", "number": "number"}
+    return ", ".join([word.get(schema.get("type", ""), schema.get("type", "any value")), *limits])
+
+
+def table_of(schema: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
+    """A table of keys, one row a key."""
+    required = set(schema.get("required", ()))
+    rows = ["| key | value | if left out | meaning |", "|---|---|---|---|"]
+    for key, value in schema.get("properties", {}).items():
+        default = value.get("default")
+        shown = "must be given" if key in required else "-" if default in (None, [], {}, ()) else f"`{default}`"
+        meaning = value.get("description", "") if "$ref" not in value else ""
+        rows.append(f"| `{key}` | {cell(type_of(value, definitions))} | {cell(shown)} | {cell(meaning)} |")
+    return rows
+
+
+def cell(text: str) -> str:
+    """Text that may stand in a table."""
+    return " ".join(str(text).split()).replace("|", "\\|")
+
+
+def sourced(path: Path) -> list[tuple[str, str, str]]:
+    """(equation or section, function, first sentence) of what a file of `ctrlgen/physics/` takes from the papers."""
+    rows = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            text = " ".join((ast.get_docstring(node) or "").split())
+            for paper, where in re.findall(CITED, text):
+                rows.append((f"{paper} {where.strip(' .,;:')}", node.name, re.split(r"(?<=\.) ", text)[0][:160]))
+    return rows
+
+
+EQUATIONS = r"eqs?\. \([\d.]+\)(?:(?:-|, | and )\([\d.]+\))*"
+CITED = rf"(S[0-3]) ({EQUATIONS}|[A-C]\.\d+(?:-[A-C]\.\d+)?|Table \d+|section [\d.]+|Appendix [A-C][\d.]*)"
+
+
+def equations_page() -> str:
+    """Where each equation of the papers is stated, from the docstrings of `ctrlgen/physics/`."""
+    package = Path(inspect.getfile(__import__("ctrlgen"))).parent
+    rows = {
+        (place, f"ctrlgen/physics/{path.name}", name, what)
+        for path in sorted((package / "physics").glob("*.py")) for place, name, what in sourced(path)
+    }  # fmt: skip
+
+    def in_order(row: tuple[str, ...]) -> tuple[Any, ...]:
+        return row[0][:2], [int(n) for n in re.findall(r"\d+", row[0][2:])], row
+
+    lines = [
+        GENERATED, "# Equations of the papers", "",
+        "S0 to S3 are the papers that describe the devices; [the conventions](../../conventions.md) name them.", "",
+        "| equation | file | function | what it gives |", "|---|---|---|---|",
+    ]  # fmt: skip
+    lines += [
+        f"| {place} | `{file}` | `{name}` | {cell(what)} |" for place, file, name, what in sorted(rows, key=in_order)
+    ]
+    return "\n".join([*lines, ""])
+
+
+def priors_page() -> str:
+    """What the search believes of each law before it sees data, from `ctrlgen/diagnosis/hypotheses/priors.py`."""
+    package = Path(inspect.getfile(__import__("ctrlgen"))).parent
+    source = package / "diagnosis" / "hypotheses" / "priors.py"
+    text = source.read_text(encoding="utf-8") if source.exists() else ""
+    head = "What the diagnosis believes of each law before it sees a recording: one row a law, with its reason."
+    return "\n".join([GENERATED, "# Priors of the laws", "", head, "", "```python", text.rstrip(), "```", ""])
+
+
+def model_section(
+    model: type[BaseModel], title: str, level: int = 2, passed_over: tuple[str, ...] = (), prefix: str = ""
+) -> list[str]:
+    """A schema as tables: the file itself, then every table in it."""
+    schema = model.model_json_schema()
+    definitions = dict(schema.get("$defs", {}), prefix=prefix)
+    schema["properties"] = {k: v for k, v in schema["properties"].items() if k not in passed_over}
+    lines = [
+        f"{'#' * level} {title}",
+        "",
+        inspect.cleandoc(model.__doc__ or ""),
+        "",
+        *table_of(schema, definitions),
+        "",
+    ]
+    for name in reachable(schema["properties"], definitions):
+        section = definitions[name]
+        lines += [
+            f"{'#' * (level + 1)} {prefix}{name}",
+            "",
+            section.get("description", ""),
+            "",
+            *table_of(section, definitions),
+            "",
+        ]
+    return lines
+
+
+def reachable(node: Any, definitions: dict[str, Any], seen: list[str] | None = None) -> list[str]:
+    """Names of the tables that `node` refers to, in the order in which a reader meets them."""
+    seen = [] if seen is None else seen
+    if isinstance(node, dict):
+        if "$ref" in node:
+            name = node["$ref"].rpartition("/")[2]
+            if name not in seen:
+                seen.append(name)
+                reachable(definitions[name], definitions, seen)
+        for value in node.values():
+            reachable(value, definitions, seen)
+    elif isinstance(node, list):
+        for value in node:
+            reachable(value, definitions, seen)
+    return seen
+
+
+GENERATED = "<!-- generated by docs/_ext/reference_pages.py -->\n"
+
+
+def device_page() -> str:
+    """Every kind of device, with its tables."""
+    from ctrlgen.devices import Device
+    from ctrlgen.devices.sensor import DisplacementSensor, InterferometerSensor
+
+    lines = [
+        GENERATED, "# device.toml", "",
+        "A device file describes one stage: `kind` chooses the equations, `name` is a C identifier, `title` and `source` are "
+        "for readers. Every number is text with its unit, or a table "
+        '`{ value = "40 um", sd = "0.5 um", source = "data sheet" }`: `sd` is the standard deviation of what is not known '
+        "exactly, `source` where the number comes from. Unknown keys are errors; all faults of a file are reported at once.",
+        "", "Any device file may hold `[[sensor]]` tables, and `[[effect]]` tables for the [physical effects](effects.md) that "
+        "its kind leaves out.", "",
+    ]  # fmt: skip
+    for kind, device in sorted(Device.library.items()):
+        lines += model_section(device, f'kind = "{kind}"', passed_over=PASSED_OVER, prefix=f"{kind} ")
+    lines += ["## [[sensor]]", ""]
+    for sensor in (DisplacementSensor, InterferometerSensor):
+        lines += model_section(sensor, sensor.__name__, level=3, prefix=f"{sensor.__name__} ")
+    return "\n".join(lines)
+
+
+def scenario_page() -> str:
+    """scenario.toml."""
+    from ctrlgen.trajectory.scenario import ScenarioFile
+
+    return "\n".join([GENERATED, *model_section(ScenarioFile, "scenario.toml", level=1)])
+
+
+def recording_page() -> str:
+    """recording.toml."""
+    from ctrlgen.recordings.schema import RecordingFile
+
+    return "\n".join([GENERATED, *model_section(RecordingFile, "recording.toml", level=1)])
+
+
+def effects_page() -> str:
+    """Every law of the library: equation, parameters, source; and what the search believes of it."""
+    from ctrlgen.effects import Effect
+
+    lines = [
+        GENERATED, "# Physical effects", "",
+        "Each is one file in `ctrlgen/effects/`, written into a device file as an `[[effect]]` table with `kind`, `at` (the "
+        "channel it acts on, or `\"all\"`), `of` for effects that couple two channels, and its parameters. In a unit, "
+        "`channel` stands for the unit of the signal the effect acts on, `travel` for that of the stage displacement and "
+        "`partner` for that of the other channel.", "",
+    ]  # fmt: skip
+    for kind, law in sorted(Effect.library.items()):
+        lines += [f"## {kind}", "", f"Acts on: {law.place.value}. Source: {law.source}", "", "```text"]
+        lines += [inspect.cleandoc(law.__doc__ or ""), "```", ""]
+        lines += ["| parameter | unit | bounds | meaning |", "|---|---|---|---|"]
+        for p in law.params:
+            low, high = p.bounds
+            lines.append(f"| `{p.name}` | {p.unit} | {low:g} … {high:g} | {cell(p.doc)} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def commands_page() -> str:
+    """The `--help` of every command."""
+    from typer.testing import CliRunner
+
+    from ctrlgen.app import cli
+
+    runner, environment = CliRunner(), {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
+    lines = [GENERATED, "# Commands", "", *_help(runner, cli.app, [], environment)]
+    for command in cli.app.registered_commands:
+        name = command.name or command.callback.__name__.replace("_", "-")
+        lines += [f"## ctrlgen {name}", "", *_help(runner, cli.app, [name], environment)]
+    return "\n".join(lines)
+
+
+def _help(runner: Any, app: Any, words: list[str], environment: dict[str, str]) -> list[str]:
+    shown = runner.invoke(app, [*words, "--help"], env=environment, prog_name="ctrlgen").output
+    return ["```text", "\n".join(line.rstrip() for line in shown.strip().splitlines()), "```", ""]
+
+
+def results_page() -> str:
+    """The files that programs read, from their published JSON schemas."""
+    import json
+
+    from ctrlgen import reporting
+
+    folder = Path(reporting.__file__).parent / "schemas"
+    lines = [
+        GENERATED, "# Result files", "",
+        "`summary.json` (of `run` and `solve`), `build.json` (of `verify`) and `diagnosis.json` (of `diagnose`) hold every "
+        "result for programs. Each states the version of its schema, the program's version, the sha256 of its inputs and the "
+        "seed. The JSON Schemas are shipped with the package in `ctrlgen/reporting/schemas/`.", "",
+    ]  # fmt: skip
+    for path in sorted(folder.glob("*.schema.json")):
+        schema = json.loads(path.read_text(encoding="utf-8"))
+        definitions = schema.get("$defs", {})
+        lines += [f"## {path.name.removesuffix('.schema.json')}.json", "", schema.get("description", ""), ""]
+        lines += [*table_of(schema, definitions), ""]
+        for name in reachable(schema.get("properties", {}), definitions):
+            section = definitions[name]
+            lines += [f"### {name}", "", section.get("description", ""), "", *table_of(section, definitions), ""]
+    return "\n".join(lines)
+
+
+def settings_page() -> str:
+    """The thresholds of the diagnosis, each with its reason, as `ctrlgen/diagnosis/settings.py` states them."""
+    source = Path(inspect.getfile(__import__("ctrlgen"))).parent / "diagnosis" / "settings.py"
+    text = source.read_text(encoding="utf-8") if source.exists() else ""
+    head = "Every threshold of the diagnosis stands in one module, with its unit and its reason."
+    return "\n".join([GENERATED, "# Settings of the diagnosis", "", head, "", "```python", text.rstrip(), "```", ""])
+
+
+def python_page() -> str:
+    """The public Python API: what `ctrlgen` exports."""
+    import ctrlgen
+
+    lines = [
+        GENERATED, "# Python", "",
+        "`import ctrlgen` gives these names. Numbers are SI; arrays are NumPy's, expressions CasADi's `SX`.", "",
+        "```{eval-rst}",
+    ]  # fmt: skip
+    for name in ctrlgen.__all__:
+        member = getattr(ctrlgen, name)
+        if inspect.isclass(member):
+            lines += [f".. autoclass:: {member.__module__}.{member.__qualname__}", "   :members:", ""]
+        elif callable(member):
+            lines += [f".. autofunction:: {member.__module__}.{member.__qualname__}", ""]
+    return "\n".join([*lines, "```", ""])

@@ -1,0 +1,91 @@
+"""What the documentation shows works: files are written as captioned, Python runs, commands end well."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+from markdown_it import MarkdownIt
+
+DOCS = ROOT / "docs"
+IN_ORDER = {  # pages that build on files of the pages before them
+    "device": ["tutorial/first_device.md"],
+    "diagnosis": ["tutorial/first_device.md", "tutorial/first_diagnosis.md"],
+    "mechanism": ["howto/own_mechanism.md"],
+}
+
+
+def blocks(page: str) -> list[tuple[str, str, str]]:
+    """(language, caption, text) of every code block of a page, in order; a caption is the file's name."""
+    found = []
+    for token in MarkdownIt().parse((DOCS / page).read_text(encoding="utf-8")):
+        if token.type != "fence":
+            continue
+        info, text, caption = token.info.strip(), token.content, ""
+        if info.startswith("{code-block}"):
+            while text.startswith(":"):
+                option, _, text = text.partition("\n")
+                caption = option.removeprefix(":caption:").strip() if option.startswith(":caption:") else caption
+            info, text = "shown", text.removeprefix("\n")
+        found.append((info, caption, text))
+    return found
+
+
+def follow(pages: list[str], folder: Path) -> int:
+    """Does what the pages say, in `folder`; how many blocks were run."""
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    run = 0
+    for page in pages:
+        for language, caption, text in blocks(page):
+            if caption:
+                (folder / caption).write_text(text, encoding="utf-8")
+            commands = [[sys.executable, "-c", text]] if language == "python" else []
+            if language == "console":
+                lines = text.splitlines()
+                assert all(line.startswith("$ ") for line in lines), (page, text)
+                commands = [shlex.split(line[2:]) for line in lines]
+            for command in commands:
+                done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+                assert done.returncode == 0, (page, command, done.stdout, done.stderr)
+                run += 1
+    return run
+
+
+@pytest.mark.parametrize("name", IN_ORDER)
+def test_what_a_page_tells_the_reader_to_do_works(name, tmp_path):
+    assert follow(IN_ORDER[name], tmp_path) > 0
+
+
+@pytest.mark.long
+def test_the_first_firmware_works(tmp_path):
+    assert follow(["tutorial/first_firmware.md"], tmp_path) > 0
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_the_first_diagnosis_finds_what_the_page_says(tmp_path):
+    follow(IN_ORDER["diagnosis"], tmp_path)
+    shown = next(text for language, _, text in blocks("tutorial/first_diagnosis.md") if language == "text")
+    found = (tmp_path / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8")
+    assert "stiffening" in shown and '"stiffening"' in found and '"explained"' in found
+
+
+def test_every_page_is_in_the_contents():
+    listed = (DOCS / "index.md").read_text(encoding="utf-8").split()
+    pages = {path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md")} - {"index"}
+    assert pages <= {*listed, *(page for page in pages if page.startswith("reference/generated"))}
+
+
+@pytest.mark.long
+def test_the_documentation_builds_without_a_warning(tmp_path):
+    """Links between pages, to files and to functions included."""
+    pytest.importorskip("sphinx", reason="the documentation's generator is not installed: pip install '.[docs]'")
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(DOCS), str(tmp_path)],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
