@@ -131,11 +131,11 @@ def test_the_cheap_bound_of_the_stress_is_never_below_it_and_exact_for_a_lift(mo
     z[:, ::2] *= rng.uniform(0, 1, (6, 1000))
     cold = np.tile(model.rest[:, None], (1, 2000))
     shares = controller.composite_ratio.map(2000)(cold, 0 * z, z).full().ravel()
-    bounds = controller.gauge.map(2000)(z).full().ravel()
+    bounds = controller.composite_bound.map(2000)(z).full().ravel()
     assert np.all(bounds >= shares) and shares.max() > 1
     lift = controller.static.displacement(model.rest, np.zeros(6), [0, 0, 0, 0, 0, 2e-5])
     share = float(controller.composite_ratio(model.rest, np.zeros(6), lift))
-    assert share == pytest.approx(float(controller.gauge(lift)), abs=1e-4) and share > 0.3
+    assert share == pytest.approx(float(controller.composite_bound(lift)), abs=1e-4) and share > 0.3
 
 
 def test_a_target_beyond_the_drives_is_approached_as_far_as_they_reach(model, controller):

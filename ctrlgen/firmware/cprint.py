@@ -76,7 +76,7 @@ _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _CALLS = {  # of `elementary`
     ca.OP_EXP: "exponential", ca.OP_LOG: "logarithm", ca.OP_SIN: "sine", ca.OP_COS: "cosine", ca.OP_TAN: "tangent",
-    ca.OP_ASIN: "arcsine", ca.OP_ACOS: "arccosine", ca.OP_ATAN: "arctangent", ca.OP_ATAN2: "direction",
+    ca.OP_ASIN: "arcsine", ca.OP_ACOS: "arccosine", ca.OP_ATAN: "arctangent", ca.OP_ATAN2: "arctangent2",
     ca.OP_TANH: "hyperbolic_tangent", ca.OP_SINH: "hyperbolic_sine", ca.OP_COSH: "hyperbolic_cosine",
     ca.OP_POW: "power", ca.OP_CONSTPOW: "power", ca.OP_FLOOR: "whole_below", ca.OP_CEIL: "whole_above",
 }  # fmt: skip

@@ -31,7 +31,7 @@ TURNS = {Real.DOUBLE: 1e5, Real.FLOAT: 1e4}  # angles up to which sine, cosine a
 TURN_END = {Real.DOUBLE: 2.0**31, Real.FLOAT: 2.0**20}  # beyond, the digits do not tell the angle
 ASIN_NEAR, TANH_NEAR, SINH_NEAR = 0.5625, 0.625, 1.0  # up to where the series itself is used
 NEEDS = {  # of each function, what it calls
-    "sine": ("quarters",), "cosine": ("quarters",), "tangent": ("quarters",), "direction": ("arctangent",),
+    "sine": ("quarters",), "cosine": ("quarters",), "tangent": ("quarters",), "arctangent2": ("arctangent",),
     "arcsine": ("root", "small_arcsine"), "arccosine": ("root", "small_arcsine"),
     "hyperbolic_tangent": ("exponential",), "hyperbolic_sine": ("exponential",), "hyperbolic_cosine": ("exponential",),
     "power": ("exponential", "logarithm", "whole_below"),

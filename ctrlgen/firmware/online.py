@@ -12,7 +12,7 @@ from ctrlgen.core.units import base_unit, show
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
-from ctrlgen.model.feedforward import INSET, SLACK, TRIALS, Controller
+from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
 from ctrlgen.trajectory.scenario import Scenario
 
 FLOAT_SLACK = 4e-6  # as SLACK of the controller, for float: 0.4 mK, which four roundings of a temperature amount to
@@ -55,22 +55,22 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     balance = printed(controller.static.settle, "balance_displacement")
     ratio = printed(controller.composite_ratio, "composite_ratio") if controller.guarded_limits else None
     nearest = printed(controller.nearest, "nearest_displacement")
-    gauge = printed(controller.gauge, "composite_bound") if controller.gauge else None
+    bound = printed(controller.composite_bound, "composite_bound") if controller.composite_bound else None
     slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     z_slack, s_slack, u_slack = slack.slacks
     drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
     last = modes[-1]
     advance = [] if model.x.numel() == model.n_states else ["advance"]
     step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", *advance) if part in last)
-    step_cost += gauge.operations if gauge else 0
+    step_cost += bound.operations if bound else 0
     once_more = sum(last[part].operations for part in ("state", "drive") if part in last)
     worst_cost = (
         step_cost
         + nearest.operations
         + (2 if controller.state_can_be_limited else 1) * balance.operations
-        + (controller.shrinks * ratio.operations if ratio else 0)
+        + (controller.composite_rounds * ratio.operations if ratio else 0)
         + (last["advance"].operations if "advance" in last and not advance else 0)
-        + once_more * (TRIALS + 3)
+        + once_more * (SECANT_STEPS + 3)
     )
     called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
     (z_centre, z_half), (s_centre, s_half), (u_centre, u_half) = (
@@ -85,11 +85,12 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
-        "elementary": elementary_text(called, real), "gauge": gauge, "nearest": nearest,
+        "elementary": elementary_text(called, real), "bound": bound, "nearest": nearest,
         "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
-        "balance": balance, "trials": TRIALS, "inset": INSET, "shrinks": controller.shrinks,
+        "balance": balance, "secant_steps": SECANT_STEPS, "secant_fraction": SECANT_FRACTION,
+        "composite_rounds": controller.composite_rounds,
         "ratio_uses_state": bool(ratio) and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,
-        "relative_slack": FLOAT_SLACK if real is Real.FLOAT else SLACK, "cost": {"step": step_cost, "worst": worst_cost},
+        "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "z_centre": z_centre, "z_half": z_half,
         "s_low": s_low, "s_high": s_high, "s_slack": s_slack, "s_centre": s_centre, "s_half": s_half,

@@ -5,7 +5,6 @@ This is the reference of the generated C: the C template does the same steps in 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntFlag
 from functools import cached_property
@@ -20,9 +19,11 @@ from ctrlgen.model.model import Limit, Model
 from ctrlgen.numerics.interval_arithmetic import bounds
 
 SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for
-MEMORY_SHRINKS = 8  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
-TRIALS = 3  # of the way to a target that the drives cannot reach in one sample
-INSET = (
+COMPOSITE_ROUNDS = (
+    8  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
+)
+SECANT_STEPS = 3  # of the way to a target that the drives cannot reach in one sample
+SECANT_FRACTION = (
     1 - 2**-8
 )  # of the way to where straight drives would meet their limit: curved ones meet it a little earlier or later
 SWEEPS = 3  # over the displacements, toward the nearest pose: 0.5 % farther at most on the shipped devices, clipping 50 to 85 %
@@ -95,11 +96,11 @@ class Controller:
         )
 
     @property
-    def shrinks(self) -> int:
+    def composite_rounds(self) -> int:
         """How often a displacement is shrunk toward home: once, if all of a limit shrinks with it."""
         m = self.nominal
         bent = ca.depends_on(ca.jacobian(m.signals["displacement"].expr, m.z), m.z)
-        return MEMORY_SHRINKS if bent or m.x.numel() > m.n_states else 1
+        return COMPOSITE_ROUNDS if bent or m.x.numel() > m.n_states else 1
 
     @cached_property
     def nearest(self) -> ca.Function:
@@ -126,7 +127,7 @@ class Controller:
         return ca.Function("nearest", [beyond], [z], ["beyond"], ["z"], {"cse": True})
 
     @cached_property
-    def gauge(self) -> ca.Function | None:
+    def composite_bound(self) -> ca.Function | None:
         """wanted -> a cheap bound of the guarded limits' share; None where there is none.
 
         The followed signal's own directions v_k (to first order at home) are a basis, z = sum_k lambda_k v_k, and for a
@@ -141,17 +142,19 @@ class Controller:
             W = np.eye(m.z.numel())
         reach = np.abs(W) @ m.z_bounds[1]  # of lambda_k over the range
         V = np.linalg.inv(W) * reach  # columns v_k, scaled to where lambda_k = reach_k
-        shares = np.max([self._shares(side * V) for side in (-1.0, 1.0)], axis=0)
-        if not all(np.allclose(self._shares(s * V), abs(s) * shares, rtol=1e-6, atol=1e-6) for s in (-0.5, 0.1)):
+        shares = np.max([self._composite_ratios(side * V) for side in (-1.0, 1.0)], axis=0)
+        if not all(
+            np.allclose(self._composite_ratios(s * V), abs(s) * shares, rtol=1e-6, atol=1e-6) for s in (-0.5, 0.1)
+        ):
             return None
         few = shares > NEGLIGIBLE
         wanted = ca.SX.sym("wanted", m.z.numel())
         bound = ca.sum1(ca.fabs(ca.mtimes(ca.DM(shares[few, None] / reach[few, None] * W[few]), wanted)))
         return ca.Function(
-            "gauge", [wanted], [bound + shares[~few].sum() + NEGLIGIBLE], ["wanted"], ["bound"], {"cse": True}
+            "composite_bound", [wanted], [bound + shares[~few].sum() + NEGLIGIBLE], ["wanted"], ["bound"], {"cse": True}
         )
 
-    def _shares(self, displacements: np.ndarray) -> np.ndarray:
+    def _composite_ratios(self, displacements: np.ndarray) -> np.ndarray:
         """The guarded limits' share at each column of `displacements`, nothing remembered."""
         m, count = self.nominal, displacements.shape[1]
         cold = np.tile(m.rest[:, None], (1, count))
@@ -194,85 +197,98 @@ class Controller:
         return self.model.rest.copy(), np.zeros(len(self.model.axes))
 
     def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> Step:
-        """Drives that bring the followed signal to `target` at the next sample, from `state` (x, z).
+        """Drives that bring the followed signal to `target` (channels,) [SI] at the next sample, from `state` (x, z).
 
-        With `settle` the equilibrium at `target` instead, and its state. A target that the drives
-        cannot reach in time is approached on the straight line of displacements, which the convex limits allow.
+        With `settle`: the equilibrium at `target`, and its state. Every limit is kept; `ControllerStatus` says which ones acted.
+        A target that the drives cannot reach in one sample is approached along the straight line of displacements, on
+        which convex limits hold.
         """
-        m = self.nominal
+        m, (x, z) = self.nominal, state
         k = self.static if settle or self.moving is None else self.moving
-        (z_low, z_high), (x_low, x_high), (u_low, u_high) = m.z_bounds, m.x_bounds, m.u_bounds
-        z_slack, s_slack, u_slack = self.slacks
-        n = m.n_states
-        x, z = state
-
-        def acting(wanted: np.ndarray) -> tuple[np.ndarray, bool]:
-            return _clamp(_row(k.state(x, z, wanted)), x_low[:n], x_high[:n], s_slack)
-
-        def drive(wanted: np.ndarray, held: np.ndarray) -> np.ndarray:
-            return _row(k.drive(x, z, wanted, held))
-
+        n, static = m.n_states, k is self.static
+        z_slack, _, u_slack = self.slacks
         wanted, status = _row(k.displacement(x, z, target)), ControllerStatus(0)
-        if not np.all((wanted >= z_low) & (wanted <= z_high)):  # not for NaN either
+        if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
             if not np.all(np.abs(target) <= self.input_limits):
-                x_next = _row(k.advance(x, z, self.safe_drive))
-                return Step(
-                    ControllerStatus.INPUT,
-                    z,
-                    x[:n],
-                    self.safe_drive,
-                    (x_next, _row(k.settle(x_next, z, self.safe_drive))),
-                )
+                return self._without_target(k, x, z)
             beyond = wanted
-            wanted, hit = _clamp(beyond, z_low, z_high, z_slack)
+            wanted, hit = _clamp(beyond, *m.z_bounds, z_slack)
             if hit:
                 wanted = _row(self.nearest(beyond))
                 status |= ControllerStatus.DISPLACEMENT
-        held, hit = acting(wanted)
+        state_wanted, hit = self._limited_state(k, x, z, wanted)
         if hit:
+            wanted = _row(k.settle(np.concatenate([state_wanted, x[n:]]), wanted, self.safe_drive))
             status |= ControllerStatus.STATE
-            wanted = _row(k.settle(np.concatenate([held, x[n:]]), wanted, self.safe_drive))
-        if self.guarded_limits and (self.gauge is None or not float(self.gauge(wanted)) <= 1):
-            first = ratio = float(self.composite_ratio(x, z, wanted))
-            for _ in range(self.shrinks):
-                wanted = wanted / ratio if ratio > 1 else wanted  # also where the ratio is NaN
-                ratio = float(self.composite_ratio(x, z, wanted)) if self.shrinks > 1 else 1.0
-            if first > 1:
-                held, _ = acting(wanted)
-            status |= ControllerStatus.COMPOSITE if first > 1 + self.slack else ControllerStatus(0)
-        u, beyond = _clamp(drive(wanted, held), u_low, u_high, u_slack)
-        if beyond:
+        wanted, worst = self._limit_composite(x, z, wanted)
+        if worst > 1:
+            state_wanted, _ = self._limited_state(k, x, z, wanted)
+        if worst > 1 + self.slack:
+            status |= ControllerStatus.COMPOSITE
+        drive = _row(k.drive(x, z, wanted, state_wanted))
+        u, limited = _clamp(drive, *m.u_bounds, u_slack)
+        if limited:
+            wanted, state_wanted, drive = self._line_search(k, x, z, np.zeros_like(z) if static else z, wanted, drive)
+            u, limited = _clamp(drive, *m.u_bounds, u_slack)
             status |= ControllerStatus.DRIVE
-            origin = np.zeros_like(z) if settle or self.moving is None else z
-            way = wanted - origin
-            wanted = origin + self._share_of(lambda s: drive(origin + s * way, acting(origin + s * way)[0])) * way
-            held, _ = acting(wanted)
-            u, beyond = _clamp(drive(wanted, held), u_low, u_high, u_slack)
-        if not beyond and len(x) == n:  # nothing but the actuators remembers: they are where the drive was computed for
-            return Step(status, wanted, held, u, (held, wanted))
-        x_next = _row(k.advance(x, wanted if settle or self.moving is None else z, u))
-        z_next = _row(k.settle(x_next, wanted, u)) if beyond else wanted
-        return Step(status, z_next, held, u, (x_next, z_next))
+        if not limited and len(x) == n:  # only actuators have memory: their state is what the drive was computed for
+            return Step(status, wanted, state_wanted, u, (state_wanted, wanted))
+        x_next = _row(k.advance(x, wanted if static else z, u))
+        z_next = _row(k.settle(x_next, wanted, u)) if limited else wanted
+        return Step(status, z_next, state_wanted, u, (x_next, z_next))
 
-    def _share_of(self, drive: Callable[[float], np.ndarray]) -> float:
-        """The largest share of a way found whose drives are admissible, by `TRIALS` secants of the drive that is first at its
-        limit; 0 where the way begins beyond one."""
+    def _without_target(self, k: Inverse, x: np.ndarray, z: np.ndarray) -> Step:
+        """The safe drive, and what the device does under it for one sample."""
+        x_next = _row(k.advance(x, z, self.safe_drive))
+        z_next = _row(k.settle(x_next, z, self.safe_drive))
+        return Step(ControllerStatus.INPUT, z, x[: self.nominal.n_states], self.safe_drive, (x_next, z_next))
+
+    def _limited_state(self, k: Inverse, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, bool]:
+        """The actuator state that displacement `wanted` needs, limited to its range, and whether that changed it."""
+        n, (low, high) = self.nominal.n_states, self.nominal.x_bounds
+        state = _row(k.state(x, z, wanted))
+        return _clamp(state, low[:n], high[:n], self.slacks[1]) if self.state_can_be_limited else (state, False)
+
+    def _limit_composite(self, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, float]:
+        """`wanted` scaled toward home where it breaks a guarded limit, and the largest share of a limit seen (0: none looked at)."""
+        worst = 0.0
+        if self.guarded_limits and (self.composite_bound is None or not float(self.composite_bound(wanted)) <= 1):
+            for _ in range(self.composite_rounds):
+                ratio = float(self.composite_ratio(x, z, wanted))
+                if ratio > 1:  # not for NaN
+                    worst, wanted = max(worst, ratio), wanted / ratio
+        return wanted, worst
+
+    def _line_search(
+        self, k: Inverse, x: np.ndarray, z: np.ndarray, origin: np.ndarray, target: np.ndarray, at_target: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(displacement, actuator state, drive) on the line from `origin` to `target`, as far as admissible drives were found.
+
+        `SECANT_STEPS` secants of the drive that is first at its limit, each shortened to `SECANT_FRACTION`; the origin
+        itself where its drives are inadmissible. `at_target`: the drives at `target`.
+        """
         (low, high), slack = self.nominal.u_bounds, self.slacks[2]
-        share, end, here, there = 0.0, 1.0, drive(0.0), drive(1.0)
-        if _clamp(here, low, high, slack)[1]:
-            return share
-        for _ in range(TRIALS):
-            part = 1.0
-            for i in np.flatnonzero((there > high + slack) | (there < low - slack)):
-                limit = high[i] if there[i] > high[i] else low[i]
-                part = min(part, (limit - here[i]) / (there[i] - here[i]))
-            trial = share + INSET * max(part, 0.0) * (end - share)
-            drives = drive(trial)
-            if _clamp(drives, low, high, slack)[1]:
-                end, there = trial, drives
+
+        def answer(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            state, _ = self._limited_state(k, x, z, displacement)
+            return state, _row(k.drive(x, z, displacement, state))
+
+        state, at_start = answer(origin)
+        if _clamp(at_start, low, high, slack)[1]:
+            return origin, state, at_start
+        direction, accepted, rejected = target - origin, 0.0, 1.0
+        for _ in range(SECANT_STEPS):
+            share = 1.0
+            for i in np.flatnonzero((at_target > high + slack) | (at_target < low - slack)):
+                limit = high[i] if at_target[i] > high[i] else low[i]
+                share = min(share, (limit - at_start[i]) / (at_target[i] - at_start[i]))
+            fraction = accepted + SECANT_FRACTION * max(share, 0.0) * (rejected - accepted)
+            trial_state, drive = answer(origin + fraction * direction)
+            if _clamp(drive, low, high, slack)[1]:
+                rejected, at_target = fraction, drive
             else:
-                share, here = trial, drives
-        return share
+                accepted, state, at_start = fraction, trial_state, drive
+        return origin + accepted * direction, state, at_start
 
 
 @dataclass(frozen=True)

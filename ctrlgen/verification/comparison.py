@@ -23,7 +23,7 @@ from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.firmware.toolchains import COMPILERS, find_compilers
-from ctrlgen.model.feedforward import INSET, ControllerStatus
+from ctrlgen.model.feedforward import SECANT_FRACTION, ControllerStatus
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.solution import Solution
@@ -117,7 +117,7 @@ def _rows(
         unit = {"um": "nm", "degC": "K", "urad": "rad"}.get(unit, unit)
         rows.append(_row(build, what, signal.label, unit, np.asarray(difference)[:, channels], limit))
 
-    left = (1 - INSET) ** 2  # of the range: what the third trial toward a limit still moves
+    left = (1 - SECANT_FRACTION) ** 2  # of the range: what the third trial toward a limit still moves
     states = (m.x_bounds[0][: m.n_states], m.x_bounds[1][: m.n_states])
     ties_of = {
         role: left * float(np.max(high - low, initial=0.0))

@@ -1828,8 +1828,8 @@ static int is_usable(const float target[6])
     }
     return usable;
 }
-/* Shrinks a displacement that breaks wire flexure stress: 0 untouched, 1 shrunk, 2 shrunk by more than the slack. */
-static int shrink(const circle20_online_f32_state *state, float wanted[6])
+/* Scales a displacement that breaks wire flexure stress toward home: 0 untouched, 1 scaled, 2 scaled by more than the slack. */
+static int limit_composite(const circle20_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
     float bound[1];
@@ -1839,13 +1839,7 @@ static int shrink(const circle20_online_f32_state *state, float wanted[6])
         composite_ratio(wanted, worst);
         if (worst[0] > 1.0f) {
             int i;
-            if (worst[0] > 1.000004f) {
-                hit = 2;
-            } else if (hit == 0) {
-                hit = 1;
-            } else {
-                /* shrunk before */
-            }
+            hit = (worst[0] > 1.000004f) ? 2 : 1;
             for (i = 0; i < 6; i++) {
                 wanted[i] = wanted[i] / worst[0];
             }
@@ -1864,66 +1858,66 @@ static void settle_drives(const circle20_online_f32_state *state, circle20_onlin
 
 /* Toward out->displacement, on the straight line from origin, as far as 3 secants of the drive that is first at its
  * limit lead. Drives limited; 1 if even those of origin had to be. */
-static int settle_approach(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
+static int settle_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
 {
-    float way[6];
-    float there[6];
+    float direction[6];
+    float at_target[6];
     int i;
     for (i = 0; i < 6; i++) {
-        way[i] = out->displacement[i] - origin[i];
-        there[i] = out->drive[i];
+        direction[i] = out->displacement[i] - origin[i];
+        at_target[i] = out->drive[i];
         out->displacement[i] = origin[i];
     }
     settle_drives(state, out);
     if (drives_admissible(out->drive) != 0) {
-        float here[6];
-        float held[6];
-        float share = 0.0f;
-        float end = 1.0f;
+        float at_start[6];
+        float state_at_start[6];
+        float accepted = 0.0f;
+        float rejected = 1.0f;
         int trial;
         for (i = 0; i < 6; i++) {
-            here[i] = out->drive[i];
+            at_start[i] = out->drive[i];
         }
         for (i = 0; i < 6; i++) {
-            held[i] = out->state[i];
+            state_at_start[i] = out->state[i];
         }
         for (trial = 0; trial < 3; trial++) {
-            float part = 1.0f;
-            float next;
+            float share = 1.0f;
+            float fraction;
             for (i = 0; i < 6; i++) {
-                if ((there[i] > (U_HIGH[i] + U_SLACK[i])) || (there[i] < (U_LOW[i] - U_SLACK[i]))) {
-                    const float limit = (there[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
-                    const float met = (limit - here[i]) / (there[i] - here[i]);
-                    part = (met < part) ? met : part;
+                if ((at_target[i] > (U_HIGH[i] + U_SLACK[i])) || (at_target[i] < (U_LOW[i] - U_SLACK[i]))) {
+                    const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                    const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
+                    share = (reached < share) ? reached : share;
                 }
             }
-            part = (part > 0.0f) ? part : 0.0f;
-            next = share + ((0.99609375f * part) * (end - share));
+            share = (share > 0.0f) ? share : 0.0f;
+            fraction = accepted + ((0.99609375f * share) * (rejected - accepted));
             for (i = 0; i < 6; i++) {
-                out->displacement[i] = origin[i] + (next * way[i]);
+                out->displacement[i] = origin[i] + (fraction * direction[i]);
             }
             settle_drives(state, out);
             if (drives_admissible(out->drive) != 0) {
-                share = next;
+                accepted = fraction;
                 for (i = 0; i < 6; i++) {
-                    here[i] = out->drive[i];
+                    at_start[i] = out->drive[i];
                 }
                 for (i = 0; i < 6; i++) {
-                    held[i] = out->state[i];
+                    state_at_start[i] = out->state[i];
                 }
             } else {
-                end = next;
+                rejected = fraction;
                 for (i = 0; i < 6; i++) {
-                    there[i] = out->drive[i];
+                    at_target[i] = out->drive[i];
                 }
             }
         }
         for (i = 0; i < 6; i++) {
-            out->displacement[i] = origin[i] + (share * way[i]);
-            out->drive[i] = here[i];
+            out->displacement[i] = origin[i] + (accepted * direction[i]);
+            out->drive[i] = at_start[i];
         }
         for (i = 0; i < 6; i++) {
-            out->state[i] = held[i];
+            out->state[i] = state_at_start[i];
         }
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
@@ -1937,66 +1931,66 @@ static void step_drives(const circle20_online_f32_state *state, circle20_online_
 
 /* Toward out->displacement, on the straight line from origin, as far as 3 secants of the drive that is first at its
  * limit lead. Drives limited; 1 if even those of origin had to be. */
-static int step_approach(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
+static int step_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
 {
-    float way[6];
-    float there[6];
+    float direction[6];
+    float at_target[6];
     int i;
     for (i = 0; i < 6; i++) {
-        way[i] = out->displacement[i] - origin[i];
-        there[i] = out->drive[i];
+        direction[i] = out->displacement[i] - origin[i];
+        at_target[i] = out->drive[i];
         out->displacement[i] = origin[i];
     }
     step_drives(state, out);
     if (drives_admissible(out->drive) != 0) {
-        float here[6];
-        float held[6];
-        float share = 0.0f;
-        float end = 1.0f;
+        float at_start[6];
+        float state_at_start[6];
+        float accepted = 0.0f;
+        float rejected = 1.0f;
         int trial;
         for (i = 0; i < 6; i++) {
-            here[i] = out->drive[i];
+            at_start[i] = out->drive[i];
         }
         for (i = 0; i < 6; i++) {
-            held[i] = out->state[i];
+            state_at_start[i] = out->state[i];
         }
         for (trial = 0; trial < 3; trial++) {
-            float part = 1.0f;
-            float next;
+            float share = 1.0f;
+            float fraction;
             for (i = 0; i < 6; i++) {
-                if ((there[i] > (U_HIGH[i] + U_SLACK[i])) || (there[i] < (U_LOW[i] - U_SLACK[i]))) {
-                    const float limit = (there[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
-                    const float met = (limit - here[i]) / (there[i] - here[i]);
-                    part = (met < part) ? met : part;
+                if ((at_target[i] > (U_HIGH[i] + U_SLACK[i])) || (at_target[i] < (U_LOW[i] - U_SLACK[i]))) {
+                    const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                    const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
+                    share = (reached < share) ? reached : share;
                 }
             }
-            part = (part > 0.0f) ? part : 0.0f;
-            next = share + ((0.99609375f * part) * (end - share));
+            share = (share > 0.0f) ? share : 0.0f;
+            fraction = accepted + ((0.99609375f * share) * (rejected - accepted));
             for (i = 0; i < 6; i++) {
-                out->displacement[i] = origin[i] + (next * way[i]);
+                out->displacement[i] = origin[i] + (fraction * direction[i]);
             }
             step_drives(state, out);
             if (drives_admissible(out->drive) != 0) {
-                share = next;
+                accepted = fraction;
                 for (i = 0; i < 6; i++) {
-                    here[i] = out->drive[i];
+                    at_start[i] = out->drive[i];
                 }
                 for (i = 0; i < 6; i++) {
-                    held[i] = out->state[i];
+                    state_at_start[i] = out->state[i];
                 }
             } else {
-                end = next;
+                rejected = fraction;
                 for (i = 0; i < 6; i++) {
-                    there[i] = out->drive[i];
+                    at_target[i] = out->drive[i];
                 }
             }
         }
         for (i = 0; i < 6; i++) {
-            out->displacement[i] = origin[i] + (share * way[i]);
-            out->drive[i] = here[i];
+            out->displacement[i] = origin[i] + (accepted * direction[i]);
+            out->drive[i] = at_start[i];
         }
         for (i = 0; i < 6; i++) {
-            out->state[i] = held[i];
+            out->state[i] = state_at_start[i];
         }
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
@@ -2035,11 +2029,11 @@ static int settle_within(circle20_online_f32_state *state, circle20_online_f32_o
     int i;
     wanted_state(out->displacement, out->state);
     {
-        const int shrunk = shrink(state, out->displacement);
-        if (shrunk > 1) {
+        const int scaled = limit_composite(state, out->displacement);
+        if (scaled > 1) {
             status += CIRCLE20_ONLINE_F32_COMPOSITE;
         }
-        if (shrunk > 0) {
+        if (scaled > 0) {
             wanted_state(out->displacement, out->state);
         }
     }
@@ -2049,7 +2043,7 @@ static int settle_within(circle20_online_f32_state *state, circle20_online_f32_o
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
-            limited = settle_approach(state, home, out);
+            limited = settle_line_search(state, home, out);
             status += CIRCLE20_ONLINE_F32_DRIVE;
         }
     }
@@ -2116,11 +2110,11 @@ static int step_within(circle20_online_f32_state *state, circle20_online_f32_out
     int i;
     wanted_state(out->displacement, out->state);
     {
-        const int shrunk = shrink(state, out->displacement);
-        if (shrunk > 1) {
+        const int scaled = limit_composite(state, out->displacement);
+        if (scaled > 1) {
             status += CIRCLE20_ONLINE_F32_COMPOSITE;
         }
-        if (shrunk > 0) {
+        if (scaled > 0) {
             wanted_state(out->displacement, out->state);
         }
     }
@@ -2129,7 +2123,7 @@ static int step_within(circle20_online_f32_state *state, circle20_online_f32_out
         if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
-            limited = step_approach(state, state->z, out);
+            limited = step_line_search(state, state->z, out);
             status += CIRCLE20_ONLINE_F32_DRIVE;
         }
     }

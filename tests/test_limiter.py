@@ -1,0 +1,408 @@
+"""The limiter in Python (`Controller.step`) and in C (online.c.j2) answer alike on every combination of their branches.
+
+The two are written separately, so each is the other's check; docs/limiter.md says why. The devices here are not physical:
+their kernels are exact in binary arithmetic (sums, products, a saw-tooth), and present state and target choose the branch
+of every decision, so that all combinations are visited and the answers can be compared bit by bit.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shutil
+import subprocess
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from types import SimpleNamespace
+
+import casadi as ca
+import coverage
+import numpy as np
+import pytest
+
+from ctrlgen import Controller, ControllerStatus
+from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.online import online_context
+from ctrlgen.firmware.templates import write
+from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.model import feedforward
+from ctrlgen.model.inverse import Inverse
+
+N = 3  # axes; enough for "some of them, not the first"
+SLACK = 2.0**-6  # coarse, so that values within it are common; a power of two keeps the arithmetic exact
+Z_LOW, Z_HIGH = np.array([-1.0, 0.0, -0.5]), np.array([1.0, 2.0, 0.5])
+S_LOW, S_HIGH = np.full(N, 0.0), np.full(N, 1.0)
+U_LOW, U_HIGH = np.full(N, 0.0), np.full(N, 1.0)
+TARGET_LIMIT = np.full(N, 64.0)
+OUTCOMES = ("inside", "edge", "beyond")
+TRIALS = tuple("".join(outcome) for outcome in product("+-", repeat=3))  # "+": the drives of a trial are admissible
+PLAIN = ("inside", "inside", "kept", "inside")
+PATIENCE = 3000  # samples drawn for one combination; the rarest sequence of trials is one in some hundreds
+
+
+@dataclass(frozen=True)
+class Device:
+    """Which parts the limiter has: each is a switch of the C template."""
+
+    states: bool = True  # actuators with a state of their own
+    limited: bool = True  # whose limits a displacement in its range can break
+    memory: bool = False  # effects that remember: x is longer than the actuators' states
+    composite: str = "bounded"  # "none"; "plain": the ratio is always worked out; "bounded": a cheap bound comes first
+    rounds: int = 1  # how often a displacement that breaks a composite limit is shrunk
+    moving: bool = True  # a sample time: step beside settle
+
+    def __str__(self) -> str:
+        return "-".join(
+            f"{name}_{value}" for name, value in vars(self).items() if value != type(self).__dataclass_fields__[name].default
+        ) or "all"  # fmt: skip
+
+    @property
+    def n_s(self) -> int:
+        return N if self.states else 0
+
+    @property
+    def n_x(self) -> int:
+        return self.n_s + (2 if self.memory else 0)
+
+    def combinations(self) -> set[tuple[str, ...]]:
+        """Every combination of decisions that this device can be brought to."""
+        state = OUTCOMES if self.states and self.limited else ("inside",)
+        shares = {"none": ("none",), "plain": ("kept", "edge", "over"), "bounded": ("bound", "kept", "edge", "over")}
+        drive = ("inside", "edge", "origin", *TRIALS)
+        modes = ("settle", "step") if self.moving else ("settle",)
+        return set(product(modes, OUTCOMES, state, shares[self.composite], drive))
+
+
+DEVICES = (
+    Device(),
+    Device(memory=True, composite="plain", rounds=3),
+    Device(limited=False, rounds=3),
+    Device(limited=False, memory=True, composite="none"),
+    Device(states=False, memory=True),
+    Device(states=False, moving=False, composite="plain"),
+    Device(moving=False, composite="none"),
+)
+
+
+class Scripted(Controller):
+    """A controller whose kernels and limits are given."""
+
+    @property
+    def composite_rounds(self) -> int:
+        return self.__dict__["rounds"]
+
+
+def controller_of(device: Device) -> Scripted:
+    x, z, target, wanted, u = (
+        ca.SX.sym(name, count) for name, count in
+        (("x", device.n_x), ("z", N), ("target", N), ("wanted", N), ("drive", N))
+    )  # fmt: skip
+    state = ca.SX.sym("state", device.n_s)
+    remembered = ca.sum1(x[device.n_s :]) if device.memory else 0
+
+    def kernel(name, arguments, names, result):
+        return ca.Function(name, arguments, [result], names, ["result"])
+
+    def inverse(own: float) -> Inverse:
+        """`own` differs between equilibrium and next sample, so that taking the other's kernel shows."""
+        phase = 5 * wanted + (state if device.states else 0) + 61 * z[1] * np.arange(1, N + 1) + own
+        drive = 0.5 + z[2] * (phase - ca.floor(phase) - 0.5)
+        return Inverse(
+            kernel("displacement", [x, z, target], ["x", "z", "target"], target + own * z),
+            kernel("state", [x, z, wanted], ["x", "z", "wanted"], x[: device.n_s] + 2**-8 * wanted[: device.n_s]),
+            kernel("drive", [x, z, wanted, state], ["x", "z", "wanted", "state"], drive),
+            kernel("memory", [x, z, wanted], ["x", "z", "wanted"], x[device.n_s :]),
+            kernel("advance", [x, z, u], ["x", "z", "drive"], (1 - own) * x / 2 + ca.sum1(z) / 8 + u[0] / 4),
+            kernel(
+                "settle", [x, z, u], ["x", "z", "drive"], 0.875 * z + u / 16 + (ca.sum1(x) / 64 if device.n_x else 0)
+            ),
+        )
+
+    signal = SimpleNamespace(channels=("a", "b", "c"), units=("m",) * N, label="signal", scale=(1.0,) * N)
+    nominal = SimpleNamespace(
+        axes=("a", "b", "c"), x=x, z=z, n_states=device.n_s, rest=np.full(device.n_x, 0.5), limits=(),
+        z_bounds=(Z_LOW, Z_HIGH), u_bounds=(U_LOW, U_HIGH),
+        x_bounds=(np.r_[S_LOW[: device.n_s], [-np.inf] * 2 * device.memory], np.r_[S_HIGH[: device.n_s], [np.inf] * 2 * device.memory]),
+        x_names=tuple(f"x{i}" for i in range(device.n_x)), x_units=("K",) * device.n_x,
+        signals={"drive": signal, "displacement": signal, "state": signal if device.states else None},
+        device=SimpleNamespace(title="scripted", source="none"),
+    )  # fmt: skip
+    controller = Scripted(nominal, "displacement", 1e-3 if device.moving else None, SLACK)
+    guarded = device.composite != "none"
+    controller.__dict__.update(
+        nominal=nominal, rounds=device.rounds, state_can_be_limited=device.states and device.limited,
+        static=inverse(0.0), moving=inverse(0.25) if device.moving else None, input_limits=TARGET_LIMIT, safe_drive=np.zeros(N),
+        slacks=(np.full(N, SLACK), np.full(device.n_s, SLACK), np.full(N, SLACK)),
+        guarded_limits=(SimpleNamespace(label="share"),) if guarded else (),
+        composite_ratio=kernel("ratio", [x, z, wanted], ["x", "z", "wanted"], ca.fabs(z[1]) + ca.fabs(z[0] * wanted[0]) + 0 * remembered),
+        composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
+        nearest=kernel("nearest", [u], ["beyond"], ca.fmin(ca.fmax(u, Z_LOW), Z_HIGH) * 0.75 + 0.125 * (Z_LOW + Z_HIGH)),
+    )  # fmt: skip
+    return controller
+
+
+@dataclass
+class Recorded:
+    """A kernel that writes down what it answered."""
+
+    name: str
+    kernel: ca.Function
+    calls: list = field(default_factory=list)
+
+    def __call__(self, *arguments):
+        result = self.kernel(*arguments)
+        self.calls.append((self.name, result.full().ravel()))
+        return result
+
+
+def recorded(controller: Scripted) -> tuple[Scripted, list]:
+    """The same controller, and the list that its kernels write their answers to."""
+    calls: list = []
+    twin = Scripted(controller.model, controller.follow, controller.sample_time, controller.slack)
+    twin.__dict__.update(controller.__dict__)
+    for mode in ("static", "moving"):
+        k = getattr(controller, mode)
+        if k is not None:
+            twin.__dict__[mode] = Inverse(**{n: Recorded(n, getattr(k, n), calls) for n in vars(k)})
+    for name in ("composite_ratio", "composite_bound"):
+        if getattr(controller, name):
+            twin.__dict__[name] = Recorded(name, getattr(controller, name), calls)
+    return twin, calls
+
+
+def outcome(value: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
+    """Whether a value is inside its range, within the slack of it, or beyond."""
+    excess = np.max(np.maximum(low - value, value - high))
+    return "inside" if excess <= 0 else "edge" if excess <= SLACK else "beyond"
+
+
+def drives(calls: list) -> list[str]:
+    """Outcomes of the drives worked out: at the target, and if they are beyond, at the origin and in the trials."""
+    return [outcome(value, U_LOW, U_HIGH) for name, value in calls if name == "drive"]
+
+
+def combination(device: Device, mode: str, calls: list) -> tuple[str, ...]:
+    """The decisions that kernels' answers called for. Written from the meaning of the limits, not from the limiter."""
+    first = {name: value for name, value in reversed(calls)}
+    outcomes = drives(calls)
+    state = outcome(first["state"], S_LOW, S_HIGH) if device.states else "inside"
+    share = "none"
+    if device.composite != "none":
+        if device.composite == "bounded" and first["composite_bound"][0] <= 1:
+            share = "bound"
+        else:
+            ratio = first["composite_ratio"][0]
+            share = "kept" if ratio <= 1 else "edge" if ratio <= 1 + SLACK else "over"
+    drive = outcomes[0]
+    if drive == "beyond":
+        drive = "origin" if outcomes[1] == "beyond" else "".join("-" if o == "beyond" else "+" for o in outcomes[2:])
+    return mode, outcome(first["displacement"], Z_LOW, Z_HIGH), state, share, drive
+
+
+def sample(
+    rng: np.random.Generator, device: Device, wish: tuple[str, ...]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(x, z, target) that bring the decisions `wish` about with a fair chance."""
+    mode, displacement, state, share, drive = wish
+    middle, half = (Z_LOW + Z_HIGH) / 2, (Z_HIGH - Z_LOW) / 2
+    wanted = middle + 0.9 * half * rng.uniform(-1, 1, N)
+    if share == "bound":  # the cheap bound is below one for a high second displacement
+        wanted[1] = rng.uniform(1.5, 1.9)
+    elif device.composite == "bounded":
+        wanted[1] = rng.uniform(0.1, 0.9)
+    out = (SLACK if displacement == "edge" else 1.0) * rng.uniform(0.1, 0.9, N) * (displacement != "inside")
+    some = rng.permutation(N) < rng.integers(1, N + 1)
+    wanted = np.where(some & (out > 0), middle + np.where(wanted > middle, 1, -1) * (half + out), wanted)
+    z = np.array([rng.choice([0.0, 0.3]) * (share != "edge"), 0.0, 0.0])
+    over = {"bound": rng.uniform(0, 2), "kept": rng.uniform(0, 0.6), "edge": 1 + SLACK * rng.uniform(0.1, 0.9)}
+    z[1] = over.get(share, rng.uniform(1.1, 1.5))
+    z[2] = {"inside": rng.uniform(0.1, 0.99), "edge": 1 + 2 * SLACK * rng.uniform(0.5, 1)}.get(
+        drive, rng.uniform(1.1, 1.6)
+    )
+    x = rng.uniform(0.2, 0.8, device.n_x)
+    if state != "inside":
+        off = SLACK / 2 if state == "edge" else rng.uniform(0.1, 1, N)
+        some = rng.permutation(N) < rng.integers(1, N + 1)
+        x[:N] = np.where(some, np.where(rng.random(N) < 0.5, -off, 1 + off), x[:N])
+    return x, z, wanted - (0.25 if mode == "step" else 0.0) * z
+
+
+def odd_cases(rng: np.random.Generator, device: Device) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+    """Targets that are no command, and states that nothing but a defect could leave."""
+    cases = []
+    for mode in ("settle", "step") if device.moving else ("settle",):
+        for bad in (np.nan, np.inf, -np.inf, 65.0, -65.0, 64.0, -64.0):
+            for i in range(N):
+                x, z, target = sample(rng, device, (mode, *PLAIN))
+                target[i] = bad
+                cases.append((mode, x, z, target))
+                x, z, target = sample(rng, device, (mode, *PLAIN))
+                z[i] = bad
+                cases.append((mode, x, z, target))
+        for i, bad in product(range(device.n_x), (np.nan, np.inf, -np.inf)):
+            x, z, target = sample(rng, device, (mode, *PLAIN))
+            x[i] = bad
+            cases.append((mode, x, z, target))
+    return cases
+
+
+def answer(step) -> np.ndarray:
+    return np.concatenate([[int(step.status)], step.drive, step.displacement, step.actuator_state, *step.state])
+
+
+MAIN = """
+#include <stdio.h>
+#include <string.h>
+#include "limiter.h"
+int main(void)
+{
+    double in[1 + NX + N + N];
+    limiter_state s;
+    limiter_output o;
+    limiter_init(NULL);
+    limiter_init(&s);
+    if (limiter_settle(NULL, in, &o) != 16 || limiter_settle(&s, NULL, &o) != 16 || limiter_settle(&s, in, NULL) != 16) {
+        return 1;
+    }
+#ifdef MOVING
+    if (limiter_step(NULL, in, &o) != 16 || limiter_step(&s, NULL, &o) != 16 || limiter_step(&s, in, NULL) != 16) {
+        return 1;
+    }
+#endif
+    while (fread(in, sizeof in[0], 1 + NX + N + N, stdin) == 1 + NX + N + N) {
+        double out[1];
+#if NX > 0
+        memcpy(s.x, in + 1, sizeof s.x);
+#endif
+        memcpy(s.z, in + 1 + NX, sizeof s.z);
+#ifdef MOVING
+        out[0] = in[0] != 0.0 ? limiter_step(&s, in + 1 + NX + N, &o) : limiter_settle(&s, in + 1 + NX + N, &o);
+#else
+        out[0] = limiter_settle(&s, in + 1 + NX + N, &o);
+#endif
+        fwrite(out, sizeof out, 1, stdout);
+        fwrite(o.drive, sizeof o.drive, 1, stdout);
+        fwrite(o.displacement, sizeof o.displacement, 1, stdout);
+#ifdef STATES
+        fwrite(o.state, sizeof o.state, 1, stdout);
+#endif
+#if NX > 0
+        fwrite(s.x, sizeof s.x, 1, stdout);
+#endif
+        fwrite(s.z, sizeof s.z, 1, stdout);
+    }
+    return 0;
+}
+"""
+
+
+def run_c(device: Device, controller: Scripted, records: np.ndarray, folder: Path) -> np.ndarray:
+    """The answers of the generated C, built so that its branches are counted."""
+    scenario = SimpleNamespace(
+        file=SimpleNamespace(follow="displacement"), digest={"device": "0" * 64, "scenario": "0" * 64}
+    )
+    context = online_context(scenario, controller, Real.DOUBLE, "limiter")
+    for end in ("h", "c"):
+        write(f"online.{end}", context, folder / f"limiter.{end}")
+    (folder / "main.c").write_text(MAIN)
+    defined = [f"-DN={N}", f"-DNX={device.n_x}"] + ["-DMOVING"] * device.moving + ["-DSTATES"] * device.states
+    strict = [flag for flag in FLAGS if flag != "-O2"]
+    for words in (
+        ["gcc", *strict, "--coverage", "-O0", "-c", "limiter.c"],
+        ["gcc", "-std=c99", "-ffp-contract=off", *defined, "--coverage", "main.c", "limiter.o", "-o", "main"],
+    ):
+        done = subprocess.run(words, capture_output=True, text=True, cwd=folder)
+        assert done.returncode == 0, done.stderr
+    done = subprocess.run([folder / "main"], input=records.tobytes(), capture_output=True, cwd=folder)
+    assert done.returncode == 0
+    return np.frombuffer(done.stdout).reshape(len(records), -1)
+
+
+def unvisited(folder: Path, kernels: set[str]) -> list[str]:
+    """Branches and lines of the generated C, kernels left out, that no call took."""
+    subprocess.run(
+        ["gcov", "--json-format", "--branch-probabilities", "limiter.c"], cwd=folder, check=True, capture_output=True
+    )
+    (report,) = folder.glob("limiter*.gcov.json.gz")
+    (file,) = (f for f in json.loads(gzip.decompress(report.read_bytes()))["files"] if f["file"].endswith("limiter.c"))
+    text = (folder / "limiter.c").read_text().splitlines()
+    return [
+        f"{line['line_number']}: {text[line['line_number'] - 1].strip()}"
+        for line in file["lines"]
+        if line.get("function_name") not in kernels
+        and (line["count"] == 0 or any(branch["count"] == 0 for branch in line["branches"]))
+    ]
+
+
+def check_status(device: Device, met: tuple[str, ...], status: ControllerStatus) -> None:
+    """The status says what the decisions amount to."""
+    _, displacement, state, share, drive = met
+    expected = ControllerStatus.DISPLACEMENT if displacement == "beyond" else ControllerStatus(0)
+    expected |= ControllerStatus.STATE if state == "beyond" else ControllerStatus(0)
+    expected |= ControllerStatus.DRIVE if drive not in ("inside", "edge") else ControllerStatus(0)
+    assert status & ~ControllerStatus.COMPOSITE == expected, met
+    if device.rounds == 1 or share != "edge":  # within the slack at first, it may be beyond in a later round
+        assert bool(status & ControllerStatus.COMPOSITE) == (share == "over"), met
+
+
+@pytest.mark.parametrize("device", DEVICES, ids=str)
+def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(device, tmp_path):
+    for program in ("gcc", "gcov"):
+        if not shutil.which(program):
+            pytest.skip(f"{program} is missing: the branches of the generated limiter were not counted")
+    controller = controller_of(device)
+    twin, calls = recorded(controller)
+    rng = np.random.default_rng(14)
+    missing, records, answers = device.combinations(), [], []
+
+    def ask(mode, x, z, target):
+        calls.clear()
+        with np.errstate(invalid="ignore"):
+            step = twin.step((x, z), target, settle=mode == "settle")
+        records.append(np.concatenate([[float(mode == "step")], x, z, target]))
+        answers.append(answer(step))
+        return step
+
+    for wish in sorted(missing):
+        for _ in range(PATIENCE if wish in missing else 0):
+            step = ask(wish[0], *sample(rng, device, wish))
+            met = combination(device, wish[0], calls)
+            assert met in device.combinations()
+            check_status(device, met, step.status)
+            if met not in missing and not (met[-1] in TRIALS and drives(calls)[1] == "edge"):  # that is rare: keep all
+                records.pop(), answers.pop()
+            missing.discard(met)
+            if wish not in missing:
+                break
+    assert not missing, (len(missing), sorted(missing)[:10])
+    for case in odd_cases(rng, device):
+        ask(*case)
+    answers, printed = np.array(answers), run_c(device, controller, np.array(records), tmp_path)
+    same = (answers == printed) | (np.isnan(answers) & np.isnan(printed))
+    wrong = np.flatnonzero(~same.all(axis=1))
+    assert not wrong.size, (len(wrong), len(records), records[wrong[0]], answers[wrong[0]], printed[wrong[0]])
+    context = online_context(
+        SimpleNamespace(file=SimpleNamespace(follow="displacement"), digest={}), controller, Real.DOUBLE, "limiter"
+    )
+    assert not unvisited(tmp_path, {kernel.name for kernel in context["kernels"]} | {"whole_below"})
+
+
+def test_samples_of_these_devices_take_every_branch_of_the_limiter_in_python(tmp_path):
+    measured = coverage.Coverage(branch=True, include=[feedforward.__file__], data_file=None)
+    rng = np.random.default_rng(15)
+    with measured.collect():
+        for device in DEVICES:
+            controller = controller_of(device)
+            for wish in sorted(device.combinations()):
+                x, z, target = sample(rng, device, wish)
+                controller.step((x, z), target, settle=wish[0] == "settle")
+            for mode, x, z, target in odd_cases(rng, device):
+                with np.errstate(invalid="ignore"):
+                    controller.step((x, z), target, settle=mode == "settle")
+    measured.json_report(outfile=str(tmp_path / "report.json"))
+    (report,) = json.loads((tmp_path / "report.json").read_text())["files"].values()
+    entered = {name: found for name, found in report["functions"].items() if name and found["executed_lines"]}
+    assert "Controller.step" in entered
+    assert {name: found["missing_branches"] for name, found in entered.items() if found["missing_branches"]} == {}
+    assert {name: found["missing_lines"] for name, found in entered.items() if found["missing_lines"]} == {}
