@@ -15,7 +15,7 @@ from ctrlgen.app.console import CHECK, complain, err, show_warning
 from ctrlgen.core.errors import CtrlgenError, Unreachable
 
 for command in app.registered_commands:  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
-    command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback))
+    command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback) or "")
 
 
 def execute(check: Callable[[], None] = lambda: None) -> int:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
+Column = tuple[str, Literal["left", "right"]]  # of a table: its heading and how it is aligned
 SHOWN_COSTS = ("scenario", "worst", "player")
 CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
 
@@ -103,7 +104,7 @@ def print_build(build: Build) -> None:
         f"{good} of {len(build.comparison.rows)} comparisons within tolerance, {', '.join(build.comparison.compilers)}"
     )
     if build.in_loop.runs:
-        columns = (
+        columns: tuple[Column, ...] = (
             *((kind, "right") for kind in SHOWN_COSTS),
             ("stack", "right"),
             ("code", "right"),
@@ -128,7 +129,7 @@ def print_build(build: Build) -> None:
         out.print(f"failed: {line}", style="red", markup=False, soft_wrap=True)
 
 
-def table_of(*columns: tuple[str, Literal["left", "right"]]) -> Table:
+def table_of(*columns: Column) -> Table:
     """A plain table with a last column for remarks; words wrap at spaces, numbers (on the right) never."""
     table = Table(box=None, pad_edge=False, header_style="dim")
     for name, justify in (*columns, ("", "left")):
@@ -230,8 +231,8 @@ def print_batch(rows: Sequence[BatchRow]) -> None:
     """One line a diagnosis, then what failed and why."""
     from ctrlgen.diagnosis.report.narrative import number
 
-    names = ("verdict", "left"), ("found", "left"), ("before", "right"), ("after", "right"), ("noise", "right")
-    table = table_of(("result", "left"), *names)
+    errors: tuple[Column, ...] = (("before", "right"), ("after", "right"), ("noise", "right"))
+    table = table_of(("result", "left"), ("verdict", "left"), ("found", "left"), *errors)
     for row in rows:
         if row.state == "failed":
             table.add_row(escape(row.name), "[red]failed[/red]")
@@ -289,7 +290,7 @@ def complain(error: CtrlgenError) -> None:
     err.print(str(error), markup=False, soft_wrap=True)
 
 
-def show_warning(message: Warning | str, *_: Any) -> None:
+def show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """One line without the place in our code, which tells a user nothing."""
     err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
 

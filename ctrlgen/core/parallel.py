@@ -129,7 +129,8 @@ def _on_processes(function: Callable[[Any], Any], items: list[Any], jobs: int) -
 
     An item that was running when a process died runs again, alone until it is known which of them it was.
     """
-    left, alone, deaths = deque(range(len(items))), deque(), Counter()
+    left, alone = deque(range(len(items))), deque[int]()
+    deaths: Counter[int] = Counter()
     running: dict[Future, int] = {}
     pool = _Pool(jobs)
     try:
@@ -205,7 +206,7 @@ def _on_dask(function: Callable[[Any], Any], items: list[Any], address: str) -> 
                 finished = as_completed(list(futures))
             for future in finished:
                 k = futures.pop(future)
-                error = future.exception()
-                yield k, future.result() if error is None else Failure(str(error) or type(error).__name__)
+                fault = future.exception()
+                yield k, future.result() if fault is None else Failure(str(fault) or type(fault).__name__)
         finally:
             client.cancel(list(futures))

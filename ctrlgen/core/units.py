@@ -22,7 +22,9 @@ _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?i
 
 @cache
 def _registry() -> pint.UnitRegistry:
-    registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=None, on_redefinition="ignore")
+    registry: pint.UnitRegistry = pint.UnitRegistry(
+        autoconvert_offset_to_baseunit=True, cache_folder=None, on_redefinition="ignore"
+    )
     registry.define("radian = [angle] = rad")  # so that 60 rpm is no 60 Hz and 5 is no angle
     registry._build_cache()  # degrees and milliradians were resolved to the old radian
     return registry
@@ -73,7 +75,9 @@ def base_unit(unit: str) -> str:
 def exponents(unit: str) -> dict[str, int] | None:
     """Powers of kg, m, s, A, K, mol, cd, rad in an SI unit, {"kg": 1, "m": 1, "s": -2} for 'N'; None where it is not a product of these."""
     named = dict(kilogram="kg", meter="m", second="s", ampere="A", kelvin="K", mole="mol", candela="cd", radian="rad")
-    powers = _registry().Quantity(1.0, _unit(unit)).to_base_units()._units.items()
+    powers: Any = (
+        _registry().Quantity(1.0, _unit(unit)).to_base_units()._units.items()
+    )  # typed as any number, complex too
     if any(name not in named or power != int(power) for name, power in powers):
         return None
     return {named[name]: int(power) for name, power in powers}

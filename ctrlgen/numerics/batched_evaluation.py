@@ -20,13 +20,13 @@ def evaluate(mapped: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
         if value.size != mapped.nnz_in(i):
             raise ValueError(f"{mapped.name_in(i)}: {value.size} numbers, not {mapped.nnz_in(i)}")
         if value.size:
-            buffer.set_arg(i, memoryview(value.ravel()))
+            buffer.set_arg(i, value.ravel().data)
     results = [np.empty((mapped.size2_out(i), mapped.size1_out(i))) for i in range(mapped.n_out())]
     for i, value in enumerate(results):
         if value.size != mapped.nnz_out(i):
             raise ValueError(f"{mapped.name_out(i)} is not dense")
         if value.size:
-            buffer.set_res(i, memoryview(value.ravel()))
+            buffer.set_res(i, value.ravel().data)
     run()
     return results
 

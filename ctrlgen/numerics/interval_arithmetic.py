@@ -74,9 +74,9 @@ def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.n
     for k in range(function.n_instructions()):
         op, inputs, outputs = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
         if op == ca.OP_INPUT:
-            low, high = ranges.get(function.name_in(inputs[0]), (None, None))
+            given = ranges.get(function.name_in(inputs[0]))
             row = function.sparsity_in(inputs[0]).row()[inputs[1]]
-            value = EVERYTHING if low is None else (float(low[row]), float(high[row]))
+            value = EVERYTHING if given is None else (float(given[0][row]), float(given[1][row]))
         elif op == ca.OP_OUTPUT:
             value = at[inputs[0]]
         elif op == ca.OP_CONST:

@@ -192,9 +192,9 @@ def best(compliance: str, ratio: float) -> Equation:
     """
     if compliance not in PLANAR:
         raise ValueError(f'there is no choice for {compliance}; name the equation, "schotborgh"')
-    fitting = [e for e in EQUATIONS if e.compliance == compliance and e.errors is not None and e.holds(ratio)]
+    fitting = [(e.errors[2], e) for e in EQUATIONS if e.compliance == compliance and e.errors and e.holds(ratio)]
     if fitting:
-        return min(fitting, key=lambda e: e.errors[2])
+        return min(fitting, key=lambda pair: pair[0])[1]
     if ratio > LARGEST * (1 + 1e-12):
         raise HingeRangeError(
             f"no equation for {compliance} is known to hold at t/R = {ratio:.4g}; the comparison ends at {LARGEST}: "

@@ -10,11 +10,12 @@ Every function takes CasADi SX, DM or plain numbers, so the same line serves sym
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TypeAlias
 
 import casadi as ca
 
-Matrix = ca.SX | ca.DM
-Scalar = float | ca.SX
+Matrix: TypeAlias = ca.SX | ca.DM
+Scalar: TypeAlias = float | ca.SX
 
 
 def rotation_z(angle: Scalar) -> Matrix:

@@ -193,7 +193,9 @@ def read_tdms(path: Path) -> MeasurementTable:
 def read_mdf4(path: Path) -> MeasurementTable:
     """Channels of ASAM MDF; `time` is the master channel, and all channels must have the same one."""
     asammdf = _package("asammdf", path)
-    columns, units, clocks = {}, {}, []
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    clocks: list[np.ndarray] = []
     with asammdf.MDF(path) as file:
         for signal in file.iter_channels(skip_master=True):
             if signal.name in columns:

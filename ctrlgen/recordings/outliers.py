@@ -57,7 +57,7 @@ def outliers(
         sigma = MAD * scipy.ndimage.median_filter(np.abs(off.mean(1)), min(WINDOW, len(off)), mode="reflect")
         size = np.abs(off).min(1)
         one_sided = np.abs(np.sign(off).sum(1)) == width
-        for start in np.flatnonzero(one_sided & (size > threshold * np.maximum(sigma, floor))) + 1:
+        for start in (np.flatnonzero(one_sided & (size > threshold * np.maximum(sigma, floor))) + 1).tolist():
             stretch = slice(start, start + width)
             if not near_jump[stretch].any() and finite[stretch].all() and _isolated(y, start, width, size[start - 1]):
                 marked[stretch] = True

@@ -131,7 +131,7 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
         found.append(
             Parasitic(
                 channel, poses, commanded[poses, i], measured[poses, i], errors[poses, i],
-                errors[np.ix_(poses, rest)], tuple(CHANNELS[k] for k in rest),
+                errors[poses][:, rest], tuple(CHANNELS[k] for k in rest),
             )
         )  # fmt: skip
     return found

@@ -61,7 +61,7 @@ def validate_record(record: Record, kind: str, model: Model, names: ChannelNames
     `record.valid` is False in channels that this record has no column for; `kind` is "series" or "poses"; `where` is the
     record's place in recording.toml, such as "record[0]".
     """
-    recorded = record.valid.any(0)
+    recorded = np.any(record.valid, axis=0)
     faults = _missing_numbers(record, kind, names, where, recorded) + _beyond_limits(record, kind, model, names, where)
     notes: list[str] = []
     stretches = [record]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import control
 import matplotlib.pyplot as plt
@@ -35,8 +36,8 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
     omega = np.logspace(np.log10(slowest) - 2, np.log10(slowest) + 2, 200)
     response = control.frequency_response(system, omega)
     with plt.rc_context(STYLE):
-        rows = [list("abc"), list("def")][: -(-len(signal.channels) // 3)]
-        figure, grid = plt.subplot_mosaic([*rows, ["phase"] * 3], figsize=(10, 2.7 * (len(rows) + 1)))
+        layout: Any = [*[list("abc"), list("def")][: -(-len(signal.channels) // 3)], ["phase"] * 3]
+        figure, grid = plt.subplot_mosaic(layout, figsize=(10, 2.7 * len(layout)))
         hertz = omega / (2 * np.pi)
         for i, channel in enumerate(signal.channels):
             panel = grid["abcdef"[i]]

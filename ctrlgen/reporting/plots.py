@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable
+from typing import Any
 
 import matplotlib
 
@@ -22,7 +23,7 @@ from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.workspace import Ball, Workspace
 
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")  # colour-blind safe, a pair per stage
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.color": "#e6e6e6", "axes.edgecolor": "#666666", "axes.axisbelow": True, "legend.frameon": False,
     "svg.fonttype": "none", "svg.hashsalt": "ctrlgen",
@@ -121,7 +122,7 @@ def draw_signal(solution: Solution, role: str) -> Figure:
         )
     axes.set_xlabel("sample" if static else "time [s]")
     if static:
-        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.locator_params("x", integer=True)
     axes.set_ylabel(f"{signal.label} [{signal.units[0]}]")
     axes.legend(ncols=6, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, 1.14))
     return figure
@@ -190,7 +191,7 @@ def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) ->
     panel = panels[0][1] if up in third else panels[0][0]
     centre = [from_si(ball.centre[i], signal.units[i]) for i in (across, up)]
     radius = [from_si(ball.radius * signal.scale[i], signal.units[i]) for i in (across, up)]
-    panel.add_patch(Ellipse(centre, 2 * radius[0], 2 * radius[1], fill=False, color=COLOURS[2], lw=1.5))
+    panel.add_patch(Ellipse((centre[0], centre[1]), 2 * radius[0], 2 * radius[1], fill=False, color=COLOURS[2], lw=1.5))
     panel.plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius[0]:.3g} {signal.units[across]}")
     for panel, vertical in zip(panels[0], (y, *third), strict=True):
         if signal.units[x] == signal.units[vertical]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -12,6 +13,9 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import from_si, parse
 from ctrlgen.trajectory.solution import Solution
 
+_STATISTICS: dict[str, Callable[[np.ndarray], np.floating]] = {
+    "min": np.min, "max": np.max, "rms": lambda column: np.sqrt(np.mean(column**2)), "abs": lambda column: np.abs(column).max(),
+}  # fmt: skip
 _NAME = re.compile(r"^(\w+)\.(\w+)(?:\.(min|max|rms|abs)|\[(\d+)\])?$")
 
 
@@ -77,9 +81,7 @@ def metric(solution: Solution, name: str) -> tuple[float, str]:
         if int(index) >= len(column):
             raise ValueError(f"{name!r}: there are {len(column)} samples")
         return float(column[int(index)]), unit
-    value = {"min": np.min, "max": np.max, "rms": lambda c: np.sqrt(np.mean(c**2)), "abs": lambda c: np.abs(c).max()}[
-        how
-    ](column)
+    value = _STATISTICS[how or "abs"](column)
     return float(value), unit
 
 

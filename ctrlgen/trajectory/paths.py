@@ -220,11 +220,12 @@ def _through(corners: np.ndarray, times: np.ndarray, n: int) -> np.ndarray:
 
 def read_poses(path: Path, frame: Frame) -> np.ndarray:
     """A CSV of samples as (n, channels) in SI. Raises InputError listing every bad cell by line and column."""
-    rows = list(csv.reader(io.StringIO(read_text(path))))
-    rows = [(i + 1, row) for i, row in enumerate(rows) if any(cell.strip() for cell in row)]
+    table = csv.reader(io.StringIO(read_text(path)))
+    rows = [(line, row) for line, row in enumerate(table, start=1) if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         raise InputError(path, [Fault("file", "has no samples; write a header row and one row a sample")])
-    columns, faults = [], []
+    columns: list[tuple[int, str, str]] = []
+    faults = []
     for text in rows[0][1]:
         name, _, unit = text.strip().partition("[")
         name, unit = name.strip(), unit.rstrip("] ").strip()

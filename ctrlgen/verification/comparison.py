@@ -180,7 +180,7 @@ def _rows(
             against_casadi("hostile sequence, online C - CasADi", chased, ref.chased, ties=True)
         what = "hostile sequence -> model: excess over a limit"
         allowed = EXCESS[real] if m.x.numel() == m.n_states else EXCESS_REMEMBERED
-        excess = _excess(m, chased[:, 1 : 1 + n], ref.scenario.sample_time, cold[0])
+        excess = _excess(m, chased[:, 1 : 1 + n], ref.sample_time, cold[0])
         rows.append(_row(build, what, "share of its bound", "1", excess, allowed))
 
     solved, online = ref.solution.drive, followed[:, 1 : 1 + n]
@@ -204,7 +204,7 @@ def _rows(
         played = run_host(program, "sample", k, n)[:, 1:]
         add("player C - its curve", "drive", played - compression.drives(k), near)
         add("player C - IPOPT", "drive", played - solved, (compression.chosen.drive or 0.0) + near)
-        times = (k[:-1] + 0.75) * ref.scenario.sample_time  # a quarter of the way from middle to middle
+        times = (k[:-1] + 0.75) * ref.sample_time  # a quarter of the way from middle to middle
         quarter = run_host(program, "at", times, n)[:, 1:] - compression.drives(k[:-1], np.full(len(k) - 1, 0.25))
         # the time itself is rounded: that much of the steepest change from sample to sample
         steep = 4 * float(np.finfo(np.float32 if real is Real.FLOAT else float).eps) * 2 * len(k)

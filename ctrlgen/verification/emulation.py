@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +45,10 @@ class Machine:
         self._uc.ctl_set_cpu_model(model)
         with program.open("rb") as stream:
             elf = ELFFile(stream)
-            self.symbols = {s.name: s["st_value"] for s in elf.get_section_by_name(".symtab").iter_symbols()}
+            table: Any = elf.get_section_by_name(
+                ".symtab"
+            )  # typed as any section; that of symbols is there, nothing is stripped
+            self.symbols = {s.name: s["st_value"] for s in table.iter_symbols()}
             sections = [(s.name, s["sh_size"], s["sh_flags"], s["sh_type"]) for s in elf.iter_sections()]
             for segment in elf.iter_segments():
                 if segment["p_type"] == "PT_LOAD" and segment["p_memsz"]:

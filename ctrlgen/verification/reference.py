@@ -34,6 +34,13 @@ class Reference:
         self.chased = self._answers(self.hostile, self.controller.rest())
 
     @property
+    def sample_time(self) -> float:
+        """Seconds between samples. Raises ValueError for a static scenario, which has none."""
+        if self.scenario.sample_time is None:
+            raise ValueError(f"{self.scenario.name} is static: its samples are not in time")
+        return self.scenario.sample_time
+
+    @property
     def cancelling(self) -> float:
         """The largest sum [m] of sizes that cancel to a displacement on the way from a random target."""
         kernel, rest = self.controller.static.displacement, self.model.rest

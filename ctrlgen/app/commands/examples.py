@@ -31,8 +31,6 @@ def example(
     Example:  ctrlgen example circle20 --to scenarios
     """
     known = examples()
-    if names and to is None:
-        raise InputError("--to", [Fault(" ".join(names), "needs a folder to be copied into, such as --to scenarios")])
     if not names:
         if to is not None:
             raise InputError("example", [Fault(f"--to {to}", "needs a name; ctrlgen example lists them")])
@@ -43,6 +41,8 @@ def example(
         show_table(table)
         out.print(f"copy one:  ctrlgen example {known[0].name} --to scenarios", markup=False)
         return
+    if to is None:
+        raise InputError("--to", [Fault(" ".join(names), "needs a folder to be copied into, such as --to scenarios")])
     for path in copy_examples(names, to):
         out.print(str(path), soft_wrap=True, markup=False)
     for one in known:
