@@ -195,7 +195,8 @@ class Law:
         return SimpleNamespace(
             value=every[self.index], rate=None, second_rate=None, all=every,
             index=self.index, partner=self.partner, ambient=held["ambient"],
-            sample_time=self.h, rest=self.REST, scale=1.0, travel=1.0, second_order=lambda: every, yielding=lambda: every,
+            sample_time=self.h, rest=self.REST, scale=1.0, travel=1.0, second_order_kinematics=lambda: every,
+            tangent_compliance=lambda: every,
             displacement=held["displacement"], velocity=held["velocity"], force=held["force"], state=held["state"],
             **{s.name: memory[i] for i, s in enumerate(self.effect.states)},
         )  # fmt: skip

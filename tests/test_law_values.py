@@ -115,7 +115,7 @@ LAWS = {
     "drive_offset": ({}, lambda s, p: p.offset),
     "end_stop": ({"gap": -0.4, "power": 1.5}, stop),
     "expansion": ({}, lambda s, p: p.slope * (s.state - s.rest) * s.value),
-    "finite_rotation": ({}, lambda s, p: p.share * s.second_order()[s.index]),
+    "finite_rotation": ({}, lambda s, p: p.share * s.second_order_kinematics()[s.index]),
     "force_step": (EVENT, lambda s, p: p.force * event(s, p)),
     "frame_tilt_x": ({}, turned(1, 2)),
     "frame_tilt_y": ({}, turned(2, 0)),
@@ -126,7 +126,7 @@ LAWS = {
     "hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.stiffness * weighted(s, p, s.displacement)),
     "lever_ratio": ({}, lambda s, p: p.gain * s.value),
     "link_compliance": ({}, lambda s, p: p.tilt * s.all[s.partner]),
-    "link_load": ({}, lambda s, p: p.share * s.yielding()[s.index]),
+    "link_load": ({}, lambda s, p: p.share * s.tangent_compliance()[s.index]),
     "log_creep": (
         {"tau": 0.1, "decades": 3.25}, logarithmic,
         lambda s, p: {f"z{j}": (s.value - getattr(s, f"z{j}")) / (0.1 * sqrt(10.0) ** j) for j in range(9)},
@@ -183,7 +183,7 @@ def signals(rng: np.random.Generator, kind: str) -> SimpleNamespace:
     return SimpleNamespace(
         value=every[index], rate=None, second_rate=None, all=every, index=index, partner=5 - index, ambient=rng.uniform(-3, 3),
         sample_time=H, rest=0.3, state=rng.uniform(0.5, 3), scale=1.3, travel=0.7,
-        second_order=lambda: other, yielding=lambda: other, displacement=rng.uniform(-1, 1), displacements=every,
+        second_order_kinematics=lambda: other, tangent_compliance=lambda: other, displacement=rng.uniform(-1, 1), displacements=every,
         velocity=rng.uniform(-1, 1), force=rng.uniform(-1, 1), **dict(zip(names, rng.uniform(-1, 1, len(names)), strict=True)),
     )  # fmt: skip
 
