@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis
 from ctrlgen.diagnosis.selection import score_gradient as slopes_module
 from ctrlgen.diagnosis.selection.ltv_propagation import Spread
 from ctrlgen.diagnosis.selection.score_gradient import Slopes
@@ -35,7 +35,7 @@ LAWS = [
 
 
 def shows_nothing(place, i):
-    return Seen()
+    return DataHints()
 
 
 @pytest.fixture(scope="module")

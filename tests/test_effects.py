@@ -22,7 +22,8 @@ from ctrlgen import Controller, build_model, simulate
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import Device
-from ctrlgen.effects import Effect, Place, Where
+from ctrlgen.diagnosis.hypotheses.priors import prior_of
+from ctrlgen.effects import Channel, Effect, Param, Place
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.toolchains import FLAGS
@@ -49,51 +50,56 @@ def device_of(table: dict, *effects: dict) -> Device:
 
 
 @cache
-def place_of(effect: type[Effect]) -> tuple[dict, list[Where]]:
+def place_of(effect: type[Effect]) -> tuple[dict, list[Channel]]:
     """The first device on which the effect can act, and every channel (and partner) there."""
     for table in tables():
         device = device_of(table)
         physics = device.physics(device.values())
         places = channels(physics, effect.place)
         if effect.pairs:
-            places = [w.beside(other) for w in places for other in places]
-        places = [w for w in places if effect.fits(w)]
-        if places and effect.needs <= available(physics, SAMPLE_TIME):
+            places = [w.paired_with(other) for w in places for other in places]
+        places = [w for w in places if effect.applies_to(w)]
+        if places and effect.requires <= available(physics, SAMPLE_TIME):
             return table, places
     raise AssertionError(f"{effect.kind} acts on no device that is known here")
 
 
-SUGGESTED = {"moments": (0.3, 1.0, 3.0), "places": (-0.3, 0.1, 0.6)}
+SUGGESTED = {"moments": (0.3, 1.0, 3.0), "jump_positions": (-0.3, 0.1, 0.6)}
 
 
-def shapes(effect: type[Effect], where: Where) -> list[dict[str, float]]:
-    """Every combination of the shape parameters' grids, SI; of what records suggest, a few."""
+def shapes(effect: type[Effect], where: Channel) -> list[dict[str, float]]:
+    """Every combination of the shape parameters' start values, SI; of what records suggest, a few."""
     shaped = [p for p in effect.params if p.off is None]
     return [
         dict(zip((p.name for p in shaped), [where.si(v, p) for v, p in zip(values, shaped, strict=True)], strict=True))
-        for values in product(*(p.grid or SUGGESTED[p.seen] for p in shaped))
+        for values in product(*(starts(effect, p) for p in shaped))
     ]
 
 
-def size(effect: type[Effect], where: Where, rng: np.random.Generator) -> float:
+def starts(effect: type[Effect], p: Param) -> tuple[float, ...]:
+    prior = prior_of(effect).of(p)
+    return prior.start_values or SUGGESTED[prior.start_from_data]
+
+
+def size(effect: type[Effect], where: Channel, rng: np.random.Generator) -> float:
     """A modest amplitude, SI."""
     p = effect.amplitude()
     return rng.uniform(0.2, 1.0) * where.si(min(0.1 * p.bounds[1], MODEST), p)
 
 
-def written(effect: type[Effect], where: Where, values: dict[str, float]) -> dict:
+def written(effect: type[Effect], where: Channel, values: dict[str, float]) -> dict:
     """The [[effect]] table with `values` [SI]."""
     units = {p.name: where.unit_of(p) for p in effect.params}
     texts = {k: f"{from_si(v, units[k])!r} {'' if units[k] == '1' else units[k]}".strip() for k, v in values.items()}
     if effect.pairs:
-        return {"kind": effect.kind, "at": where.channel, "of": where.partner, **texts}
-    return {"kind": effect.kind, "at": "all" if effect.place is Place.POSE else where.channel, **texts}
+        return {"kind": effect.kind, "at": where.name, "of": where.partner, **texts}
+    return {"kind": effect.kind, "at": "all" if effect.place is Place.POSE else where.name, **texts}
 
 
 class Everything:
     """All equations and signals of a device with and without the effect, its parameters free."""
 
-    def __init__(self, effect: type[Effect], where: Where, rng: np.random.Generator) -> None:
+    def __init__(self, effect: type[Effect], where: Channel, rng: np.random.Generator) -> None:
         table = place_of(effect)[0]
         values = {**shapes(effect, where)[0], effect.amplitude().name: size(effect, where, rng)}
         ambient = ca.SX.sym("ambient")
@@ -154,7 +160,7 @@ class Law:
 
     def __init__(self, effect: type[Effect], h: float, index: int = INDEX, still: bool = False) -> None:
         self.effect, self.h = effect, h
-        self.where = Where("1X", place_unit(effect), 1.0, "m", 1.0, "1Y", effect.partner_unit or "m", 1.0)
+        self.where = Channel("1X", place_unit(effect), 1.0, "m", 1.0, "1Y", effect.partner_unit or "m", 1.0)
         self.index = 1 if effect.channel_unit == "rad" else index
         self.partner = 4 if effect.channel_unit == "rad" else self.PARTNER
         memory = ca.SX.sym("memory", len(effect.states))
@@ -171,7 +177,7 @@ class Law:
         def f(m: ca.SX) -> ca.SX:
             return ca.vertcat(ca.SX(0, 1), *law(m)[1])
 
-        if effect.sticks:  # bristles: linear in themselves, far faster than a sample
+        if effect.set_valued:  # bristles: linear in themselves, far faster than a sample
             a = f(memory)
             slope = h * ca.diag(ca.jacobian(a, memory))
             after = after + h * a * ca.if_else(slope < -1e-6, (ca.exp(slope) - 1) / slope, 1.0)
@@ -270,7 +276,7 @@ def test_makes_no_energy(effect, rng):
     d = signals[:, Law.PER_CHANNEL]
     start = np.array([1.0 if s.clock else 0.0 for s in effect.states])
     walk = law.walk(signals, start)
-    keeps = not effect.states and "velocity" not in effect.needs
+    keeps = not effect.states and "velocity" not in effect.requires
     for shape in shapes(effect, law.where):
         F = walk(law.numbers(shape, size(effect, law.where, rng))).full().ravel()
         steps = np.diff(d)
@@ -290,7 +296,9 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
     every, held = rng.uniform(0.5, 2, 6), dict(zip(Law.ALONE, rng.uniform(0.5, 2, len(Law.ALONE)), strict=True))
     units = {"displacement": "m", "velocity": "m/s", "force": "N", "state": "K", "ambient": "K", "time": "s"}
     every_unit = (
-        ["rad"] * 3 + ["m"] * 3 if "spatial" in effect.needs or (effect.pairs and effect.channel_unit) else [unit] * 6
+        ["rad"] * 3 + ["m"] * 3
+        if "spatial" in effect.requires or (effect.pairs and effect.channel_unit)
+        else [unit] * 6
     )
     if effect.partner_unit not in (None, "channel"):
         every_unit[law.partner] = effect.partner_unit
@@ -466,8 +474,6 @@ def test_has_an_equation_a_source_bounds_and_fits_on_a_screen(effect):
     for p in effect.params:
         assert p.doc and p.bounds[0] < p.bounds[1]
         assert p.off is None or p.bounds[0] <= p.off <= p.bounds[1]
-        assert p.off is not None or p.grid or p.seen in SUGGESTED
-        assert all(p.bounds[0] <= value <= p.bounds[1] for value in p.grid)
         assert same_dimension(where.unit_of(p), where.unit_of(p))  # a unit that is known
     for state in effect.states:
         assert not (state.clock and state.stepped) and where.si(state.scale, state) > 0

@@ -246,7 +246,7 @@ def recover(fitter: Fitter, device: Device, effect: str, planted: Planted) -> No
     nominal = fitter.fit(Structure(device))
     best, *_ = Screen(fitter, [cause]).run(nominal).suspects
     fit = fitter.fit(Structure(device).with_cause(cause, best.start))
-    rough, held = cause.law.rough**2, sum(int(r.valid.sum()) for r in fitter.held_out_records)
+    rough, held = cause.prior.model_form_error**2, sum(int(r.valid.sum()) for r in fitter.held_out_records)
     assert fit.chi2 < noisy(fit.n) + rough * nominal.chi2 and fit.chi2 < 0.3 * nominal.chi2
     assert fitter.held_out_deviance(fit) < noisy(held) + rough * fitter.held_out_deviance(nominal)
     sd = np.sqrt(np.diag(fit.covariance))

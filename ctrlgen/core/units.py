@@ -15,6 +15,7 @@ from typing import Any
 
 import pint
 from annotated_types import GroupedMetadata
+from pint.util import UnitsContainer, to_units_container
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf)\s*(.*?)\s*$", re.IGNORECASE)
@@ -175,10 +176,15 @@ def written_unit(text: str) -> str:
     return (match[2] if match else "") or "1"
 
 
-def power_of(unit: str, marker: str) -> float:
-    """The power with which the base unit `marker` stands in `unit`: -2 for 'candela' in 's/candela^2'."""
-    (dimension,) = _unit(marker).dimensionality
-    return float(_unit(unit).dimensionality.get(dimension, 0))
+@cache
+def split_unit(unit: str, words: tuple[str, ...]) -> tuple[dict[str, float], str]:
+    """Powers of the placeholder `words` in `unit`, and the unit that is left without them.
+
+    ({"channel": 1.0, "travel": -2.0}, "s ** 2") for 'channel*s^2/travel^2'.
+    """
+    powers = UnitsContainer(to_units_container(unit))
+    placed = {word: float(power) for word, power in powers.items() if word in words}
+    return placed, str(powers.remove(placed))
 
 
 def read_quantity(unit: str | None, given: Any) -> Quantity:

@@ -13,7 +13,7 @@ from pydantic import Field
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
-from ctrlgen.effects import Effect
+from ctrlgen.effects import Effect, EffectTable
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class Device(Section):
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     title: str
     source: str
-    effect: tuple[Effect, ...] = ()
+    effect: tuple[EffectTable, ...] = ()
     sensor: tuple[AnySensor, ...] = ()
 
     @classmethod

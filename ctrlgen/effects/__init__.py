@@ -1,14 +1,28 @@
-"""The library of physical effects: every module here is one law, but for those that begin with an underscore.
+"""The library of physical effects: one law a file.
 
-A law's file needs `from ctrlgen.effects import Effect, Param, Place`; importing this package fills `Effect.library`.
+To add a law:
+
+1. Add one file here with a subclass of `Effect`: equation and validity in the docstring, place, parameters, source, `term`,
+   and `rates` or `update` if it has states. Simulation, inversion, trajectory optimisation, generated C and diagnosis read it
+   from there; this package finds the file by itself.
+2. Plant it in `tests/test_recovery.py`: a recording made by the law's definition, written independently of its expression,
+   from which the diagnosis must recover the parameters. That test file fails while a law has none.
+
+The theorems of `tests/test_effects.py` then hold the law to its claims: off means off, energy, units, C equal to Python. What
+the diagnosis believes of it beforehand has defaults; `ctrlgen/diagnosis/hypotheses/priors.py` takes a row where they are wrong.
+
+A law's file imports `Effect, Param, Place` (and `State`) from here. Files that begin with an underscore are no laws: the law's
+interface, the reader of [[effect]] tables, and expressions that several laws share.
 """
 
 from importlib import import_module
 from pkgutil import iter_modules
 
-from ctrlgen.effects._effect import Effect, Param, Place, State, Where
+from ctrlgen.effects._effect import Effect, Place
+from ctrlgen.effects._parameter import Channel, Param, State
+from ctrlgen.effects._table import EffectTable, faults_at, read_effect
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")
 
-__all__ = ["Effect", "Param", "Place", "State", "Where"]
+__all__ = ["Channel", "Effect", "EffectTable", "Param", "Place", "State", "faults_at", "read_effect"]

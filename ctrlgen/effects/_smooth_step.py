@@ -9,8 +9,8 @@ import casadi as ca
 from ctrlgen.effects import Param, State
 
 WHEN = (
-    Param("moment", "s", (-1e6, 1e6), "middle of its rise", seen="moments"),
-    Param("rise", "s", (1e-4, 1.0), "time it takes", grid=(1.0,), level=True),
+    Param("moment", "s", (-1e6, 1e6), "middle of its rise"),
+    Param("rise", "s", (1e-4, 1.0), "time it takes"),
 )
 CLOCK = (State("t", "s", 1.0, clock=True),)
 

@@ -9,8 +9,7 @@ class AsymmetricGain(Effect):
     """Delta u = g |u|: gain 1 + g for u > 0, 1 - g for u < 0. Holds below saturation."""
 
     place = Place.DRIVE
-    rarity = 2.3
-    needs = frozenset({"actuator", "bipolar"})
+    requires = frozenset({"actuator", "bipolar"})
     source = "definition"
     params = (Param("gain", "1", (-0.5, 0.5), "half the difference of the gains", off=0.0),)
 

@@ -13,15 +13,12 @@ class AsymmetricHysteresis(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.02
-    family = "hysteresis"
-    rarity = 2.3
-    needs = frozenset({"force"})
+    requires = frozenset({"force"})
     source = "P. R. Dahl, AIAA Journal 14 (1976) 1675; the warp is ours"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal at home", off=0.0),
-        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles", grid=(0.01, 0.03, 0.1, 0.3, 1.0)),
-        Param("skew", "1", (-0.95, 0.95), "a: how much stronger far on the positive side", grid=(-0.6, 0.6)),
+        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles"),
+        Param("skew", "1", (-0.95, 0.95), "a: how much stronger far on the positive side"),
     )
     states = (State("z", "travel", 0.1, stepped=True), State("w", "travel", 1.0, stepped=True))
 

@@ -12,7 +12,7 @@ class AsymmetricViscous(Effect):
     """
 
     place = Place.FORCE
-    needs = frozenset({"velocity"})
+    requires = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: direction-dependent friction"
     params = (Param("damping", "channel*s/travel", (-10.0, 10.0), "forward minus backward damping", off=0.0),)
 

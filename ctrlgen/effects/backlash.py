@@ -14,10 +14,9 @@ class Backlash(Effect):
     """
 
     place = Place.DISPLACEMENT
-    stage = 1
-    rough = 0.01  # of itself: reversals between samples are placed so well
+    order = 1
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash"
-    params = (Param("gap", "travel", (0.0, 1.0), "whole play", off=0.0, grid=(1e-4, 1e-3, 0.01, 0.1), level=True),)
+    params = (Param("gap", "travel", (0.0, 1.0), "whole play", off=0.0),)
     states = (
         State("w", "travel", 1.0, stepped=True),
         State("d", "travel", 1.0, stepped=True),

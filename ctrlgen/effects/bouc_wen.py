@@ -13,14 +13,12 @@ class BoucWen(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.02
-    family = "hysteresis"
-    needs = frozenset({"force"})
+    requires = frozenset({"force"})
     source = "Y. K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249; R. Bouc (1967)"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
-        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles", grid=(0.01, 0.03, 0.1, 0.3, 1.0)),
-        Param("loop", "1", (0.55, 1.0), "share b of the law that depends on direction", grid=(0.55, 0.9)),
+        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles"),
+        Param("loop", "1", (0.55, 1.0), "share b of the law that depends on direction"),
     )
     states = (State("z", "travel", 0.1, stepped=True), State("d", "travel", 1.0, stepped=True))
 

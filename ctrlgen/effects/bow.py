@@ -7,8 +7,7 @@ class Bow(Effect):
     """Delta y = b y^2. Holds while the sensor's nonlinearity is a few per cent of the reading."""
 
     place = Place.SENSOR
-    stage = -1  # a scale is off before it is read: fringes count in what it says
-    rough = 0.05  # no sensor is bent by its first even term alone
+    order = -1  # a scale is off before it is read: fringes count in what it says
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
     params = (Param("curvature", "1/channel", (-0.3, 0.3), "nonlinearity per reading squared", off=0.0),)
 

@@ -15,15 +15,13 @@ class Coulomb(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.02
-    family = "dry friction"
-    sticks = True
-    needs = frozenset({"velocity"})
+    set_valued = True
+    requires = frozenset({"velocity"})
     source = "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; the rest is its usual smooth form"
     params = (
         Param("force", "channel", (0.0, 1.0), "force of sliding", off=0.0),
-        Param("reach", "travel", (1e-6, 0.03), "way in which the contact yields", grid=(3e-4, 3e-3, 0.03), level=True),
-        Param("smoothing", "travel/s", (1e-5, 1e3), "v_s, below which it creeps", grid=(1e-4, 0.1), level=True),
+        Param("reach", "travel", (1e-6, 0.03), "way in which the contact yields"),
+        Param("smoothing", "travel/s", (1e-5, 1e3), "v_s, below which it creeps"),
     )
     states = (State("z", "1", 1.0),)
 

@@ -15,16 +15,14 @@ class Cyclic(Effect):
     """
 
     place = Place.SENSOR
-    several = True
     channel_unit = ("m", "rad")
     source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
     params = (
         Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
         Param(
             "period", "channel", (1e-4, 2.0), "path of one period",
-            grid=(2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05), seen="pitches",
         ),
-        Param("phase", "deg", (-360.0, 360.0), "phase at home", grid=(0.0, 90.0)),
+        Param("phase", "deg", (-360.0, 360.0), "phase at home"),
     )  # fmt: skip
 
     @classmethod

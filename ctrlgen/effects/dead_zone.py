@@ -12,11 +12,11 @@ class DeadZone(Effect):
     """
 
     place = Place.DRIVE
-    needs = frozenset({"actuator"})
+    requires = frozenset({"actuator"})
     source = "G. Tao, P. V. Kokotovic, IEEE Trans. Autom. Control 39 (1994) 59: plants with unknown dead-zones"
     params = (
         Param("width", "channel", (0.0, 0.5), "half width", off=0.0),
-        Param("rounding", "1", (0.01, 5.0), "of the corners, in widths", grid=(0.3,)),
+        Param("rounding", "1", (0.01, 5.0), "of the corners, in widths"),
     )
 
     def term(self, s, p):

@@ -12,11 +12,11 @@ class Degradation(Effect):
     """
 
     place = Place.DRIVE
-    needs = frozenset({"actuator"})
+    requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): incipient faults"
     params = (
         Param("rate", "1/s", (-0.1, 0.1), "relative loss per time, at first", off=0.0),
-        Param("levels_off", "s", (0.3, 1e6), "T: when the loss comes to its end", grid=(3.0, 30.0, 1e4)),
+        Param("levels_off", "s", (0.3, 1e6), "T: when the loss comes to its end"),
     )
     states = (State("t", "s", 1.0, clock=True),)
 

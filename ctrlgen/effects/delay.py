@@ -16,9 +16,8 @@ class Delay(Effect):
     """
 
     place = Place.SENSOR
-    stage = 3
-    rough = 0.001  # by interpolation
-    needs = frozenset({"sample_time"})
+    order = 3
+    requires = frozenset({"sample_time"})
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"
     params = (Param("delay", "ms", (0.0, 500.0), "age of the reading", off=0.0),)
     states = (

@@ -7,7 +7,7 @@ class DriveGain(Effect):
     """Delta u = g u. Holds while the amplifier is linear, that is below its saturation."""
 
     place = Place.DRIVE
-    needs = frozenset({"actuator"})
+    requires = frozenset({"actuator"})
     source = "definition"
     params = (Param("gain", "1", (-0.5, 0.5), "relative excess of the delivered drive", off=0.0),)
 

@@ -11,15 +11,13 @@ class DriveHysteresis(Effect):
     """
 
     place = Place.DRIVE
-    stage = 1
-    rough = 0.02
-    rarity = 2.3
-    needs = frozenset({"actuator"})
+    order = 1
+    requires = frozenset({"actuator"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
     params = (
         Param("share", "1", (0.0, 0.5), "part of the drive that lags", off=0.0),
-        Param("reach", "channel", (1e-3, 2.0), "change of drive that all follow", grid=(0.03, 0.1, 0.3, 1.0)),
-        Param("taper", "1", (-1.0, 2.0), "q: how much more of the narrow ones", grid=(0.0,)),
+        Param("reach", "channel", (1e-3, 2.0), "change of drive that all follow"),
+        Param("taper", "1", (-1.0, 2.0), "q: how much more of the narrow ones"),
     )
     states = tuple(State(name, "channel", 1.0, stepped=True) for name in names())
 

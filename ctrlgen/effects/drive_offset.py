@@ -7,7 +7,7 @@ class DriveOffset(Effect):
     """Delta u = b, constant. Holds while the amplifier is on, at rest too."""
 
     place = Place.DRIVE
-    needs = frozenset({"actuator"})
+    requires = frozenset({"actuator"})
     source = "definition"
     params = (Param("offset", "channel", (-0.5, 0.5), "drive at command zero", off=0.0),)
 

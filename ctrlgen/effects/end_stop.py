@@ -13,8 +13,7 @@ class EndStop(Effect):
     """
 
     place = Place.FORCE
-    needs = frozenset({"force"})
-    rough = 0.05
+    requires = frozenset({"force"})
     source = "K. L. Johnson, Contact Mechanics (1985), eq. (4.23): Hertz; its corner rounded"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e3), "stiffness of the stop at first", off=0.0),
@@ -23,10 +22,8 @@ class EndStop(Effect):
             "travel",
             (-10.0, 10.0),
             "where it stands",
-            grid=(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97),
-            level=True,
         ),
-        Param("power", "1", (1.0, 2.0), "n: how the force grows with the depth", grid=(1.0, 1.5)),
+        Param("power", "1", (1.0, 2.0), "n: how the force grows with the depth"),
     )
 
     def term(self, s, p):

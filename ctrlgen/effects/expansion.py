@@ -7,7 +7,7 @@ class Expansion(Effect):
     """Delta F = a (T - T_rest) F: thermal expansion that grows by a per kelvin. Holds for a (T - T_rest) below 0.3."""
 
     place = Place.FORCE
-    needs = frozenset({"state"})
+    requires = frozenset({"state"})
     source = "Y. Okada, Y. Tokumaru, J. Appl. Phys. 56 (1984) 314: expansion of silicon between 300 and 1500 K"
     params = (Param("slope", "1/K", (-1e-2, 1e-2), "relative change of force per kelvin", off=0.0),)
 

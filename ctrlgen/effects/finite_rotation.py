@@ -10,8 +10,7 @@ class FiniteRotation(Effect):
     """
 
     place = Place.POSE
-    needs = frozenset({"second_order_kinematics"})
-    whole = True
+    requires = frozenset({"second_order_kinematics"})
     source = "J.-P. Merlet, Parallel Robots (2006), chapter 4: loop closure, expanded to second order"
     params = (Param("share", "1", (-2.0, 4.0), "1 for links on ideal pivots", off=0.0),)
 

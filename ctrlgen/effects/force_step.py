@@ -8,8 +8,7 @@ class ForceStep(Effect):
     """Delta F = f e(t), e from 0 to 1 within the time T about the moment t_0. Holds for one event."""
 
     place = Place.FORCE
-    needs = frozenset({"force"})
-    domain = "disturbance"
+    requires = frozenset({"force"})
     active = True
     source = "definition"
     params = (

@@ -12,7 +12,7 @@ class FrameTiltY(Effect):
     """
 
     place = Place.POSE
-    needs = frozenset({"spatial"})
+    requires = frozenset({"spatial"})
     source = "definition"
     params = (Param("angle", "mrad", (-50.0, 50.0), "turn of the platform frame about y", off=0.0),)
 

@@ -12,7 +12,7 @@ class FrameTurn(Effect):
     """
 
     place = Place.POSE
-    needs = frozenset({"spatial"})
+    requires = frozenset({"spatial"})
     source = "definition"
     params = (Param("angle", "mrad", (-50.0, 50.0), "turn of the platform frame about z", off=0.0),)
 

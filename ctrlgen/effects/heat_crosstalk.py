@@ -12,7 +12,7 @@ class HeatCrosstalk(Effect):
     """
 
     place = Place.HEAT
-    needs = frozenset({"heat"})
+    requires = frozenset({"heat"})
     source = "definition"
     params = (Param("share", "1", (0.0, 0.1), "power arriving per power of another heater", off=0.0),)
 

@@ -10,7 +10,7 @@ class HeaterResistance(Effect):
     """
 
     place = Place.HEAT
-    needs = frozenset({"heat", "state"})
+    requires = frozenset({"heat", "state"})
     source = "definition: linear temperature coefficient of resistance"
     params = (Param("slope", "1/K", (-1e-3, 1e-2), "relative change of resistance per kelvin", off=0.0),)
 

@@ -13,14 +13,12 @@ class Hysteresis(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.02
-    family = "hysteresis"
-    needs = frozenset({"force"})
+    requires = frozenset({"force"})
     source = "W. D. Iwan, J. Appl. Mech. 33 (1966) 893; K. Kuhnen, Eur. J. Control 9 (2003) 407"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
-        Param("reach", "travel", (1e-3, 5.0), "travel at which all slip", grid=(0.03, 0.1, 0.3, 1.0, 2.0)),
-        Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones", grid=(0.5,)),
+        Param("reach", "travel", (1e-3, 5.0), "travel at which all slip"),
+        Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones"),
     )
     states = (
         *(State(name, "travel", 1.0, stepped=True) for name in names()),

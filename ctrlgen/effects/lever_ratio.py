@@ -7,7 +7,6 @@ class LeverRatio(Effect):
     """Delta d = g d: the mechanism is carried g further than the stage model says. Holds for small lever angles."""
 
     place = Place.DISPLACEMENT
-    rarity = 2.3
     source = "definition"
     params = (Param("gain", "1", (-0.3, 0.3), "relative excess of travel", off=0.0),)
 

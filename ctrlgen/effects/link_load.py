@@ -10,8 +10,7 @@ class LinkLoad(Effect):
     """
 
     place = Place.DISPLACEMENT
-    needs = frozenset({"tangent_compliance"})
-    whole = True
+    requires = frozenset({"tangent_compliance"})
     source = "S1 eq. (12) and (16): stages in series with struts, at the stage's tangent stiffness"
     params = (Param("share", "1", (-2.0, 4.0), "1 for the stage's own law", off=0.0),)
 

@@ -15,13 +15,11 @@ class LogCreep(Effect):
     """
 
     place = Place.DISPLACEMENT
-    rough = 0.01
-    family = "creep"
     source = "H. Jung, D.-G. Gweon, Rev. Sci. Instrum. 71 (2000) 1896: creep of piezoelectric actuators"
     params = (
         Param("gain", "1", (0.0, 0.1), "extra travel per decade of time, per travel", off=0.0),
-        Param("tau", "s", (1e-3, 1e2), "shortest relaxation time", grid=(0.01, 0.1, 1.0)),
-        Param("decades", "1", (1.0, 4.5), "D: after so many it ends", grid=(3.25,)),
+        Param("tau", "s", (1e-3, 1e2), "shortest relaxation time"),
+        Param("decades", "1", (1.0, 4.5), "D: after so many it ends"),
     )
     states = tuple(State(f"z{j}", "travel", 1.0) for j in range(len(TIMES)))
 

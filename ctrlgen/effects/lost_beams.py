@@ -8,7 +8,7 @@ class LostBeams(Effect):
     """Delta F = -g F e(t), e from 0 to 1 within the time T about the moment t_0. Holds for one event."""
 
     place = Place.FORCE
-    needs = frozenset({"actuator", "force"})
+    requires = frozenset({"actuator", "force"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): abrupt faults"
     params = (
         Param("share", "1", (0.0, 1.0), "part of the force that is lost", off=0.0),

@@ -11,8 +11,7 @@ class LostMotion(Effect):
     """
 
     place = Place.DISPLACEMENT
-    rarity = 2.3
-    needs = frozenset({"force"})
+    requires = frozenset({"force"})
     source = "S. T. Smith, Flexures: Elements of Elastic Mechanisms (2000): levers"
     params = (Param("compliance", "um/N", (-100.0, 100.0), "lost travel per force", off=0.0),)
 

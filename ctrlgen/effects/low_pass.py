@@ -11,13 +11,12 @@ class LowPass(Effect):
     """
 
     place = Place.SENSOR
-    stage = 2
-    rough = 0.005
+    order = 2
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
     params = (
-        Param("share", "1", (-0.5, 1.5), "part of the reading that is filtered", off=0.0, usual=(0.8, 1.2)),
-        Param("tau", "s", (1e-4, 1e2), "one over the corner [rad/s]", grid=(1e-3, 8e-3, 0.06, 0.5)),
-        Param("damping", "1", (0.3, 20.0), "D", grid=(0.7, 4.0)),
+        Param("share", "1", (-0.5, 1.5), "part of the reading that is filtered", off=0.0),
+        Param("tau", "s", (1e-4, 1e2), "one over the corner [rad/s]"),
+        Param("damping", "1", (0.3, 20.0), "D"),
     )
     states = (State("w", "channel", 1.0), State("v", "channel", 1.0))
 

@@ -16,7 +16,7 @@ class Payload(Effect):
     source = "definition: moment of a weight about a horizontal axis"
     params = (
         Param("share", "1", (-0.5, 0.5), "angle of giving way per angle of lean", off=0.0),
-        Param("lean", "deg", (-180.0, 180.0), "how far the centre of mass leans at home", grid=(0.0, 90.0)),
+        Param("lean", "deg", (-180.0, 180.0), "how far the centre of mass leans at home"),
     )
 
     def term(self, s, p):

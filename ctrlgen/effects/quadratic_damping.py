@@ -9,7 +9,7 @@ class QuadraticDamping(Effect):
     """Delta F = -c v |v|. Holds for turbulent flow."""
 
     place = Place.FORCE
-    needs = frozenset({"velocity"})
+    requires = frozenset({"velocity"})
     source = "definition: drag at constant drag coefficient"
     params = (Param("damping", "channel*s^2/travel^2", (0.0, 10.0), "force per speed squared", off=0.0),)
 

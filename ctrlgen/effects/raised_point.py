@@ -12,7 +12,7 @@ class RaisedPoint(Effect):
     """
 
     place = Place.POSE
-    needs = frozenset({"spatial"})
+    requires = frozenset({"spatial"})
     channel_unit = "m"
     source = "R. M. Murray, Z. Li, S. S. Sastry, Robotic Manipulation (1994), chapter 2: Rodrigues' formula"
     params = (Param("height", "mm", (-500.0, 500.0), "how far above", off=0.0),)

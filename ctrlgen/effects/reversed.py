@@ -8,11 +8,9 @@ class Reversed(Effect):
     which `drive_gain` says better."""
 
     place = Place.DRIVE
-    rarity = 2.3
-    needs = frozenset({"actuator", "bipolar"})
-    domain = "mechanism"
+    requires = frozenset({"actuator", "bipolar"})
     source = "definition"
-    params = (Param("share", "1", (0.0, 1.2), "1 where the sign is wrong", off=0.0, expected=(0.9, 1.1)),)
+    params = (Param("share", "1", (0.0, 1.2), "1 where the sign is wrong", off=0.0),)
 
     def term(self, s, p):
         return -2 * p.share * s.value

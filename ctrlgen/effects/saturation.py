@@ -12,17 +12,15 @@ class Saturation(Effect):
     """
 
     place = Place.DRIVE
-    needs = frozenset({"actuator"})
+    requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): actuator faults; smooth form ours"
     params = (
-        Param("share", "1", (0.0, 1.5), "1 where nothing above the level is delivered", off=0.0, expected=(0.5, 1.5)),
+        Param("share", "1", (0.0, 1.5), "1 where nothing above the level is delivered", off=0.0),
         Param(
             "level",
             "channel",
             (0.01, 1.0),
             "drive that is not exceeded",
-            grid=(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
-            level=True,
         ),
     )
 

@@ -12,7 +12,7 @@ class ScrewMotion(Effect):
     """
 
     place = Place.POSE
-    needs = frozenset({"spatial"})
+    requires = frozenset({"spatial"})
     channel_unit = "m"
     source = "R. M. Murray, Z. Li, S. S. Sastry, Robotic Manipulation (1994), chapter 2: exponential of a twist"
     params = (Param("share", "1", (-4.0, 4.0), "1 for motion along one screw", off=0.0),)

@@ -8,7 +8,6 @@ class SensorStep(Effect):
     """Delta y = b e(t), e from 0 to 1 within the time T about the moment t_0. Holds for one event."""
 
     place = Place.SENSOR
-    domain = "disturbance"
     source = "definition"
     params = (
         Param("offset", "channel", (-1e3, 1e3), "after the step", off=0.0),

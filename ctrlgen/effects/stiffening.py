@@ -10,7 +10,7 @@ class Stiffening(Effect):
     """
 
     place = Place.FORCE
-    needs = frozenset({"force"})
+    requires = frozenset({"force"})
     source = "S. Timoshenko, Strength of Materials II (1956), large deflection of clamped beams"
     params = (Param("k3", "channel/travel^3", (-10.0, 10.0), "cubic stiffness", off=0.0),)
 

@@ -7,7 +7,7 @@ class Stiffness(Effect):
     """E = k d^2/2, hence Delta F = -k d on the bar. Holds for d below the flexure's thickness."""
 
     place = Place.FORCE
-    needs = frozenset({"force"})
+    requires = frozenset({"force"})
     source = "definition"
     params = (Param("stiffness", "channel/travel", (-10.0, 10.0), "stiffness beyond the nominal one", off=0.0),)
 

@@ -13,14 +13,12 @@ class StitchingError(Effect):
     """
 
     place = Place.SENSOR
-    several = True
     channel_unit = ("m", "rad")
-    rarity = 1.0  # rarer than errors that are everywhere alike
     source = "definition"
     params = (
         Param("offset", "channel", (-0.1, 0.1), "error beyond the place", off=0.0),
-        Param("position", "channel", (-2.0, 2.0), "place where it sets in", seen="places"),
-        Param("width", "channel", (1e-4, 0.05), "path over which it does", grid=(0.005, 0.03)),
+        Param("position", "channel", (-2.0, 2.0), "place where it sets in"),
+        Param("width", "channel", (1e-4, 0.05), "path over which it does"),
     )
 
     @classmethod

@@ -12,18 +12,14 @@ class Stribeck(Effect):
     """
 
     place = Place.FORCE
-    rough = 0.02
-    rarity = 1.0  # dry friction that does not fall is the commoner
-    family = "dry friction"
-    special = ("coulomb", "breakaway", 1.0)
-    sticks = True
-    needs = frozenset({"velocity"})
+    set_valued = True
+    requires = frozenset({"velocity"})
     source = "C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, eqs. (1)-(4)"
     params = (
         Param("force", "channel", (0.0, 1.0), "force of sliding at speed", off=0.0),
-        Param("breakaway", "1", (1.0, 5.0), "b: force that breaks it away, per force of sliding", grid=(1.8,)),
-        Param("speed", "travel/s", (1e-3, 1e3), "v_s, where the excess is gone", grid=(0.01, 0.05, 0.2), level=True),
-        Param("reach", "travel", (1e-6, 0.03), "way in which the contact yields", grid=(1e-3, 0.01), level=True),
+        Param("breakaway", "1", (1.0, 5.0), "b: force that breaks it away, per force of sliding"),
+        Param("speed", "travel/s", (1e-3, 1e3), "v_s, where the excess is gone"),
+        Param("reach", "travel", (1e-6, 0.03), "way in which the contact yields"),
     )
     states = (State("z", "1", 1.0),)
 

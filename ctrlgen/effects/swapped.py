@@ -8,14 +8,12 @@ class Swapped(Effect):
     crosstalk of the leads."""
 
     place = Place.DRIVE
-    rarity = 2.3
     pairs = True
-    mutual = True
-    needs = frozenset({"actuator"})
+    symmetric = True
+    requires = frozenset({"actuator"})
     partner_unit = "channel"
-    domain = "mechanism"
     source = "definition"
-    params = (Param("share", "1", (0.0, 1.2), "1 where the two are exchanged", off=0.0, expected=(0.9, 1.1)),)
+    params = (Param("share", "1", (0.0, 1.2), "1 where the two are exchanged", off=0.0),)
 
     def term(self, s, p):
         return p.share * (s.all[s.partner] - s.value)

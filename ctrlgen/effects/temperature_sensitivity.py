@@ -10,12 +10,12 @@ class TemperatureSensitivity(Effect):
     """
 
     place = Place.SENSOR
-    stage = -1  # what warms or sags moves along the path: fringes count it
-    needs = frozenset({"ambient"})
+    order = -1  # what warms or sags moves along the path: fringes count it
+    requires = frozenset({"ambient"})
     source = "definition"
     params = (
         Param("slope", "channel/K", (-10.0, 10.0), "reading per rise of the surroundings", off=0.0),
-        Param("reference", "K", (-30.0, 30.0), "rise at which the reading is right", grid=(0.0,)),
+        Param("reference", "K", (-30.0, 30.0), "rise at which the reading is right"),
     )
 
     def term(self, s, p):

@@ -132,7 +132,7 @@ def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: 
         stepped={first + k: closed(m.stepped[s.name]) for k, (m, s, _) in enumerate(memories) if s.stepped},
         clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
         set_valued_axes=_set_valued_axes(terms, v, parts.own_force),
-        bristles=tuple(first + k for k, (m, s, _) in enumerate(memories) if m.effect.sticks and not s.stepped),
+        bristles=tuple(first + k for k, (m, s, _) in enumerate(memories) if m.effect.set_valued and not s.stepped),
         signals=signals,
         force_parts=physics.restoring_force_parts(z),
         limits=tuple(physics.limits(_limited(physics, signals, own_x, z))),
@@ -146,14 +146,14 @@ def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: 
             base_unit(unit)
             for unit in (
                 *(() if state is None else state.units),
-                *(m.where.unit_of(s) for m, s, _ in memories),
+                *(m.channel.unit_of(s) for m, s, _ in memories),
                 *(f"({physics.travel_unit})/s",) * v.numel(),
             )
         ),
         rest=np.concatenate([_numbers(physics.rest, p, p_nominal), np.zeros(len(memories) + v.numel())]),
         x_scale=np.array([
             *(() if state is None else state.scale),
-            *(m.where.si(s.scale, s) for m, s, _ in memories),
+            *(m.channel.si(s.scale, s) for m, s, _ in memories),
             *(TYPICAL_RATE * physics.displacement_scale,) * v.numel(),
         ]),
         z_scale=np.full(n, physics.displacement_scale),
@@ -256,7 +256,7 @@ def _set_valued_axes(terms: EffectTerms, v: ca.SX, own_force: ca.SX) -> tuple[in
     if not v.numel():
         return ()
     nonlinear = {i for i in range(v.numel()) if ca.depends_on(ca.jacobian(own_force[i], v[i]), v[i])}
-    by_effect = {m.index for m in terms.members if m.effect.sticks and m.effect.place is Place.FORCE}
+    by_effect = {m.index for m in terms.members if m.effect.set_valued and m.effect.place is Place.FORCE}
     return tuple(sorted(nonlinear | by_effect))
 
 

@@ -11,7 +11,7 @@ import casadi as ca
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
-from ctrlgen.effects import Effect, Place, State, Where
+from ctrlgen.effects import Channel, Effect, Place, State, faults_at
 
 REACH = 10.0  # typical displacements beyond which a law reads the stage's force at that end: a search may try values
 # that far, no stage goes there, and restoring forces may have no value (a root of a negative number)
@@ -23,7 +23,7 @@ class Member:
 
     effect: Effect
     values: SimpleNamespace
-    where: Where
+    channel: Channel
     index: int
     partner: int | None
     states: dict[str, ca.SX]
@@ -40,7 +40,7 @@ class Member:
 
 
 class EffectTerms:
-    """Adds the effects' terms place by place, in the order of `Effect.stage`, and collects their states.
+    """Adds the effects' terms place by place, in the order of `Effect.order`, and collects their states.
 
     `displacement` (n_axes,), `velocity` (n_axes, or none where it is not known) and `acceleration` are the model's
     symbols, `ambient` the rise of the surroundings [K]. Raises InputError with every effect or sensor that does not fit
@@ -57,7 +57,7 @@ class EffectTerms:
         self.within_reach = ca.fmin(ca.fmax(displacement, -reach), reach)
         self.restoring_force = physics.restoring_force(self.within_reach)
         self.mechanism_displacement = displacement  # with the effects' terms, once these are added
-        self.signals_before: dict[Place, list[tuple[float, ca.SX]]] = {}  # (stage, the signal before its terms)
+        self.signals_before: dict[Place, list[tuple[float, ca.SX]]] = {}  # (order, the signal before its terms)
         self.members: list[Member] = []
         self.faults: list[Fault] = []
         for k, effect in enumerate(device.effect):
@@ -66,8 +66,8 @@ class EffectTerms:
     def _place(self, k: int, effect: Effect, values: SimpleNamespace) -> None:
         """Adds one member per channel on which the effect acts; notes its faults."""
         places = channels(self.physics, effect.place)
-        names = [where.channel for where in places]
-        for need in sorted(effect.needs - available(self.physics, sample_time=self.sample_time)):
+        names = [channel.name for channel in places]
+        for need in sorted(effect.requires - available(self.physics, sample_time=self.sample_time)):
             self.faults.append(
                 Fault(f"effect[{k}].kind", f"{effect.kind} needs {need}, which this device does not have")
             )
@@ -79,27 +79,27 @@ class EffectTerms:
             return
         other = None if effect.of is None else names.index(effect.of)
         pairs = [(i, other) for i in chosen]
-        if effect.mutual:
+        if effect.symmetric:
             pairs += [(other, i) for i in chosen]
         for i, partner in pairs:
-            where = places[i] if partner is None else places[i].beside(places[partner])
-            if not effect.fits(where):
+            channel = places[i] if partner is None else places[i].paired_with(places[partner])
+            if not effect.applies_to(channel):
                 if effect.at != "all":
                     self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} cannot act on {names[i]}: wrong unit"))
                 continue
-            self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in effect.faults_at(where)]
+            self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in faults_at(effect, channel)]
             states = {s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") for s in effect.states}
-            self.members.append(Member(effect, values, where, i, partner, states))
+            self.members.append(Member(effect, values, channel, i, partner, states))
 
     def added(self, place: Place, before: ca.SX) -> ca.SX:
         """`before` (channels,) plus every term of the effects at `place`."""
         total, members = ca.SX(before), [m for m in self.members if m.effect.place is place]
         levels = self.signals_before[place] = []
-        for stage in sorted({m.effect.stage for m in members}):
-            levels.append((stage, total[:]))
+        for order in sorted({m.effect.order for m in members}):
+            levels.append((order, total[:]))
             for member in members:
-                if member.effect.stage == stage:
-                    s = self.law_inputs(place, member.index, member.partner, member.states, stage)
+                if member.effect.order == order:
+                    s = self.law_inputs(place, member.index, member.partner, member.states, order)
                     total[member.index] += member.apply(s)
         levels.append((float("inf"), total[:]))
         if place is Place.DISPLACEMENT:
@@ -107,10 +107,10 @@ class EffectTerms:
         return total
 
     def law_inputs(
-        self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX], stage: int = 0
+        self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX], order: int = 0
     ) -> SimpleNamespace:
         """What the law of an effect on channel `i` of `place` may read (see `Effect`), with the effect's own `states`."""
-        before = next(signal for level, signal in self.signals_before[place] if level >= stage)
+        before = next(signal for level, signal in self.signals_before[place] if level >= order)
         s = SimpleNamespace(
             value=before[i], all=before, index=i, partner=partner, ambient=self.ambient, sample_time=self.sample_time,
             **states,
@@ -131,8 +131,8 @@ class EffectTerms:
             z, v = self.displacement, self.velocity
             s.rate = ca.jtimes(s.value, z, v)
             s.second_rate = ca.jtimes(s.rate, z, v) + ca.jtimes(s.rate, v, self.acceleration)
-        where = channels(self.physics, place)[s.index]
-        s.scale, s.travel = where.scale, where.travel_scale
+        channel = channels(self.physics, place)[s.index]
+        s.scale, s.travel = channel.scale, channel.travel_scale
         return s
 
     @cached_property
@@ -154,8 +154,8 @@ class EffectTerms:
         ]
 
 
-def channels(physics: DevicePhysics, place: Place) -> list[Where]:
-    """Where an effect of `place` can act on a device."""
+def channels(physics: DevicePhysics, place: Place) -> list[Channel]:
+    """The channels on which an effect of `place` can act."""
     feedback = physics.feedback if isinstance(physics, InertialPhysics) else None
     if place in (Place.POSE, Place.SENSOR):
         rows = zip(physics.components, physics.pose_units, physics.pose_scale, strict=True)
@@ -170,11 +170,11 @@ def channels(physics: DevicePhysics, place: Place) -> list[Where]:
             Place.DISPLACEMENT: (physics.travel_unit, physics.displacement_scale),
         }[place]
         rows = ((axis, unit, scale) for axis in physics.axes)
-    return [Where(*row, physics.travel_unit, physics.displacement_scale) for row in rows]
+    return [Channel(*row, physics.travel_unit, physics.displacement_scale) for row in rows]
 
 
 def available(physics: DevicePhysics, sample_time: float | None = None) -> frozenset[str]:
-    """What a device offers to an effect's law, in the words of `Effect.needs`."""
+    """What a device offers to an effect's law, in the words of `Effect.requires`."""
     heated, balanced = _has_heaters(physics), isinstance(physics, BalancedPhysics)
     present = {
         "unheated": not heated, "heat": heated, "state": heated,

@@ -17,7 +17,6 @@ from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER
 from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT, STATISTICS
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record, Recording
@@ -76,14 +75,16 @@ class Fit:
         return found
 
     def nested_case(self, cause: int) -> str | None:
-        """The effect that a cause may as well be, its law's `special` case inside the 95 % interval."""
+        """The effect that a cause may as well be, its law's nested case lies inside the 95 % interval."""
         hypothesis = self.structure.causes[cause]
-        if hypothesis.effect == PARAMETER or hypothesis.law.special is None:
+        nested = hypothesis.prior.nested_case
+        if nested is None:
             return None
-        effect, name, value = hypothesis.law.special
-        i = next(i for i, u in enumerate(self.structure.free_parameters) if u.cause == cause and u.name == name)
+        i = next(
+            i for i, u in enumerate(self.structure.free_parameters) if u.cause == cause and u.name == nested.parameter
+        )
         sd = np.sqrt(max(self.covariance[i, i], 0.0))
-        return effect if abs(self.theta[i] - value) <= STATISTICS.z_95 * sd else None
+        return nested.effect if abs(self.theta[i] - nested.value) <= STATISTICS.z_95 * sd else None
 
 
 class Fitter:

@@ -23,7 +23,7 @@ from ctrlgen.diagnosis.hypotheses.hypotheses import (
     written,
 )
 from ctrlgen.diagnosis.settings import FIT
-from ctrlgen.effects import Param, Where
+from ctrlgen.effects import Channel, Param
 from ctrlgen.model.assembly import movable
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Recording
@@ -78,23 +78,24 @@ class Structure:
         return replace(self, starts=(*self.starts[:index], start, *self.starts[index + 1 :]))
 
     @property
-    def rarity(self) -> float:
-        """Of its causes."""
-        return sum(c.law.rarity for c in self.causes if c.effect != PARAMETER)
+    def log_prior_odds(self) -> float:
+        """The sum over its causes."""
+        return sum(c.prior.log_prior_odds for c in self.causes)
 
-    def usual(self, unknown: FreeParameter) -> tuple[float, float] | None:
+    def plausible_range(self, unknown: FreeParameter) -> tuple[float, float] | None:
         """The range [SI] outside of which an amplitude means something else than its effect's name says."""
         cause = self.causes[unknown.cause]
-        p = None if cause.effect == PARAMETER else cause.law.amplitude()
-        if p is None or p.usual is None:
+        if cause.effect == PARAMETER:
             return None
-        return tuple(self.channel_of(cause).si(end, p) for end in p.usual)
+        p = cause.law.amplitude()
+        plausible = cause.prior.of(p).plausible_range
+        return None if plausible is None else tuple(self.channel_of(cause).si(end, p) for end in plausible)
 
-    def channel_of(self, cause: Hypothesis) -> Where:
+    def channel_of(self, cause: Hypothesis) -> Channel:
         """The channel at which a cause acts; the first one where it acts at all of them."""
-        where = channels(nominal_physics(self.device), cause.law.place)
-        here = where[0] if cause.at == "all" else next(w for w in where if w.channel == cause.at)
-        return here if cause.of is None else here.beside(next(w for w in where if w.channel == cause.of))
+        every = {c.name: c for c in channels(nominal_physics(self.device), cause.law.place)}
+        own = next(iter(every.values())) if cause.at == "all" else every[cause.at]
+        return own if cause.of is None else own.paired_with(every[cause.of])
 
     @cached_property
     def device_with_causes(self) -> Device:
@@ -106,10 +107,10 @@ class Structure:
                 low, high = _reach(number)
                 values[cause.path] = min(max(start["value"], low), high)  # a stage of negative size cannot be built
                 continue
-            where = self.channel_of(cause)
+            channel = self.channel_of(cause)
             law = cause.law
             numbers_ = {
-                p.name: written(_inside(_settled(start[p.name], p, where), p, where), where.unit_of(p))
+                p.name: written(_inside(_fixed(start[p.name], p, cause, channel), p, channel), channel.unit_of(p))
                 for p in law.params
             }
             added.append(law(cause.at, numbers_, cause.of))
@@ -145,12 +146,12 @@ class Structure:
                     )
                 )
                 continue
-            where, law = self.channel_of(cause), cause.law
+            channel, law = self.channel_of(cause), cause.law
             for p in law.params:
-                if p.expected:  # it is so or it is not: nothing to fit
+                if cause.prior.of(p).fixed_range:  # present or absent: nothing to fit
                     continue
-                low, high = cause.bounds(p, where)
-                off = 0.0 if p.off is None else where.si(p.off, p)
+                low, high = cause.bounds(p, channel)
+                off = 0.0 if p.off is None else channel.si(p.off, p)
                 size = (
                     max(abs(start[p.name] - off), 1e-6 * (high - low))
                     if p.off is not None
@@ -159,7 +160,7 @@ class Structure:
                 rows.append(
                     FreeParameter(
                         f"effect[{k}].{p.name}",
-                        where.unit_of(p),
+                        channel.unit_of(p),
                         off,
                         low,
                         high,
@@ -198,13 +199,14 @@ class Structure:
         return found
 
 
-def _settled(value: float, p: Param, where: Where) -> float:
-    """The middle of the range that an amplitude is expected in, where it is; else the value."""
-    return value if p.expected is None else where.si(sum(p.expected) / 2, p)
+def _fixed(value: float, p: Param, cause: Hypothesis, channel: Channel) -> float:
+    """The middle of the range in which an amplitude is fixed; the value where it is free."""
+    fixed = cause.prior.of(p).fixed_range
+    return value if fixed is None else channel.si(sum(fixed) / 2, p)
 
 
-def _inside(value: float, p: Param, where: Where) -> float:
-    low, high = (where.si(b, p) for b in p.bounds)
+def _inside(value: float, p: Param, channel: Channel) -> float:
+    low, high = (channel.si(b, p) for b in p.bounds)
     return min(max(value, low), high)
 
 

@@ -32,7 +32,7 @@ def with_probes(device: Device, physics: DevicePhysics) -> tuple[Device, dict[tu
     for place in Place:
         if place is Place.HEAT and "heat" not in available(physics):
             continue
-        for i, where in enumerate(channels(physics, place)):
+        for i, channel in enumerate(channels(physics, place)):
             paths[place, i] = f"effect[{len(device.effect) + len(probes)}].delta"
-            probes.append(_Probe(place, where.channel, where.unit))
+            probes.append(_Probe(place, channel.name, channel.unit))
     return device.model_copy(update={"effect": (*device.effect, *probes)}), paths

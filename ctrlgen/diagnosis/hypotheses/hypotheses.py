@@ -12,8 +12,9 @@ from itertools import product
 from ctrlgen.core.units import Quantity, from_si
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.base import Section
+from ctrlgen.diagnosis.hypotheses.priors import DEFAULT, LawPrior, prior_of
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
-from ctrlgen.effects import Effect, Param, Place, Where
+from ctrlgen.effects import Channel, Effect, Param, Place
 from ctrlgen.model.effect_terms import available, channels
 
 DOMAIN = {
@@ -24,13 +25,15 @@ PARAMETER = "parameter"
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What the records show at one place, SI: the `most` that the signal ("channel"), the displacement ("travel") and its
-    rate ("travel/s") reach, and a part of the records' time ("s"): a limit beyond shows nowhere. `suggested`: frequencies
-    ("lines") that stand out of what is left over, paths after which it repeats ("pitches"), places of the path at which it
-    jumps ("places"), times between which it may change ("moments")."""
+class DataHints:
+    """What the recording shows at one channel [SI]: where the search may start.
 
-    most: dict[str, float] = field(default_factory=dict)
+    peaks: the largest value of the signal ("channel"), of the displacement ("travel") and of its rate ("travel/s"), and a
+        twelfth of the duration ("s"). A limit beyond the peak leaves no trace in the recording.
+    suggested: start values by the names of `ParameterPrior.start_from_data`, and the "lines" [Hz] of the residual's spectrum.
+    """
+
+    peaks: dict[str, float] = field(default_factory=dict)
     suggested: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 
@@ -61,49 +64,60 @@ class Hypothesis:
         there = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
         if not there:
             return self
-        several = self.effect != PARAMETER and self.law.several
+        several = self.prior.repeatable
         return replace(self, count=1 + max(c.count for c in there)) if several else None
 
     @property
     def family(self) -> str | None:
-        """Of the effect."""
-        return None if self.effect == PARAMETER else self.law.family
+        """The family of laws of which a place has at most one; None where the law belongs to none."""
+        return self.prior.family
+
+    @property
+    def prior(self) -> LawPrior:
+        """What the search believes of the law; the default for a number of the device."""
+        return DEFAULT if self.effect == PARAMETER else prior_of(self.law)
 
     @property
     def law(self) -> type[Effect]:
         """The effect's class. Raises KeyError for a parameter."""
         return Effect.library[self.effect]
 
-    def shapes(self, where: Where, seen: Seen) -> list[dict[str, float]]:
-        """Every combination of the values tried of the shape parameters [SI]; one empty one for laws without shape."""
+    def shapes(self, channel: Channel, hints: DataHints) -> list[dict[str, float]]:
+        """Every combination of start values of the shape parameters, which are all but the amplitude [SI].
+
+        A law without shape parameters has one empty combination.
+        """
         shaped = [p for p in self.law.params if p is not self.law.amplitude()]
-        grids = [self._tried(p, where, seen) for p in shaped]
-        return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*grids)]
+        starts = [self._starts(p, channel, hints) for p in shaped]
+        return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*starts)]
 
-    def secants(self, where: Where, seen: Seen) -> list[float]:
-        """The amplitudes [SI] to which the slope from `off` is taken too, where the law bends at once."""
+    def secants(self, channel: Channel, hints: DataHints) -> list[float]:
+        """The amplitudes [SI] to which the law is linearised from `off` too, where its prior gives some."""
         p = self.law.amplitude()
-        return self._tried(p, where, seen) if p.grid else []
+        return self._starts(p, channel, hints) if self.prior.of(p).start_values else []
 
-    def _tried(self, p: Param, where: Where, seen: Seen) -> list[float]:
-        """The grid of a parameter and what the records suggest beside it [SI]."""
-        low, high = self.bounds(p, where)
-        if p.level and p.unit in seen.most:
-            return [min(max(value * seen.most[p.unit], low), high) for value in p.grid]
-        suggested = [*seen.suggested.get(p.seen, ()), *(seen.suggested.get("lines", ()) if p.unit == "Hz" else ())]
-        grid = p.grid or (() if suggested else (sum(p.bounds) / 2,))
-        tried = [*(where.si(value, p) for value in grid), *(value for value in suggested if value >= low)]
+    def _starts(self, p: Param, channel: Channel, hints: DataHints) -> list[float]:
+        """Start values of one parameter [SI], those that the recording suggests included."""
+        low, high = self.bounds(p, channel)
+        prior = self.prior.of(p)
+        if prior.scales_with_peak and p.unit in hints.peaks:
+            return [min(max(value * hints.peaks[p.unit], low), high) for value in prior.start_values]
+        suggested = [
+            *hints.suggested.get(prior.start_from_data, ()),
+            *(hints.suggested.get("lines", ()) if p.unit == "Hz" else ()),
+        ]
+        starts = prior.start_values or (() if suggested else (sum(p.bounds) / 2,))
+        tried = [*(channel.si(value, p) for value in starts), *(value for value in suggested if value >= low)]
         return [value for value in tried if value <= high] or [(low + high) / 2]
 
-    def bounds(self, p: Param, where: Where) -> tuple[float, float]:
-        """Of a parameter [SI], here and with these samples."""
-        low, high = (where.si(b, p) for b in p.bounds)
+    def bounds(self, p: Param, channel: Channel) -> tuple[float, float]:
+        """The bounds of a parameter [SI] at this channel and this sampling rate."""
+        low, high = (channel.si(b, p) for b in p.bounds)
         if p.unit == "Hz":
             return low, max(low, min(high, self.highest))
-        if p.unit == "s" and p.level and self.law.place is not Place.SENSOR:
-            low = min(
-                high, max(low, CANDIDATE_TERMS.highest_frequency / self.highest)
-            )  # within a sample a motion shows the middle of a change, not its length
+        if p.unit == "s" and self.prior.of(p).scales_with_peak and self.law.place is not Place.SENSOR:
+            # An actuated change within one sample shows its middle in the motion, not its duration.
+            low = min(high, max(low, CANDIDATE_TERMS.highest_frequency / self.highest))
         return low, high
 
 
@@ -119,26 +133,25 @@ def _of_law(
     law: type[Effect], physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
 ) -> Iterator[Hypothesis]:
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
-    if not law.needs <= there or (law.place is Place.HEAT and "heat" not in there):
+    if not law.requires <= there or (law.place is Place.HEAT and "heat" not in there):
         return
-    domain = law.domain or DOMAIN[law.place]
+    prior = prior_of(law)
+    domain = prior.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
     places = channels(physics, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
-        places = [where for where in places if where.channel in seen]
+        places = [channel for channel in places if channel.name in seen]
     if law.pairs:
-        for k, where in enumerate(places):
+        for k, channel in enumerate(places):
             for j, other in enumerate(channels(physics, law.place)):
-                if law.fits(where.beside(other)) and not (law.mutual and j < k):
-                    yield Hypothesis(
-                        law.kind, f"{domain}:{where.channel}", where.channel, other.channel, highest=highest
-                    )
+                if law.applies_to(channel.paired_with(other)) and not (law.symmetric and j < k):
+                    yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, other.name, highest=highest)
         return
-    fitting = [where for where in places if law.fits(where)]
-    for where in () if law.whole else fitting:
-        yield Hypothesis(law.kind, f"{domain}:{where.channel}", where.channel, highest=highest)
-    if law.whole or (len(fitting) > 1 and law.place is not Place.SENSOR):
+    fitting = [channel for channel in places if law.applies_to(channel)]
+    for channel in () if prior.acts_on_all else fitting:
+        yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest)
+    if prior.acts_on_all or (len(fitting) > 1 and law.place is not Place.SENSOR):
         yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
 
 

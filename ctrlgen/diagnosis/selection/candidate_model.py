@@ -23,7 +23,7 @@ class Trial:
 
     @property
     def price(self) -> float:
-        """Of its numbers and of the rarity of its causes."""
+        """Of its numbers and of the prior odds of its causes."""
         return self.total - self.fit.objective - self.held
 
 

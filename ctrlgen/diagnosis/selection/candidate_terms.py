@@ -16,7 +16,7 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, Seen, nominal_physics
+from ctrlgen.diagnosis.hypotheses.hypotheses import DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect, Place
 from ctrlgen.model.effect_terms import channels
@@ -86,7 +86,7 @@ class Laws:
 
     def __init__(
         self, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
-        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], Seen],
+        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], DataHints],
     ) -> None:  # fmt: skip
         self.simulator = simulator
         self.terms: list[_Term] = []
@@ -98,19 +98,19 @@ class Laws:
         h: Hypothesis,
         structure: Structure,
         probes: dict[tuple[Place, int], int],
-        seen: Callable[[Place, int], Seen],
+        seen: Callable[[Place, int], DataHints],
     ) -> Iterator[Column]:
         law, where = h.law, structure.channel_of(h)
-        names = [w.channel for w in channels(nominal_physics(structure.device), law.place)]
+        names = [c.name for c in channels(nominal_physics(structure.device), law.place)]
         partner = names.index(h.of) if h.of else None
         at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
-        if law.mutual:
+        if law.symmetric:
             at += [(partner, i) for i, _ in at]
         amplitude = law.amplitude()
         low, high = (where.si(b, amplitude) for b in amplitude.bounds)
         off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
         side = 1 if off <= low else -1 if off >= high else 0
-        meant = amplitude.expected or (low - off, high - off)
+        meant = h.prior.of(amplitude).fixed_range or (low - off, high - off)
         span = (meant[0] / size, meant[1] / size)
         entered = tuple(probes[law.place, i] for i, _ in at)
         here = seen(law.place, at[0][0])
@@ -128,7 +128,7 @@ class Laws:
             states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
-            s = self.simulator.model.law_inputs(law.place, i, partner, states, law.stage)
+            s = self.simulator.model.law_inputs(law.place, i, partner, states, law.order)
             new = law.update(s, p)
             s.__dict__.update(new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)

@@ -11,11 +11,12 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import difference, show
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
 from ctrlgen.diagnosis.selection.diagnosis import Finding
 from ctrlgen.diagnosis.selection.direct_detection import named
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
-from ctrlgen.effects import Effect, Place, Where
+from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Recording
 
@@ -49,25 +50,25 @@ def alive(device: Device, recording: Recording) -> Alive:
     structure = Structure(device)
     simulators = structure.simulators(recording, {})
     foreseen = [simulators[r.sample_time, r.linear].simulate(r, structure.start) for r in moving]
-    places = {f"reading.{w.channel}": w for w in channels(nominal_physics(device), Place.SENSOR)}
+    places = {f"reading.{c.name}": c for c in channels(nominal_physics(device), Place.SENSOR)}
     findings, said = [], []
     for i, level in dead.items():
         name, unit = recording.channels[i], recording.units[i]
         way = float(np.ptp(np.concatenate([y[:, i] for y in foreseen])))
         moves = f"the device as described moves it by {way * difference(1.0, unit):.3g} {unit}"
         said.append(f"{name}: reads {show(level, unit)} throughout, {moves}; it is left out of every fit.")
-        where = places.get(name)
-        if where is not None and way > DIRECT_DETECTION.dead_motion * where.scale:
-            findings += [named(law, where, read) for law, read in _laws(where, values[i])]
+        channel = places.get(name)
+        if channel is not None and way > DIRECT_DETECTION.dead_motion * channel.scale:
+            findings += [named(law, channel, read) for law, read in _laws(channel, values[i])]
     return Alive(
         _only(recording, [i for i in range(len(recording.channels)) if i not in dead]), tuple(findings), tuple(said)
     )
 
 
-def _laws(where: Where, values: np.ndarray) -> Iterator[tuple[type[Effect], dict[str, float]]]:
+def _laws(channel: Channel, values: np.ndarray) -> Iterator[tuple[type[Effect], dict[str, float]]]:
     """What reads one number throughout, by the laws of a sensor that read themselves off."""
     for law in Effect.library.values():
-        if law.place is Place.SENSOR and law.fits(where) and (seen := law.read_off(values)) is not None:
+        if law.place is Place.SENSOR and law.applies_to(channel) and (seen := detect_directly(law, values)) is not None:
             yield law, seen[0]
 
 

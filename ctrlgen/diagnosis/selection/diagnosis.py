@@ -167,9 +167,9 @@ def loose(fitter: Fitter, search: Search) -> bool:
 
 
 def tolerated(search: Search) -> float:
-    """The share of the mismatch that the chosen causes may leave: what the form of the roughest of their laws may."""
+    """The share of the mismatch that the chosen causes may leave: the largest model-form error of their laws."""
     causes = search.chosen.fit.structure.causes
-    return max([VERDICT.model_form_error, *(c.law.rough for c in causes if c.effect != PARAMETER)])
+    return max([VERDICT.model_form_error, *(c.prior.model_form_error for c in causes)])
 
 
 def remaining(fitter: Fitter, search: Search) -> float:
@@ -218,7 +218,7 @@ def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
     for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
         if unknown.amplitude and cause.effect != PARAMETER:
-            s = np.hypot(s, cause.law.rough * (value - unknown.nominal))
+            s = np.hypot(s, cause.prior.model_form_error * (value - unknown.nominal))
         ends = (value, max(value - STATISTICS.z_95 * s, unknown.low), min(value + STATISTICS.z_95 * s, unknown.high))
         value, low, high = (float(from_si(v, unknown.unit)) for v in ends)
         if unknown.path in profiled:
@@ -240,8 +240,8 @@ def findings(search: Search, profiles: tuple[Profile, ...] = ()) -> tuple[Findin
             if unknown.cause == k
         }
         for p in () if cause.effect == PARAMETER else cause.law.params:
-            if p.expected:
-                middle = sum(p.expected) / 2
+            if fixed := cause.prior.of(p).fixed_range:
+                middle = sum(fixed) / 2
                 parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
         rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
         source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source

@@ -9,11 +9,12 @@ import numpy as np
 
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_model import Search
 from ctrlgen.diagnosis.selection.diagnosis import Estimate, Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
-from ctrlgen.effects import Effect, Place, Where
+from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.model.effect_terms import channels
 
 
@@ -24,30 +25,30 @@ def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
         return ()
     known = {(e.kind, e.at) for e in structure.device.effect} | {(c.effect, c.at) for c in structure.causes}
     found = []
-    for where in channels(nominal_physics(structure.device), Place.SENSOR):
-        name = f"reading.{where.channel}"
+    for channel in channels(nominal_physics(structure.device), Place.SENSOR):
+        name = f"reading.{channel.name}"
         if name not in recording.channels:
             continue
         i = recording.channels.index(name)
         values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
         for law in Effect.library.values():
-            seen = law.read_off(values) if law.place is Place.SENSOR and law.fits(where) else None
+            seen = detect_directly(law, values) if law.place is Place.SENSOR and law.applies_to(channel) else None
             if (
                 seen is None
                 or seen[1] < DIRECT_DETECTION.noticed * fitter.noise.floor[i]
-                or {(law.kind, where.channel), (law.kind, "all")} & known
+                or {(law.kind, channel.name), (law.kind, "all")} & known
             ):
                 continue
-            found.append(named(law, where, seen[0]))
+            found.append(named(law, channel, seen[0]))
     return tuple(found)
 
 
-def named(law: type[Effect], where: Where, values: dict[str, float]) -> Finding:
+def named(law: type[Effect], channel: Channel, values: dict[str, float]) -> Finding:
     """A sensor's law with parameters [SI] that were not fitted."""
     parameters = {}
     for p in law.params:
-        unit = where.unit_of(p)
+        unit = channel.unit_of(p)
         value = float(from_si(values[p.name], unit))
         parameters[p.name] = Estimate(value, (value, value), unit)
-    cause = Hypothesis(law.kind, f"{DOMAIN[Place.SENSOR]}:{where.channel}", where.channel)
+    cause = Hypothesis(law.kind, f"{DOMAIN[Place.SENSOR]}:{channel.name}", channel.name)
     return Finding(law.kind, cause.location, parameters, (), 0.0, law.source, cause)

@@ -8,8 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.settings import LINE_RESOLVABILITY
+from ctrlgen.effects import Param
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
 
@@ -22,7 +24,7 @@ def resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()
         return False
     for j, k in combinations(range(len(causes)), 2):
         a, b = causes[j], causes[k]
-        if a.effect == PARAMETER or not a.law.several or (a.effect, a.location) != (b.effect, b.location):
+        if a.effect == PARAMETER or not a.prior.repeatable or (a.effect, a.location) != (b.effect, b.location):
             continue
         if a in accepted and b in accepted:
             continue
@@ -40,18 +42,23 @@ def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> bool:
         return False
     i = recording.channels.index(channel)
     values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
-    read, *_ = cause.law.read_off(values) or ({},)
-    steps = (p.name for p in cause.law.params if p.off is None and (p.seen == "pitches" or p.name in read))
+    read, *_ = detect_directly(cause.law, values) or ({},)
+    steps = (p.name for p in cause.law.params if p.off is None and (_is_spatial_period(cause, p) or p.name in read))
     return any(fit.values(k)[name] < LINE_RESOLVABILITY.shortest_period * quantisation_step(values) for name in steps)
+
+
+def _is_spatial_period(cause: Hypothesis, p: Param) -> bool:
+    return cause.prior.of(p).start_from_data == "spatial_periods"
 
 
 def _line(fit: Fit, k: int) -> float:
     """Periods a second, or a unit of the path, of cause k; zero for one that has none."""
     values = fit.values(k)
-    for p in fit.structure.causes[k].law.params:
+    cause = fit.structure.causes[k]
+    for p in cause.law.params:
         if p.unit == "Hz":
             return values[p.name]
-        if p.seen == "pitches":
+        if _is_spatial_period(cause, p):
             return 1 / values[p.name]
     return 0.0
 
@@ -63,7 +70,7 @@ def _covered(recording: Recording, cause: Hypothesis) -> float:
     if any(p.unit == "Hz" for p in params):
         return max(float(r.time[-1] - r.time[0]) for r in records)
     channel = f"reading.{cause.at}"
-    if not any(p.seen == "pitches" for p in params) or channel not in recording.channels:
+    if not any(_is_spatial_period(cause, p) for p in params) or channel not in recording.channels:
         return np.inf
     i = recording.channels.index(channel)
     read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])

@@ -1,7 +1,7 @@
 """Step 8: what a structure is worth beside another: on the records to fit, on those held out, at the price of its numbers.
 
 T = objective on the records to fit + BIC's price of their numbers + -2 ln of how likely they make the held-out records,
-where nothing was fitted, + twice the rarity of their causes: among equals the plainer one is named.
+where nothing was fitted, - twice the log prior odds of their causes: among equals the plainer one is named.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Weighing:
         """A fit with what the held-out records and the price of its numbers say."""
         structure, held = fit.structure, self.fitter.held_out_deviance(fit)
         price = sum(u.cause is not None for u in structure.free_parameters) * np.log(max(self.n_fit, 2))
-        price += 2 * structure.rarity
+        price -= 2 * structure.log_prior_odds
         return Trial(fit, held, fit.objective + price + held, cause)
 
     def ahead(self, a: Trial, b: Trial) -> float:
@@ -61,7 +61,7 @@ class Weighing:
             first = t if self.ahead(t, first) > 0 else first
         numbers = len(first.fit.structure.free_parameters)
         alike = [t for t in better if self.ahead(first, t) <= 0 and len(t.fit.structure.free_parameters) <= numbers]
-        return min(alike, key=lambda t: (t.fit.structure.rarity, t.total), default=first)
+        return min(alike, key=lambda t: (-t.fit.structure.log_prior_odds, t.total), default=first)
 
     @staticmethod
     def hides(fit: Fit) -> bool:
@@ -87,8 +87,8 @@ class Weighing:
         for unknown, value in zip(structure.free_parameters, trial.fit.theta, strict=True):
             if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
                 continue
-            usual = structure.usual(unknown)
-            if usual and not usual[0] <= value <= usual[1]:
+            plausible = structure.plausible_range(unknown)
+            if plausible and not plausible[0] <= value <= plausible[1]:
                 return False
             span = 1e-6 * (unknown.high - unknown.low)
             if value >= unknown.high - span or (value <= unknown.low + span and unknown.low != unknown.nominal):
@@ -162,11 +162,10 @@ class Weighing:
             Structure(current.fit.structure.device), steps=40
         )  # without one alone a fit may leave the numbers
         for j, cause in enumerate(current.fit.structure.causes):
-            rough = 0.0 if cause.effect == PARAMETER else cause.law.rough
-            if rough:
+            if form_error := cause.prior.model_form_error:
                 without = self.trial(cooled(current.fit).without(j))
                 held = min(without.held, most.held) - current.held
                 fitted = min(without.fit.objective, most.fit.objective) - current.fit.objective
-                if squares < (rough * times) ** 4 * max(held, 0.0) * max(fitted, 0.0):
+                if squares < (form_error * times) ** 4 * max(held, 0.0) * max(fitted, 0.0):
                     return True
         return False

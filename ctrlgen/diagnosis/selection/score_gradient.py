@@ -14,7 +14,7 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_physics
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import Column, Laws
 from ctrlgen.diagnosis.selection.ltv_propagation import Spread
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
@@ -51,7 +51,7 @@ class Slopes:
         fit: Fit,
         record: Record,
         hypotheses: list[Hypothesis],
-        seen: Callable[[Place, int], Seen],
+        seen: Callable[[Place, int], DataHints],
     ) -> None:
         self.fitter, self.record = fitter, record
         probed, probes = with_probes(fit.structure.device_with_causes, nominal_physics(fit.structure.device))

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, Seen, nominal_physics
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import Column, Peaks, peaks
 from ctrlgen.diagnosis.selection.score_gradient import Slopes, Sums
 from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
@@ -81,7 +81,7 @@ class Screen:
             columns, sums, U.T @ fit.residual, np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
         )
 
-    def _seen(self, fit: Fit) -> Callable[[Place, int], Seen]:
+    def _seen(self, fit: Fit) -> Callable[[Place, int], DataHints]:
         """What the records show at each place, after what `fit` explains."""
         if self.peaks is None:
             self.peaks = peaks(self.fitter, fit)
@@ -89,8 +89,8 @@ class Screen:
         moments, part = self._moments()
         common = {"lines": self._lines(fit), "moments": moments}
 
-        def at(place: Place, i: int) -> Seen:
-            return Seen(most.get((place, i), {}) | {"s": part}, common | along.get((place, i), {}))
+        def at(place: Place, i: int) -> DataHints:
+            return DataHints(most.get((place, i), {}) | {"s": part}, common | along.get((place, i), {}))
 
         return at
 
@@ -123,12 +123,14 @@ class Screen:
         record = max(records, key=lambda r: r.valid.size)
         foreseen, behind = (self.fitter.predict(each, record) for each in (fit, _read_truly(fit)))
         left = record.observed - foreseen
-        names = [w.channel for w in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
+        names = [c.name for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         return {
             (Place.SENSOR, names.index(name)): {
-                "pitches": both(pitches(y[good, i], left[good, i]) for y in (record.observed, foreseen, behind)),
-                "places": jumps(record.observed[good, i], left[good, i]),
+                "spatial_periods": both(
+                    pitches(y[good, i], left[good, i]) for y in (record.observed, foreseen, behind)
+                ),
+                "jump_positions": jumps(record.observed[good, i], left[good, i]),
             }
             for i, name in read
             if name in names and np.any(good := record.valid[:, i] & np.isfinite(left[:, i]))

@@ -1,0 +1,88 @@
+"""The numbers of a law, and what their units mean at one channel of a device."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+from ctrlgen.core.units import split_unit, to_si
+
+PLACEHOLDERS = ("channel", "travel", "partner")
+
+
+@dataclass(frozen=True)
+class Param:
+    """One number of a law: `bounds` in its `unit`; at `off` the whole effect vanishes (of one parameter, the amplitude).
+
+    In `unit` the word `channel` stands for the unit of the signal that the effect acts on, `travel` for that of the stage
+    displacement, and `partner` for that of the other channel of a pair. Bounds then count in typical sizes of these signals,
+    so that one law serves micrometres and degrees.
+    """
+
+    name: str
+    unit: str
+    bounds: tuple[float, float]
+    doc: str
+    off: float | None = None
+
+    @property
+    def relative(self) -> bool:
+        """Whether the unit depends on where the effect acts."""
+        return _is_relative(self.unit)
+
+
+@dataclass(frozen=True)
+class State:
+    """A memory of the effect, zero at rest; `scale` is a typical size in `unit`, counted as in `Param`.
+
+    A `stepped` one changes once a sample, by `update`; a `clock` is the time since the record's common zero.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    stepped: bool = False
+    clock: bool = False
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel an effect can act on: unit and typical size (SI) of its signal and of the stage displacement."""
+
+    name: str
+    unit: str
+    scale: float
+    travel_unit: str
+    travel_scale: float
+    partner: str | None = None
+    partner_unit: str = "1"
+    partner_scale: float = 1.0
+
+    def paired_with(self, other: Channel) -> Channel:
+        """The same channel as the first one of a pair."""
+        return replace(self, partner=other.name, partner_unit=other.unit, partner_scale=other.scale)
+
+    def unit_of(self, number: Param | State) -> str:
+        """The unit of a law's number at this channel, such as 'N/um^3' for 'channel/travel^3'."""
+        units = dict(zip(PLACEHOLDERS, (self.unit, self.travel_unit, self.partner_unit), strict=True))
+
+        def own(word: re.Match[str]) -> str:
+            unit = units[word[0]]
+            return unit if unit.isalnum() or number.unit == word[0] else f"({unit})"
+
+        return re.sub("|".join(PLACEHOLDERS), own, number.unit)
+
+    def si(self, value: float, number: Param | State) -> float:
+        """A bound, a start value or a scale of a law's number, in SI at this channel."""
+        if not _is_relative(number.unit):
+            return to_si(value, number.unit)
+        powers, rest = split_unit(number.unit, PLACEHOLDERS)
+        sizes = zip(PLACEHOLDERS, (self.scale, self.travel_scale, self.partner_scale), strict=True)
+        size = 1.0
+        for word, scale in sizes:
+            size *= scale ** powers.get(word, 0.0)
+        return float(to_si(value, rest) * size)
+
+
+def _is_relative(unit: str) -> bool:
+    return any(word in unit for word in PLACEHOLDERS)

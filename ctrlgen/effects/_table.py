@@ -1,0 +1,114 @@
+"""An [[effect]] table of a device file: its keys, units and bounds."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import PydanticCustomError, core_schema
+
+from ctrlgen.core.units import Quantity, read_quantity, same_dimension, show, to_si, written_unit
+from ctrlgen.effects._effect import Effect
+from ctrlgen.effects._parameter import PLACEHOLDERS, Channel, Param
+
+
+def read_effect(given: Any) -> Effect:
+    """The effect that a table describes. Raises ValueError naming everything that is wrong with the table.
+
+    Units that depend on the channel are checked by `faults_at`, once the device is known.
+    """
+    if isinstance(given, Effect):
+        return given
+    if not isinstance(given, dict):
+        raise ValueError("an effect is a table: [[effect]] with kind, at and its parameters")
+    kind = given.get("kind")
+    if not isinstance(kind, str) or kind not in Effect.library:
+        raise ValueError(f"kind = {kind!r} is not a known effect; known are: {', '.join(sorted(Effect.library))}")
+    law = Effect.library[kind]
+    keys = ["kind", "at", *(["of"] if law.pairs else []), *(p.name for p in law.params)]
+    faults = [f"unknown key {key!r} (has: {', '.join(keys[1:])})" for key in given if key not in keys]
+    at, of = given.get("at"), given.get("of")
+    if not isinstance(at, str):
+        faults.append(f'at is missing: name the {law.place.value} channel, such as at = "1X", or "all"')
+    if law.pairs and not isinstance(of, str):
+        faults.append(f'of is missing: name the other {law.place.value} channel, such as of = "1Y"')
+    values = {}
+    for param in law.params:
+        try:
+            values[param.name] = _read_parameter(param, given)
+        except ValueError as error:
+            faults.append(str(error))
+    if faults:
+        raise ValueError(f"{kind}: " + "; ".join(faults))
+    return law(str(at), values, of)
+
+
+def _read_parameter(param: Param, given: dict[str, Any]) -> Quantity:
+    if param.name not in given:
+        unit = param.unit
+        for word in PLACEHOLDERS:
+            unit = unit.replace(word, "um")
+        example = f"{param.bounds[1]:g} {unit}".removesuffix(" 1")
+        raise ValueError(f'{param.name} is missing ({param.doc}); write for example {param.name} = "{example}"')
+    try:
+        number = read_quantity(None if param.relative else param.unit, given[param.name])
+    except ValueError as error:
+        raise ValueError(f"{param.name}: {error}") from error
+    if not param.relative:
+        low, high = (to_si(bound, param.unit) for bound in param.bounds)
+        if not _is_between(number.si, low, high):
+            raise ValueError(_outside(param, number, low, high, param.unit))
+    return number
+
+
+def faults_at(effect: Effect, channel: Channel) -> list[tuple[str, str]]:
+    """(parameter, what is wrong with it) for units and bounds that depend on the channel."""
+    found = []
+    for param in effect.params:
+        if not param.relative:
+            continue
+        number, unit = effect.values[param.name], channel.unit_of(param)
+        low, high = (channel.si(bound, param) for bound in param.bounds)
+        if not same_dimension(written_unit(number.text), unit):
+            found.append((param.name, f"{number.text!r} has the wrong unit at {channel.name}: {unit} is needed"))
+        elif not _is_between(number.si, low, high):
+            found.append((param.name, _outside(param, number, low, high, unit)))
+    return found
+
+
+def _is_between(si: float, low: float, high: float) -> bool:
+    rounding = 1e-12 * max(abs(low), abs(high))  # conversion between units rounds
+    return low - rounding <= si <= high + rounding
+
+
+def _outside(param: Param, number: Quantity, low: float, high: float, unit: str) -> str:
+    return f"{param.name} = {number.text} is outside {show(low, unit)} ... {show(high, unit)}"
+
+
+class _TableReader:
+    """Tells pydantic how an [[effect]] table becomes an `Effect`."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        def validate(given: Any) -> Effect:
+            try:
+                return read_effect(given)
+            except ValueError as error:
+                raise PydanticCustomError("effect", "{message}", {"message": str(error)}) from error
+
+        return core_schema.no_info_plain_validator_function(validate)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """An [[effect]] table; the keys beside `kind`, `at` and `of` are the parameters of that kind of effect."""
+        kinds = {"type": "string", "enum": sorted(Effect.library)}
+        text = {"type": "string"}
+        return {
+            "type": "object",
+            "title": "effect",
+            "properties": {"kind": kinds, "at": text, "of": text},
+            "required": ["kind", "at"],
+        }
+
+
+EffectTable = Annotated[Effect, _TableReader()]

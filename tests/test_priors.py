@@ -1,0 +1,65 @@
+"""The table of what the search believes of each law: it fits the laws, and a law without a row is found all the same."""
+
+from __future__ import annotations
+
+import pytest
+
+from ctrlgen.diagnosis.hypotheses.priors import DEFAULT, PRIORS, LawPrior, default_starts, prior_of
+from ctrlgen.effects import Effect, Param
+
+STARTS_FROM_DATA = {"", "moments", "spatial_periods", "jump_positions"}
+every_law = pytest.mark.parametrize("law", Effect.library.values(), ids=Effect.library)
+
+
+def test_every_row_is_of_a_law_and_has_a_reason():
+    assert set(PRIORS) <= set(Effect.library)
+    assert all(row.reason for row in PRIORS.values())
+
+
+@every_law
+def test_a_row_names_parameters_of_its_law(law):
+    assert set(prior_of(law).parameters) <= {p.name for p in law.params}
+
+
+@every_law
+def test_a_shape_parameter_has_somewhere_to_start_inside_its_bounds(law):
+    for p in law.params:
+        prior = prior_of(law).of(p)
+        assert p.off is not None or prior.start_values or prior.start_from_data
+        assert all(p.bounds[0] <= value <= p.bounds[1] for value in prior.start_values)
+        assert prior.start_from_data in STARTS_FROM_DATA
+
+
+@every_law
+def test_only_an_amplitude_is_fixed_or_limited_to_what_is_plausible(law):
+    for p in law.params:
+        prior = prior_of(law).of(p)
+        for low, high in filter(None, (prior.fixed_range, prior.plausible_range)):
+            assert p is law.amplitude()
+            assert p.bounds[0] <= low < high <= p.bounds[1]
+
+
+@every_law
+def test_a_nested_case_is_a_law_of_the_same_family_with_the_parameter_inside_its_bounds(law):
+    nested = prior_of(law).nested_case
+    if nested is None:
+        return
+    assert prior_of(Effect.library[nested.effect]).family == prior_of(law).family
+    p = next(p for p in law.params if p.name == nested.parameter)
+    assert p.bounds[0] <= nested.value <= p.bounds[1]
+
+
+def test_a_law_without_a_row_starts_at_three_values_spread_over_the_bounds():
+    time = Param("tau", "s", (1e-3, 1e3), "time constant")
+    assert DEFAULT.of(time).start_values == pytest.approx((1e-2, 1.0, 1e2))
+    skew = Param("skew", "1", (-3.0, 3.0), "to one side")
+    assert default_starts(skew) == pytest.approx((-2.0, 0.0, 2.0))
+    assert default_starts(Param("gain", "1", (-1.0, 1.0), "amplitude", off=0.0)) == ()
+
+
+def test_a_law_without_a_row_has_even_odds_and_an_exact_form():
+    class Unlisted(Effect, listed=False):
+        params = (Param("gain", "1", (-1.0, 1.0), "amplitude", off=0.0),)
+
+    assert prior_of(Unlisted) == LawPrior()
+    assert (DEFAULT.log_prior_odds, DEFAULT.model_form_error, DEFAULT.family) == (0.0, 0.0, None)
