@@ -222,7 +222,7 @@ def test_every_fault_is_said_at_once():
         "axes.slide: '1 um' is not of the dimension of '60 deg'", "drive.motor: '0 V' is no size", "state.hot",
         "force: asks for 'q'", "p has no 'wieght'; did you mean 'weight'?",
         "damping_force: returns 'z'", "damping_force: returns no 'slide'",
-        "mass: contains the symbol 'strange'", "pose: is missing", "'nope' is not an effect",
+        "mass: contains the symbol 'strange'", "pose: is missing", "'nope' is not a known effect",
     ):  # fmt: skip
         assert part in text, part
 
