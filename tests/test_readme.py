@@ -1,4 +1,4 @@
-"""The README shows what the program prints."""
+"""README and tutorial show what the program prints."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from conftest import ROOT
 
 import ctrlgen
 
-README = (ROOT / "README.md").read_text()
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+FIRMWARE = (ROOT / "docs" / "tutorial" / "first_firmware.md").read_text(encoding="utf-8")
 ROUNDING = re.compile(r"\d(\.\d+)?e-\d+( (rad|nm|W))?|0\.0\d* nm|0\.00\d+ nm")
 
 
-def block(language: str) -> str:
-    return re.search(rf"```{language}\n(.*?)```", README, re.DOTALL)[1]
+def block(language: str, page: str = README) -> str:
+    return re.search(rf"```{language}\n(.*?)```", page, re.DOTALL)[1]
 
 
 def same(text: str) -> list[str]:
@@ -30,7 +31,7 @@ def test_the_printed_output_is_the_programs(tmp_path, compiler):
         capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    shown, printed = same(block("text")), same(done.stdout.replace(str(out), "out/circle20"))
+    shown, printed = same(block("text", FIRMWARE)), same(done.stdout.replace(str(out), "out"))
     tools = re.compile(
         r"built strictly with [\w, ]+;|(not installed: not run)|\d+ of \d+ comparisons"
     )  # which compilers there are
@@ -42,15 +43,23 @@ def test_the_python_example_names_what_exists():
         assert hasattr(ctrlgen, name), name
 
 
-def test_every_path_in_the_readme_exists():
-    for path in re.findall(r"`((?:ctrlgen|codegen|tests|scenarios|benchmarks)/[\w/.*]+)`", README):
+def test_every_path_in_the_readme_and_the_documentation_exists():
+    pages = [README, *(path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md"))]
+    for path in re.findall(r"`((?:ctrlgen|codegen|tests|scenarios|benchmarks|docs)/[\w/.*]+)`", "\n".join(pages)):
         assert list(ROOT.glob(path)), path
 
 
-def test_every_module_stands_in_the_architecture():
-    for path in (ROOT / "ctrlgen").glob("*.py"):
-        if not path.stem.startswith("_"):
-            assert f"`{path.stem}`" in README, path.stem
+def test_every_link_of_the_readme_exists():
+    for path in re.findall(r"\]\(([\w/.]+)\)", README):
+        assert (ROOT / path).exists(), path
+
+
+def test_every_package_stands_in_the_architecture():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    for path in (ROOT / "ctrlgen").rglob("__init__.py"):
+        name = path.parent.relative_to(ROOT / "ctrlgen").as_posix().replace("/", ".")
+        if (name.count(".") == 0 and name != "") or name.startswith("diagnosis."):
+            assert f"`{name}`" in page, name
 
 
 def test_the_two_commands_are_targets_of_the_makefile():
