@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import casadi as ca
 
 from ctrlgen.core.errors import Fault
 
-Law = Callable[..., Any] | ca.Function
+Law: TypeAlias = Callable[..., Any] | ca.Function
 
 
 class Ports:
@@ -51,7 +51,8 @@ def ask(where: str, law: Law, offered: Mapping[str, Ports], names: Sequence[str]
     """
     nothing = ca.SX.zeros(len(names), 1)
     try:
-        given, faults = (_inputs if isinstance(law, ca.Function) else _arguments)(where, law, offered)
+        read: Callable[..., tuple[list[ca.SX], list[Fault]]] = _inputs if isinstance(law, ca.Function) else _arguments
+        given, faults = read(where, law, offered)
     except (TypeError, ValueError) as error:
         return nothing, [Fault(where, f"is no function: {error}")]
     if faults:

@@ -136,7 +136,7 @@ class DisplacementSensor(_Mounted):
 
     def sensor(self) -> chain.Sensor:
         """The sensor of the measuring chain with these numbers."""
-        given = self._numbers() | {"adc": self.adc.adc()}
+        given: dict[str, Any] = self._numbers() | {"adc": self.adc.adc()}
         if self.model is not None:
             return replace(chain.SENSORS[self.model], **given)
         return chain.Sensor(name="sensor", **given)

@@ -147,7 +147,7 @@ class _Laws:
         self.pushed(u, self.x, d, v), self.restoring_force(d)
         travel = max(q.si for q in r.axes.values())
         unit = written_unit(next(iter(r.axes.values())).text)
-        common = dict(
+        common: dict[str, Any] = dict(
             axes=axes, components=tuple(r.reading), pose_units=_units(r.reading), pose_scale=_sizes(r.reading),
             drive=Signal("drive", "drive", tuple(r.drive), _units(r.drive), "u_", u, _sizes(r.drive)),
             state=Signal("state", "state", tuple(r.state), _units(r.state), "x_", self.x, _sizes(r.state)) if r.state else None,
@@ -189,7 +189,7 @@ def _class(recipe: Recipe) -> type[UserDevice]:
     """The device's class: one section of parameters a domain."""
     fields: dict[str, Any] = {}
     for domain in dict.fromkeys(recipe.domains.values()):
-        numbers = {
+        numbers: dict[str, Any] = {
             n: (Annotated[Quantity, In(recipe.units[n])], ...) for n, where in recipe.domains.items() if where == domain
         }
         section = create_model(f"{domain.title()}Numbers", __base__=Section, **numbers)
@@ -208,11 +208,12 @@ class _Reader:
     """Reads the words of `user_device` and collects their faults."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.faults = name, []
+        self.name = name
+        self.faults: list[Fault] = []
 
     def ports(self, where: str, given: Mapping[str, str]) -> dict[str, Quantity]:
         """Sizes by name; one that cannot be read is noted and counts as 1."""
-        found = {}
+        found: dict[str, Quantity] = {}
         if not isinstance(given, Mapping) or not all(isinstance(n, str) and n.isidentifier() for n in given):
             self.faults.append(Fault(where, 'must be names with sizes, such as {"motor": "10 V"}'))
             return found
@@ -325,7 +326,10 @@ def user_device(
     }  # fmt: skip
     laws = read.laws(given, sizes["state"], reading is None or list(reading) == list(axes))
     size = None if force_size is None else read.ports("force_size", {"force_size": force_size})["force_size"]
-    recipe = Recipe(name, **sizes, domains=domains, units=units, laws=laws, force=size)
+    recipe = Recipe(
+        name, drive=sizes["drive"], axes=sizes["axes"], state=sizes["state"], reading=sizes["reading"], domains=domains, units=units,
+        laws=laws, force=size,
+    )  # fmt: skip
     return _checked(
         recipe, tables, {"name": name, "title": title or name, "source": source, "effect": tuple(effect)}, read
     )
@@ -334,7 +338,7 @@ def user_device(
 def _checked(recipe: Recipe, tables: dict[str, Any], plain: dict[str, Any], read: _Reader) -> Device:
     """The device, if words, laws and numbers are in order."""
     made, device = _class(recipe), None
-    sections = {SECTIONS[domain]: {} for domain in recipe.domains.values()}
+    sections: dict[str, dict[str, Any]] = {SECTIONS[domain]: {} for domain in recipe.domains.values()}
     for name, domain in recipe.domains.items():
         sections[SECTIONS[domain]][name] = tables[name]
     for effects in ((), plain["effect"]):  # the laws are judged even where an effect is wrong
@@ -354,10 +358,13 @@ def _at_home(device: Device, read: _Reader) -> None:
     physics = device.physics(device.values())
     n = len(physics.axes)
     d, v, x, u = ca.SX.sym("d", n), ca.SX.sym("v", n), ca.SX.sym("x", len(physics.rest)), physics.drive.expr
-    inertial = isinstance(physics, InertialPhysics)
-    force, rates = physics.dynamics(u, x, d, v) if inertial else (physics.force(u, x, d), physics.rates(x, u))
+    if isinstance(physics, InertialPhysics):
+        force, rates = physics.dynamics(u, x, d, v)
+    else:
+        assert isinstance(physics, BalancedPhysics)
+        force, rates = physics.force(u, x, d), physics.rates(x, u)
     laws = {"force": force, "rates": rates, "restoring_force": physics.restoring_force(d), "pose": physics.pose(d)}
-    if inertial:
+    if isinstance(physics, InertialPhysics):
         laws |= {"damping_force": physics.damping_force(v)} if physics.damping_force else {}
         laws["mass"] = ca.vertcat(*physics.mass)
     home = ca.Function("home", [u, x, d, v], list(laws.values()))(0, 0, 0, 0)

@@ -93,6 +93,16 @@ class Economised:
     weight: float
 
 
+@lru_cache
+def _tanh_terms() -> tuple[Fraction, ...]:
+    """(tanh(x) - x)/x^3 in powers of x^2, from t' = 1 - t^2: (2 k + 1) t_k = -sum t_i t_(k - 1 - i)."""
+    t = [Fraction(1)]
+    for k in range(1, TERMS + 1):
+        total = sum((t[i] * t[k - 1 - i] for i in range(k)), Fraction(0))
+        t.append(Fraction(_fixed(-total / (2 * k + 1)), 1 << BITS))
+    return tuple(t[1:])
+
+
 def _odd(sign: int) -> Callable[[int], Fraction]:
     return lambda k: Fraction(sign ** (k + 1), math.factorial(2 * k + 3))
 
@@ -167,22 +177,15 @@ def _through(points: list[int], values: list[int]) -> list[int]:
     return found
 
 
-@lru_cache
-def _tanh_terms() -> tuple[Fraction, ...]:
-    """(tanh(x) - x)/x^3 in powers of x^2, from t' = 1 - t^2: (2 k + 1) t_k = -sum t_i t_(k - 1 - i)."""
-    t = [Fraction(1)]
-    for k in range(1, TERMS + 1):
-        t.append(Fraction(_fixed(-sum(t[i] * t[k - 1 - i] for i in range(k)) / (2 * k + 1)), 1 << BITS))
-    return tuple(t[1:])
-
-
 def _arctan_half() -> Fraction:
-    return Fraction(_fixed(sum(Fraction((-1) ** k, (2 * k + 1) * 2 ** (2 * k + 1)) for k in range(TERMS))), 1 << BITS)
+    terms = (Fraction((-1) ** k, (2 * k + 1) * 2 ** (2 * k + 1)) for k in range(TERMS))
+    return Fraction(_fixed(sum(terms, Fraction(0))), 1 << BITS)
 
 
 def _log_two() -> Fraction:
     """ln 2 = 2 artanh(1/3)."""
-    return Fraction(_fixed(sum(Fraction(2, (2 * k + 1) * 3 ** (2 * k + 1)) for k in range(70))), 1 << BITS)
+    terms = (Fraction(2, (2 * k + 1) * 3 ** (2 * k + 1)) for k in range(70))
+    return Fraction(_fixed(sum(terms, Fraction(0))), 1 << BITS)
 
 
 def _parts(value: Fraction, digits: int, spare: int, number: int) -> list[float]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ctrlgen.firmware.compression import Compression, compress
 from ctrlgen.firmware.cprint import Real
@@ -73,7 +74,7 @@ def generate(
     compression = compress(played) if played else {}
     contexts, written = {}, []
     for real in Real:
-        of = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
+        of: dict[str, Any] = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
         online = online_context(scenario, controller, real, of["online"])
         samples = {} if played is None else player_context(played, compression[real], of["player"])
         reference = vectors(controller, command, real) | played_vectors(compression.get(real), len(command))
@@ -90,7 +91,10 @@ def generate(
     write_package(out, scenario, contexts, figures or {}, written)
     cost = contexts[Real.FLOAT]["cost"]
     pieces = names if played else names | {"player": {}}
-    return CFolder(out, scenario.name, *(pieces[piece] for piece in PIECES), compression, cost["step"], cost["worst"])
+    return CFolder(
+        out, scenario.name, pieces["online"], pieces["player"], pieces["selftest"], pieces["vectors"], compression,
+        operations=cost["step"], worst_operations=cost["worst"],
+    )  # fmt: skip
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:

@@ -8,7 +8,9 @@ its multiples follow by rotation: every sample starts anew, so that nothing drif
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +49,8 @@ class Fourier:
         fine = np.arange(2**self.low_bits)
         coarse = 2**self.low_bits * np.arange(-(-self.samples // len(fine)))
         angle = 2 * np.pi / self.samples
-        return tuple(np.column_stack([np.cos(angle * k), np.sin(angle * k)]) for k in (coarse, fine))
+        c, f = (np.column_stack([np.cos(angle * k), np.sin(angle * k)]) for k in (coarse, fine))
+        return c, f
 
     def bytes(self, real: Real) -> int:
         """Constants of the C."""
@@ -70,7 +73,7 @@ class Fourier:
 
     def between(self, k: np.ndarray, part: np.ndarray, real: Real) -> np.ndarray:
         """The same at k + part, 0 <= part < 1."""
-        number = np.float32 if real is Real.FLOAT else np.float64
+        number: Any = np.float32 if real is Real.FLOAT else np.float64
         coarse, fine = (turn.astype(number) for turn in self.turns)
         c, s = _turn(coarse[k >> self.low_bits].T, fine[k & (2**self.low_bits - 1)].T)
         x = part.astype(number) * number(2 * np.pi / self.samples)
@@ -101,6 +104,6 @@ def series(drive: np.ndarray, harmonics: int) -> Fourier:
     return Fourier(len(drive), rows)
 
 
-def _turn(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _turn(a: Sequence[np.ndarray] | np.ndarray, b: Sequence[np.ndarray] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """cos and sin of the sum of two angles."""
     return (a[0] * b[0]) - (a[1] * b[1]), (a[1] * b[0]) + (a[0] * b[1])

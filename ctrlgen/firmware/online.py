@@ -39,7 +39,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             kernel = print_function(function, names[-1], real, ranges)
         return kernels.setdefault(body, kernel)
 
-    modes = []
+    modes: list[dict[str, Any]] = []
     for name, inverse, z in (
         ("settle", controller.static, "out->displacement"),
         ("step", controller.moving, "state->z"),
@@ -89,7 +89,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
         "balance": balance, "secant_steps": SECANT_STEPS, "secant_fraction": SECANT_FRACTION,
         "composite_rounds": controller.composite_rounds,
-        "ratio_uses_state": bool(ratio) and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,
+        "ratio_uses_state": ratio is not None and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack, "cost": {"step": step_cost, "worst": worst_cost},
         "input_limits": controller.input_limits, "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "z_centre": z_centre, "z_half": z_half,

@@ -136,10 +136,10 @@ def _context(
 
 def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
     """Rows of the README's table, bytes in double and in float; `chosen` is how the player's samples are held in each."""
-    x, n, n_s, m, rows = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
+    x, n, n_s, m, count = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
-    vectors = f"{rows} x ({m} + {n}) numbers and 3 x {rows} `int` of 4 B, constants; only if the test is called"
+    vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} `int` of 4 B, constants; only if the test is called"
     played = len(c["played"])
     if played:
         vectors = vectors.replace(
@@ -148,7 +148,7 @@ def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[
     rows = [
         _counted("state", x + n, 0, state),
         _counted("output", 2 * n + n_s, 0, output),
-        _counted("vectors", rows * (m + n) + played * n, 12 * rows + 4 * played, vectors),
+        _counted("vectors", count * (m + n) + played * n, 12 * count + 4 * played, vectors),
     ]
     if played:
         held = "; ".join(

@@ -161,8 +161,8 @@ def kinks(drive: np.ndarray, scale: np.ndarray) -> list[int]:
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(jump, 8, mode="reflect"), 17)
     ratio = jump / np.maximum(np.median(windows, axis=1), NOISE)
     peaks = np.flatnonzero((ratio > KINK) & (jump >= windows[:, 5:12].max(axis=1)))
-    peaks = sorted(peaks, key=lambda k: -jump[k])[:MOST_KINKS]
-    return sorted({int(k) + shift for k in peaks for shift in (1, 2, 3)})
+    highest = sorted(peaks.tolist(), key=lambda k: -jump[k])[:MOST_KINKS]
+    return sorted({k + shift for k in highest for shift in (1, 2, 3)})
 
 
 def fit(drive: np.ndarray, low: np.ndarray, high: np.ndarray, tolerance: np.ndarray, closed: bool) -> Spline | None:

@@ -6,10 +6,11 @@ u --(drive terms)--> drive --rates--> x --force(terms)--> balance with the stage
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -95,13 +96,17 @@ def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: 
     faults = mounting_faults(device.sensor, physics.components, physics.pose_units) + terms.faults
     if faults:
         raise InputError(device.name, faults)
-    join = {BalancedPhysics: _balanced, InertialPhysics: partial(_inertial, v=v), ImposedPhysics: _imposed}
+    join: dict[type, Callable[..., Any]] = {
+        BalancedPhysics: _balanced,
+        InertialPhysics: partial(_inertial, v=v),
+        ImposedPhysics: _imposed,
+    }
     parts = join[type(physics)](physics, terms, z)
 
     state, memories = physics.state, terms.memories()
     own_x = NONE if state is None else state.expr
     first = own_x.numel()  # place in x of the effects' states
-    acceleration = parts.balance / ca.vertcat(*physics.mass) if inertial else NONE
+    acceleration = parts.balance / ca.vertcat(*physics.mass) if isinstance(physics, InertialPhysics) else NONE
     memory_rates = ca.vertcat(NONE, *(m.rates[s.name] for m, s, _ in memories))
     rates = ca.vertcat(parts.rates, memory_rates, acceleration)
 

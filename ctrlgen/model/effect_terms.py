@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import SimpleNamespace
+from typing import TypeGuard
 
 import casadi as ca
 
@@ -78,8 +80,8 @@ class EffectTerms:
             self.faults.append(Fault(f"effect[{k}].of", f"{effect.of!r} is not one of {', '.join(names)}"))
             return
         other = None if effect.of is None else names.index(effect.of)
-        pairs = [(i, other) for i in chosen]
-        if effect.symmetric:
+        pairs: list[tuple[int, int | None]] = [(i, other) for i in chosen]
+        if effect.symmetric and other is not None:
             pairs += [(other, i) for i in chosen]
         for i, partner in pairs:
             channel = places[i] if partner is None else places[i].paired_with(places[partner])
@@ -122,9 +124,9 @@ class EffectTerms:
             i = min(i, len(self.physics.axes) - 1)
             s.displacement, s.displacements = self.displacement[i], self.displacement
             s.velocity = self.velocity[i] if self.velocity.numel() else None
-            heated = self.physics.state is not None and _has_heaters(self.physics)
-            s.state = self.physics.state.expr[i] if heated else None
-            s.rest = self.physics.rest[i] if heated else None
+            state = self.physics.state if _has_heaters(self.physics) else None
+            s.state = None if state is None else state.expr[i]
+            s.rest = None if state is None else self.physics.rest[i]
             s.force = self.restoring_force[i]
         s.rate = s.second_rate = None
         if at_platform and isinstance(self.physics, InertialPhysics):
@@ -138,11 +140,13 @@ class EffectTerms:
     @cached_property
     def second_order_kinematics(self) -> ca.SX:
         """What finite rotations of the links add to the pose; large, hence built only when an effect asks for it."""
+        assert isinstance(self.physics, BalancedPhysics) and self.physics.second_order_kinematics  # `available` says so
         return self.physics.second_order_kinematics(self.mechanism_displacement)
 
     @cached_property
     def tangent_compliance(self) -> ca.SX:
         """By how much less the stages yield to the links' load than at home; built only when an effect asks for it."""
+        assert isinstance(self.physics, BalancedPhysics) and self.physics.tangent_compliance  # `available` says so
         return self.physics.tangent_compliance(self.within_reach)
 
     def memories(self) -> list[tuple[Member, State, ca.SX]]:
@@ -157,6 +161,7 @@ class EffectTerms:
 def channels(physics: DevicePhysics, place: Place) -> list[Channel]:
     """The channels on which an effect of `place` can act."""
     feedback = physics.feedback if isinstance(physics, InertialPhysics) else None
+    rows: Iterable[tuple[str, str, float]]
     if place in (Place.POSE, Place.SENSOR):
         rows = zip(physics.components, physics.pose_units, physics.pose_scale, strict=True)
     elif place is Place.DRIVE and feedback is not None:  # u is the loop's reference, the amplifier's drive its command
@@ -164,8 +169,9 @@ def channels(physics: DevicePhysics, place: Place) -> list[Channel]:
     elif place is Place.DRIVE:
         rows = zip(physics.drive.channels, physics.drive.units, physics.drive.scale, strict=True)
     else:
+        power = physics.power if _has_heaters(physics) else None
         unit, scale = {
-            Place.HEAT: (physics.power.unit, physics.power.scale) if _has_heaters(physics) else ("1", 1.0),
+            Place.HEAT: (power.unit, power.scale) if power else ("1", 1.0),
             Place.FORCE: (physics.force_unit, physics.force_scale),
             Place.DISPLACEMENT: (physics.travel_unit, physics.displacement_scale),
         }[place]
@@ -182,11 +188,11 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
         "velocity": not balanced, "ambient": True, "sample_time": sample_time is not None,
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,
-        "second_order_kinematics": balanced and physics.second_order_kinematics is not None,
-        "tangent_compliance": balanced and physics.tangent_compliance is not None,
+        "second_order_kinematics": isinstance(physics, BalancedPhysics) and physics.second_order_kinematics is not None,
+        "tangent_compliance": isinstance(physics, BalancedPhysics) and physics.tangent_compliance is not None,
     }  # fmt: skip
     return frozenset(name for name, given in present.items() if given)
 
 
-def _has_heaters(physics: DevicePhysics) -> bool:
+def _has_heaters(physics: DevicePhysics) -> TypeGuard[BalancedPhysics]:
     return isinstance(physics, BalancedPhysics) and physics.power is not None

@@ -51,6 +51,10 @@ class Steps:
     def _rest(self, model: Model) -> ca.SX:
         return ca.vertcat(model.sampled_rates, model.v) - self.A @ ca.vertcat(model.x, model.z)
 
+    def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
+        """y one step on, and each (y, u) where N was evaluated."""
+        raise NotImplementedError
+
     def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
         """y one step on, the drive going from `u` to `u_end`."""
         return self.points(N, y, u, u_end)[0]

@@ -6,7 +6,7 @@ division by something that may be zero or a function without a rule gives (-inf,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import product
 
 import casadi as ca
@@ -42,7 +42,7 @@ def _magnitude(a: Interval) -> Interval:
     return (0.0 if a[0] <= 0.0 <= a[1] else low), high
 
 
-_RULES = {
+_RULES: dict[int, Callable[..., Interval]] = {
     ca.OP_ASSIGN: lambda a: a,
     ca.OP_ADD: lambda a, b: (a[0] + b[0], a[1] + b[1]),
     ca.OP_SUB: lambda a, b: (a[0] - b[1], a[1] - b[0]),
