@@ -50,9 +50,8 @@ def test_a_record_at_rest_tells_colour_and_level_of_every_sensor(ar, h, rng):
     found = estimate_noise(recording(record(y, "rest", h=h)), SETTLING)
     assert found.sd == pytest.approx(np.array(sds), rel=SIGMAS / np.sqrt(2 * n))
     for sd, coefficients, floor in zip(sds, found.ar, found.floor, strict=True):
-        assert len(coefficients) >= len(ar)
-        wanted = np.pad(np.array(ar), (0, len(coefficients) - len(ar)))
-        assert coefficients == pytest.approx(wanted, abs=SIGMAS / np.sqrt(n))  # no coefficient is known worse
+        assert len(coefficients) == len(ar)  # BIC adds one to white noise once in 600
+        assert coefficients == pytest.approx(np.array(ar), abs=SIGMAS / np.sqrt(n))  # no coefficient is known worse
         longer = (1 + np.sum(np.abs(ar))) / (
             1 - min(np.sum(np.abs(ar)), 0.9)
         )  # correlated samples tell less of the level
@@ -108,7 +107,7 @@ def test_a_dwell_in_which_something_happened_is_left_out(loud, rng):
 @pytest.mark.parametrize("h", [1e-4, 0.5])
 def test_the_fastest_part_of_readings_that_never_rest_tells_white_noise(h, rng):
     """Third differences, whose squares are 1 + 9 + 9 + 1 = 20 times those of the noise; of two sensors at once."""
-    n, sds = 40000, (3e-9, 7e-7)
+    n, sds = 1_000_000, (3e-9, 7e-7)
     motion = 1e-5 * moving(n)[:, None]
     y = motion + np.column_stack([noise(rng, n, sd) for sd in sds])
     found = estimate_noise(recording(record(y, drive=moving(n), h=h)), SETTLING)
@@ -153,7 +152,7 @@ def test_a_stated_deviation_stands_where_nothing_else_tells_and_yields_to_a_rest
     assert two.sd[0] == pytest.approx(2e-9, rel=SIGMAS / np.sqrt(2 * n))
 
 
-@pytest.mark.parametrize("steps, counts", [(0.5, False), (6.0, True)])
+@pytest.mark.parametrize("steps, counts", [(0.5, False), (4.0, True)])
 def test_rounding_counts_where_it_is_larger_than_the_noise(steps, counts, rng):
     """A step q adds q^2/12 to what is not known of a reading on the move."""
     sd = 1e-9
