@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long bench battery loop docs lint clean
+.PHONY: run test test-long bench battery loop mutants docs lint clean
 
 run: $(VENV)/installed
 	$(BIN)/ctrlgen run scenarios/circle20 --out out/circle20
@@ -35,6 +35,12 @@ loop: $(VENV)/installed
 docs: $(VENV)/installed-dev
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/docs
 	@echo "documentation  out/docs/index.html"
+
+# make mutants SAMPLE=100 SEED=1: wrong lines put in one at a time, each against the tests that see it (hours); docs/mutants.md
+SAMPLE ?= 100
+mutants: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test,mutants]'
+	$(BIN)/python -m mutants --sample $(SAMPLE) --seed $(SEED) --out out/mutants
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -1,0 +1,154 @@
+"""Which tests execute which line, by coverage.py's contexts, one test file at a time; kept until the code or that file changes.
+
+A line that runs at import (a constant, a parameter of a law) belongs to no test: it is seen by the tests that execute a line which
+names what it defines, and where there is none, by those that execute anything else of its file.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from coverage import CoverageData
+
+CODE = ("ctrlgen/**/*.py", "codegen/templates/**/*", "tests/*.py")
+LONGEST = 1800.0  # s that one file of tests may take
+
+
+@dataclass
+class Seen:
+    """`by_line` file -> line -> tests; `seconds` of each test that passes; `breadth` how many lines it executes."""
+
+    root: Path
+    by_line: dict[str, dict[int, set[str]]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    breadth: dict[str, int] = field(default_factory=dict)
+
+    def add(self, found: dict) -> None:
+        """What one file of tests has shown."""
+        for test, seconds in found["seconds"].items():
+            self.seconds[test] = seconds
+        names = found["tests"]
+        for file, lines in found["lines"].items():
+            own = self.by_line.setdefault(file, {})
+            for line, tests in lines.items():
+                here = {names[k] for k in tests} & found["seconds"].keys()
+                own.setdefault(int(line), set()).update(here)
+                for test in here:
+                    self.breadth[test] = self.breadth.get(test, 0) + 1
+
+    def tests(self, file: str, line: int) -> list[str]:
+        """Those that can see the line, most specific and fastest first."""
+        first, last = self._statement(file, line)
+        lines = self.by_line.get(file, {})
+        tests: set[str] = set().union(*(lines.get(k, set()) for k in range(first, last + 1)))
+        if not tests:
+            tests = self._through_names(file, first, last)
+        if not tests:
+            tests = set().union(*lines.values())
+        return sorted(tests, key=lambda t: (self.seconds[t] + 0.01) * self.breadth[t])
+
+    def _statement(self, file: str, line: int) -> tuple[int, int]:
+        """First and last line of the innermost statement; of a compound one, its head."""
+        best = (line, line)
+        for node in ast.walk(ast.parse((self.root / file).read_text())):
+            if isinstance(node, ast.stmt) and node.lineno <= line <= node.end_lineno:
+                body = getattr(node, "body", None)
+                end = body[0].lineno - 1 if body else node.end_lineno
+                if node.lineno <= line <= max(end, node.lineno):
+                    best = (node.lineno, max(end, node.lineno))
+        return best
+
+    def _through_names(self, file: str, first: int, last: int) -> set[str]:
+        names = set()
+        for node in ast.walk(ast.parse((self.root / file).read_text())):
+            if isinstance(node, ast.Assign | ast.AnnAssign) and node.lineno <= first <= node.end_lineno:
+                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+                names |= {t.id for target in targets for t in ast.walk(target) if isinstance(t, ast.Name)}
+        names -= {"params", "states", "place"}  # of every law: its file says more
+        found: set[str] = set()
+        for name in names:
+            word = re.compile(rf"\b{re.escape(name)}\b")
+            own = any(word.search(text) for k, text in enumerate(self._texts[file], 1) if not first <= k <= last)
+            for other in [file] if own and name.startswith("_") else self._texts:
+                if other != file and not self._imports(other, file):
+                    continue
+                for k, text in enumerate(self._texts[other], 1):
+                    if word.search(text) and not (other == file and first <= k <= last):
+                        found |= self.by_line.get(other, {}).get(k, set())
+        return found
+
+    def _imports(self, other: str, file: str) -> bool:
+        module = file.removesuffix(".py").replace("/", ".")
+        return any(module in text for text in self._texts[other])
+
+    @cached_property
+    def _texts(self) -> dict[str, list[str]]:
+        return {file: (self.root / file).read_text().splitlines() for file in self.by_line}
+
+
+def code_hash(root: Path, tests: Path | None = None) -> str:
+    """Of everything that decides which of the `tests` executes what: the code, what they share, and their own file."""
+    digest = hashlib.sha256()
+    for path in sorted({p for pattern in CODE for p in root.glob(pattern) if p.is_file()}):
+        if not path.name.startswith("test_") or path == tests:
+            digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def seen(root: Path, tests: Iterable[Path], cache: Path, jobs: int, done: Callable[[], None]) -> Seen:
+    """By the files of `tests`, from the `cache` where the code is the same; `done` is called after each file."""
+    cache.mkdir(parents=True, exist_ok=True)
+
+    def one(path: Path) -> dict:
+        kept = cache / f"{path.stem}-{code_hash(root, path)}.json"
+        if not kept.exists():
+            for old in cache.glob(f"{path.stem}-*.json"):
+                old.unlink()
+            kept.write_text(json.dumps(_measured(root, path, cache)))
+        done()
+        return json.loads(kept.read_text())
+
+    whole = Seen(root)
+    with ThreadPoolExecutor(jobs) as pool:
+        for found in pool.map(one, tests):
+            whole.add(found)
+    return whole
+
+
+def _measured(root: Path, path: Path, folder: Path) -> dict:
+    """One file of tests under coverage; tests that fail, are skipped or take too long say nothing."""
+    data, times = folder / f"{path.stem}.coverage", folder / f"{path.stem}.times"
+    command = [
+        sys.executable, "-m", "pytest", "-q", "-m", "not long", "-p", "mutants.timing", "-p", "no:cacheprovider", "-p", "no:xdist",
+        "--cov=ctrlgen", "--cov-context=test", "--cov-report=", str(path),
+    ]  # fmt: skip
+    environment = os.environ | {"COVERAGE_FILE": str(data), "MUTANTS_TIMES": str(times), "PYTHONPATH": str(root)}
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=LONGEST)
+    if not (data.exists() and times.exists()):
+        return {"seconds": {}, "tests": [], "lines": {}}
+    rows = json.loads(times.read_text())
+    covered = CoverageData(str(data))
+    covered.read()
+    tests: dict[str, int] = {}
+    lines: dict[str, dict[int, list[int]]] = {}
+    for file in covered.measured_files():
+        own = lines[str(Path(file).relative_to(root))] = {}
+        for line, contexts in covered.contexts_by_lineno(file).items():
+            names = {c.rpartition("|")[0] for c in contexts if c}
+            own[line] = sorted(tests.setdefault(name, len(tests)) for name in names)
+    data.unlink()
+    times.unlink()
+    return {"seconds": {k: v["seconds"] for k, v in rows.items() if v["passed"]}, "tests": list(tests), "lines": lines}
