@@ -321,6 +321,14 @@ def test_a_noise_that_is_poorly_known_itself_is_granted_2_6_deviations(side, pas
     assert judged(sized(1.0), fitted_ratio=granted + side, count=count).passed == passes
 
 
+def test_the_chance_of_an_error_is_that_of_its_squares_in_units_of_the_noise_as_known():
+    count, n, ratio = 200.0, 500, 1.2
+    doubt = 1 + 2.6 / np.sqrt(2 * count)
+    found = judged(sized(ratio, n), fitted_ratio=ratio, count=count, n_fit=n).p_values
+    wanted = stats.chi2.sf(n * (ratio / doubt) ** 2, n)
+    assert 1e-3 < wanted < 0.5 and [found["size"], found["fitted"]] == pytest.approx([wanted, wanted], rel=1e-9)
+
+
 def spectrum(power: np.ndarray, rms: float) -> np.ndarray:
     """A signal (n, 1) of this power spectrum, random phases."""
     n = 2 * len(power) - 2
