@@ -6,7 +6,8 @@ import argparse
 import json
 import sys
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
 from queue import Queue
@@ -17,7 +18,7 @@ from rich.table import Table
 
 from mutants.areas import AREAS, files
 from mutants.draw import Mutant, drawn
-from mutants.seen import code_hash, seen
+from mutants.seen import Seen, code_hash, seen
 from mutants.trial import CAUGHT, SURVIVED, TIMEOUT, UNSEEN, Copy, Outcome
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -69,11 +70,21 @@ def main(arguments: list[str] | None = None) -> int:
             ROOT, {area: files(ROOT, area) for area in a.areas}, a.sample, a.seed, known if a.covered else None
         )
         task = bar.add_task("mutants", total=len(chosen))
-        outcomes = _tried(chosen, known, a.limit, a.jobs, lambda: bar.advance(task))
-    share = _shown(console, outcomes)
-    rows = [asdict(o.mutant) | {k: v for k, v in asdict(o).items() if k != "mutant"} for o in outcomes]
-    report = {"sample": a.sample, "seed": a.seed, "code": code_hash(ROOT), "caught": share, "mutants": rows}
-    (a.out / "mutants.json").write_text(json.dumps(report, indent=1))
+        outcomes: list[Outcome] = []
+
+        def tried(outcome: Outcome) -> None:
+            bar.advance(task)
+            outcomes.append(outcome)
+            if outcome.what not in FOUND:
+                console.print(f"{outcome.what} ({outcome.tests} tests, {outcome.left} left out)", style="bold")
+                console.print(outcome.diff, markup=False, highlight=False, soft_wrap=True)
+            _write(
+                a.out / "mutants.json", a.sample, a.seed, outcomes
+            )  # so that a run that is stopped has said something
+
+        _try(chosen, known, a.limit, a.jobs, tried)
+    share = _share(outcomes)
+    _show(console, outcomes)
     console.print(f"{a.out / 'mutants.json'}: {share:.0%} caught of {len(outcomes)}")
     return 0 if share >= a.least else 1
 
@@ -84,7 +95,7 @@ def _progress(console: Console) -> Progress:
     )
 
 
-def _tried(chosen: list[Mutant], known, limit: float, jobs: int, done) -> list[Outcome]:
+def _try(chosen: list[Mutant], known: Seen, limit: float, jobs: int, tried: Callable[[Outcome], None]) -> None:
     copies: Queue[Copy] = Queue()
     for _ in range(jobs):
         copies.put(Copy(ROOT))
@@ -95,28 +106,37 @@ def _tried(chosen: list[Mutant], known, limit: float, jobs: int, done) -> list[O
             return copy.tried(mutant, known.tests(mutant.file, mutant.line), known.seconds, limit)
         finally:
             copies.put(copy)
-            done()
 
     try:
         with ThreadPoolExecutor(jobs) as pool:
-            return list(pool.map(one, chosen))
+            for running in as_completed([pool.submit(one, mutant) for mutant in chosen]):
+                tried(running.result())
     finally:
         for _ in range(jobs):
             copies.get().remove()
 
 
-def _shown(console: Console, outcomes: list[Outcome]) -> float:
-    """Prints the survivors and a table by area; the share caught."""
-    for o in outcomes:
-        if o.what not in FOUND:
-            console.print(f"{o.what} ({o.tests} tests, {o.left} left out)", style="bold")
-            console.print(o.diff, markup=False, highlight=False)
-    table = Table("area", CAUGHT, TIMEOUT, SURVIVED, UNSEEN, "of", title="mutants")
-    for area in dict.fromkeys(o.mutant.area for o in outcomes):
-        counts = Counter(o.what for o in outcomes if o.mutant.area == area)
-        table.add_row(area, *(str(counts[what]) for what in (CAUGHT, TIMEOUT, SURVIVED, UNSEEN)), str(counts.total()))
-    console.print(table)
+def _share(outcomes: list[Outcome]) -> float:
     return sum(o.what in FOUND for o in outcomes) / max(len(outcomes), 1)
+
+
+def _write(path: Path, sample: int, seed: int, outcomes: list[Outcome]) -> None:
+    rows = [asdict(o.mutant) | {k: v for k, v in asdict(o).items() if k != "mutant"} for o in outcomes]
+    rows.sort(key=lambda row: (row["what"] in FOUND, row["file"], row["line"]))
+    report = {"sample": sample, "seed": seed, "code": code_hash(ROOT), "caught": _share(outcomes), "mutants": rows}
+    path.write_text(json.dumps(report, indent=1))
+
+
+def _show(console: Console, outcomes: list[Outcome]) -> None:
+    """The table by area."""
+    table = Table("area", CAUGHT, TIMEOUT, SURVIVED, UNSEEN, "of", title="mutants")
+    for area in AREAS:
+        counts = Counter(o.what for o in outcomes if o.mutant.area == area)
+        if counts:
+            table.add_row(
+                area, *(str(counts[what]) for what in (CAUGHT, TIMEOUT, SURVIVED, UNSEEN)), str(counts.total())
+            )
+    console.print(table)
 
 
 if __name__ == "__main__":

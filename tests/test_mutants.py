@@ -193,9 +193,9 @@ def test_the_command_counts_lists_survivors_and_says_by_its_exit_whether_enough_
     out = tmp_path / "out"
     assert command.main(["--out", str(out), "--jobs", "1", "--least", str(least), "--areas", "model"]) == code
     report = json.loads((out / "mutants.json").read_text())
-    assert report["caught"] == 0.5 and [row["what"] for row in report["mutants"]] == ["caught", "survived"]
+    assert report["caught"] == 0.5 and [row["what"] for row in report["mutants"]] == ["survived", "caught"]
     assert (
-        report["mutants"][1]["line"] == line("total += a * b")
-        and "+        total += a / b" in report["mutants"][1]["diff"]
+        report["mutants"][0]["line"] == line("total += a * b")
+        and "+        total += a / b" in report["mutants"][0]["diff"]
     )
     assert "total += a / b" in capsys.readouterr().out
