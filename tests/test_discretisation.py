@@ -293,6 +293,13 @@ def test_dry_friction_that_reverses_gently_is_right_to_a_thousandth_however_long
     assert rms(found - exact) < 1e-3 * rms(effect)
 
 
+def test_bristles_are_found_beside_other_memories(tmp_path):
+    """Creep has two, before them."""
+    text = "kind = 'creep'\ngain = '0.1'\ntau = '1 s'\nslow = '0.1'\n[[effect]]\nat = 'axis'\n"
+    model = axis_with(f"{text}kind = 'coulomb'\nforce = '1 N'\nreach = '1 um'\nsmoothing = '1 mm/s'", tmp_path)
+    assert [model.x_names[i] for i in model.bristles] == ["coulomb_1_z_axis"]
+
+
 def series(a: float, k: int) -> float:
     """phi_k(a) by its series, fifty digits."""
     with localcontext() as context:

@@ -27,6 +27,7 @@ from ctrlgen.diagnosis.selection.diagnosis import (
     verdict,
 )
 from ctrlgen.diagnosis.selection.line_resolvability import resolved
+from ctrlgen.diagnosis.selection.model_selection import Weighing
 
 N, JUST = 1000, 1e-6
 CREEP, DRIFT, GAIN, REVERSED = (
@@ -201,3 +202,13 @@ def test_all_pairs_of_lines_are_looked_at_whatever_stands_between():
     assert not lines(None, 5.0, 5.01) and not lines(5.0, None, 5.01) and not lines(5.0, 7.0, 7.01)
     assert lines(5.0, 5.01, accepted=(0, 1)) and not lines(5.0, 5.01, 9.0, accepted=(0, 2))
     assert not lines(5.0, 5.01, 9.0, 9.01, accepted=(0, 1))
+
+
+@pytest.mark.parametrize("period, means", [(6.29, True), (6.28, False)])
+def test_a_cause_whose_law_does_not_hold_means_nothing(period, means):
+    """Fringes of one metre must be longer than 2 pi metres, or the reading would fall as the position rises."""
+    cause = Hypothesis("cyclic", "sensor:axis", "axis")
+    fit = fitted(causes=(cause, GAIN))
+    fit.values = lambda k: {"amplitude": 1.0, "period": period} if k == 0 else {"gain": 0.1}
+    weigh = Weighing(SimpleNamespace(to_fit=[], held=[], recording=SimpleNamespace(channels=(), records=())), None)
+    assert weigh.meant(SimpleNamespace(fit=fit)) == means and weigh.meant(SimpleNamespace(fit=fit), (cause,))

@@ -1,0 +1,63 @@
+"""When a fit begins again, and what it says of a number: at the two sides of each threshold."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from conftest import SCENARIOS
+
+from ctrlgen import load_device
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+
+AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
+N = 1000
+
+
+@pytest.mark.parametrize("objective, again", [(1e4 * N * (1 - 1e-9), False), (1e4 * N * (1 + 1e-9), True)])
+@pytest.mark.parametrize("known", [True, False])
+def test_a_device_is_fitted_from_several_starts_where_it_is_a_hundred_times_the_noise_off(objective, again, known):
+    """And only where the noise is known: a start a stated deviation to either side of each stated number."""
+    starts = []
+
+    def fit(structure):
+        starts.append(structure.own)
+        return SimpleNamespace(structure=structure, objective=objective, n=N)
+
+    fitter = SimpleNamespace(noise=SimpleNamespace(known=np.array([known])), fit=fit)
+    Fitter.described(fitter, AXIS)
+    stated = [u for u in Structure(AXIS).unknowns if u.sd]
+    both = [{u.path: u.nominal + side * u.sd} for u in stated for side in (-1, 1)]
+    assert stated and starts == [{}, *(both if again and known else [])]
+
+
+def fitted(cause: Hypothesis, start: dict[str, float], sd: float) -> Fit:
+    structure = Structure(AXIS).with_cause(cause, start)
+    theta = structure.start
+    return Fit(structure, theta, (), float(N), N, np.zeros(len(theta)), np.eye(len(theta)) / sd, 0.0)
+
+
+@pytest.mark.parametrize("sd, may", [(0.3 / 1.959964 * 1.001, True), (0.3 / 1.959964 * 0.999, False)])
+def test_a_law_may_be_its_special_case_within_the_interval_of_95_per_cent(sd, may):
+    """Friction that breaks away at 1.3 times its force of sliding is Coulomb's where 1.3 cannot be told from 1."""
+    start = {"force": 0.1, "breakaway": 1.3, "speed": 1e-3, "reach": 1e-6}
+    fit = fitted(Hypothesis("stribeck", "stage:axis", "axis"), start, sd)
+    assert fit.special(0) == ("coulomb" if may else None)
+
+
+def test_a_number_of_the_device_and_a_law_without_special_cases_are_what_they_are():
+    creep = {"gain": 0.1, "tau": 1.0, "slow": 0.1}
+    assert fitted(Hypothesis("creep", "stage:axis", "axis"), creep, 1.0).special(0) is None
+    number = next(u.path for u in Structure(AXIS).unknowns)
+    cause = Hypothesis("parameter", "stage:axis", path=number)
+    assert fitted(cause, {"value": 1.0}, 1.0).special(0) is None
+
+
+@pytest.mark.parametrize("side, noise", [(-1e-6, True), (1e-6, False)])
+def test_a_fit_leaves_noise_up_to_four_deviations_of_its_squares(side, noise):
+    fit = fitted(Hypothesis("creep", "stage:axis", "axis"), {"gain": 0.1, "tau": 1.0, "slow": 0.1}, 1.0)
+    left = N + 4 * np.sqrt(2 * N) + side
+    assert Fit(fit.structure, fit.theta, (), left - 3.0, N, fit.residual, fit.J, 3.0).is_noise == noise

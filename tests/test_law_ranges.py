@@ -1,0 +1,46 @@
+"""The ranges that a law's record gives for its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ctrlgen.effects  # noqa: F401  fills the library
+from ctrlgen.effects import Effect
+
+PARAMETERS = [(kind, p) for kind, law in Effect.library.items() for p in law.params]
+every_parameter = pytest.mark.parametrize("kind, p", PARAMETERS, ids=[f"{kind}-{p.name}" for kind, p in PARAMETERS])
+ONE_WAY = {  # shares of something that there is by itself once, and a metal's resistance, which rises
+    "finite_rotation": (-2.0, 4.0), "link_load": (-2.0, 4.0), "low_pass": (-0.5, 1.5), "heater_resistance": (-1e-3, 1e-2),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("law", Effect.library.values(), ids=Effect.library)
+def test_an_amplitude_goes_as_far_either_way_or_one_way_alone(law):
+    """No sign of what was left out is likelier than the other; it is off at zero."""
+    p = law.amplitude()
+    low, high = p.bounds
+    assert p.off == 0.0 and (low == 0.0 or (low, high) == ONE_WAY.get(law.kind, (-high, high)))
+
+
+@every_parameter
+def test_what_is_tried_lies_inside_the_bounds_and_rises_or_falls(kind, p):
+    low, high = p.bounds
+    assert low < high and all(low <= value <= high for value in p.grid)
+    steps = np.sign(np.diff(p.grid))
+    assert len(set(steps)) <= 1
+
+
+@every_parameter
+def test_what_is_expected_or_usual_lies_inside_the_bounds_around_its_middle(kind, p):
+    for ends in (p.expected, p.usual):
+        if ends:
+            assert p.bounds[0] <= ends[0] < ends[1] <= p.bounds[1]
+            assert sum(ends) / 2 == pytest.approx(1.0)  # of a whole: it is so, or it is not
+
+
+@every_parameter
+def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_leans_may_be(kind, p):
+    if p.off is None:
+        either = p.name in ("moment", "position", "reference", "phase", "lean", "gap", "level", "taper", "skew")
+        assert either or p.bounds[0] >= 0.0
