@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ctrlgen.recordings.recording import load_recordings
 from recorded import csv_text, described, samples
 
 from ctrlgen.core.errors import InputError
+from ctrlgen.recordings.recording import load_recordings
 
 
 @pytest.mark.parametrize("shared, refused", [(4, False), (5, False), (6, True)])

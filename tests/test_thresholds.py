@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import SCENARIOS
-from ctrlgen.recordings.recording import Record, Recording
 from scipy import stats
 
 from ctrlgen import load_device
@@ -18,6 +17,7 @@ from ctrlgen.diagnosis.estimation.structure import Structure, Unknown
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import Trial
 from ctrlgen.diagnosis.selection.model_selection import Weighing
+from ctrlgen.recordings.recording import Record, Recording
 
 N = 1000  # samples to fit, and held out
 NOISE = Noise(np.ones(1), (np.zeros(0),), np.ones(1, bool), ("",), np.full(1, np.inf))

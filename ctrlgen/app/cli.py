@@ -13,6 +13,7 @@ from ctrlgen.app.commands import controllers, devices, examples, recordings  # n
 from ctrlgen.app.commands.app import app
 from ctrlgen.app.console import CHECK, complain, err, show_warning
 from ctrlgen.core.errors import CtrlgenError, Unreachable
+from ctrlgen.core.files import explained
 
 for command in app.registered_commands:  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
     command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback) or "")
@@ -38,10 +39,8 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     except typer.Abort:
         return 130
     except OSError as error:
-        said = (
-            f"{error.strerror}: {error.filename}" if error.strerror else str(error)
-        )  # a library's own may have no number
-        err.print(f"error: {said}", markup=False, soft_wrap=True)
+        place = f"{error.filename}: " if error.filename else ""
+        err.print(f"error: {place}{explained(error)}", markup=False, soft_wrap=True)
         return 1
     except Exception as error:
         if not hasattr(error, "format_message"):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.files import read_toml
+from ctrlgen.core.files import read_toml, write_bytes
 from ctrlgen.core.shipped_files import shipped
 
 SCENARIO = "scenario.toml"
@@ -95,8 +94,7 @@ def copy_examples(names: Sequence[str], to: Path) -> list[Path]:
             what = "exists and is not the example's; name another folder, or move it away"
             raise InputError("--to", [Fault(str(copy), what)])
     for copy, original in copies.items():
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(original, copy)
+        write_bytes(copy, original.read_bytes())
     return list(copies)
 
 

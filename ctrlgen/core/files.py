@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import os
+import reprlib
 import shutil
 import tempfile
 import tomllib
@@ -20,9 +22,9 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_text(path: Path | str) -> str:
-    """The text of a file, UTF-8. Raises InputError when it cannot be read."""
+    """The text of a file, UTF-8 with or without a byte order mark. Raises InputError when it cannot be read."""
     try:
-        return Path(path).read_text(encoding="utf-8")
+        return Path(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise InputError(path, [Fault("file", "does not exist; check the path")]) from None
     except IsADirectoryError:
@@ -30,7 +32,40 @@ def read_text(path: Path | str) -> str:
     except UnicodeDecodeError as error:
         raise InputError(path, [Fault("file", f"is not UTF-8 text (byte {error.start}); save it as UTF-8")]) from None
     except OSError as error:
-        raise InputError(path, [Fault("file", f"cannot be read: {error.strerror}")]) from None
+        raise InputError(path, [Fault("file", f"cannot be read: {explained(error)}")]) from None
+    except ValueError:  # a name with a null character
+        raise InputError(repr(str(path)), [Fault("file", "is no name of a file; correct the path")]) from None
+
+
+def explained(error: OSError) -> str:
+    """What the operating system refused, and what to do about it where that is known."""
+    said = error.strerror or str(error)
+    remedy = _REMEDIES.get(error.errno or 0)
+    return f"{said}; {remedy}" if remedy else said
+
+
+_REMEDIES = {
+    errno.ENOSPC: "free space on that disk, or write to another one",
+    errno.EDQUOT: "your share of that disk is used up: free space, or write to another one",
+    errno.EFBIG: "raise the limit of the size of a file (ulimit -f), or ask for fewer samples",
+    errno.EROFS: "that disk is read-only: write to another one",
+    errno.EACCES: "you may not; name a place where you may, or have it permitted",
+    errno.EPERM: "you may not; name a place where you may, or have it permitted",
+    errno.ELOOP: "a link leads back to itself; remove or correct the link",
+    errno.ENOENT: "check the path",
+    errno.EEXIST: "a file or a broken link stands where a folder is needed",
+    errno.ENOTDIR: "a file stands where a folder is needed",
+    errno.ENAMETOOLONG: "choose a shorter name",
+    errno.EMFILE: "too many files are open: raise the limit (ulimit -n), or use fewer processes",
+}
+_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG}  # only writing meets these
+
+
+def unwritable(path: Path | str, error: OSError, where: str = "file") -> InputError:
+    """The error for `path`, which could not be written."""
+    above = error.filename and Path(error.filename) in Path(path).parents  # not the temporary file's name
+    place = f" at {error.filename}" if above else ""
+    return InputError(path, [Fault(where, f"cannot be written{place}: {explained(error)}")])
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:
@@ -39,6 +74,9 @@ def read_toml(path: Path | str) -> dict[str, Any]:
         return tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise InputError(path, [Fault("syntax", f"{error}; see https://toml.io for the notation")]) from None
+    except RecursionError:
+        what = "lists or tables stand hundreds deep inside one another, which no file of ctrlgen needs; is it the right one?"
+        raise InputError(path, [Fault("syntax", what)]) from None
 
 
 def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Model:
@@ -67,9 +105,14 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
             f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(siblings)}"
         )
     elif details["type"] in _REMEDY:
-        message = f"{details['input']!r}: {_REMEDY[details['type']]}"
+        message = f"{reprlib.repr(details['input'])}: {_REMEDY[details['type']]}"
     elif details["type"] == "literal_error":
-        message = f"{details['input']!r} must be {details['ctx']['expected']}"
+        message = f"{reprlib.repr(details['input'])} must be {details['ctx']['expected']}"
+    elif details["type"] == "union_tag_invalid":
+        where = f"{where}.kind" if where else "kind"
+        message = f"{reprlib.repr(details['input']['kind'])} is not one I know; write {details['ctx']['expected_tags']}"
+    elif details["type"] == "union_tag_not_found":
+        message = 'has no kind; add kind = "..."'
     return Fault(where or "file", message)
 
 
@@ -81,6 +124,7 @@ _REMEDY = {
     "float_type": "write a number without a unit",
     "float_parsing": "write a number without a unit",
     "bool_type": "write true or false",
+    "model_attributes_type": "write a table, such as { ... } or [section]",
     "model_type": "write a table, such as { ... } or [section]",
     "dict_type": 'write a table, such as { delta_z = "20 um" }',
 }
@@ -124,7 +168,14 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write `content` whole or not at all: a temporary file beside `path`, then a rename."""
+    """Write `content` whole or not at all: a temporary file beside `path`, then a rename. Raises InputError."""
+    try:
+        _write_whole(path, content)
+    except OSError as error:
+        raise unwritable(path, error) from None
+
+
+def _write_whole(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
@@ -146,7 +197,9 @@ def whole_folder(out: Path) -> Iterator[Path]:
     Raises InputError when `out` cannot be written or holds somebody else's files.
     """
     try:
-        out = Path(out).resolve()
+        out = Path(os.path.realpath(out))
+        if out.is_symlink():
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(out))
         if out.exists() and not out.is_dir():
             raise InputError(out, [Fault("--out", "is a file; name a folder")])
         foreign = _foreign(out)
@@ -156,9 +209,7 @@ def whole_folder(out: Path) -> Iterator[Path]:
         out.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
     except OSError as error:
-        raise InputError(
-            out, [Fault("--out", f"cannot be written ({error.strerror}); name a folder you may write")]
-        ) from None
+        raise unwritable(out, error, "--out") from None
     retired = draft.with_name(draft.name + ".old")
     try:
         yield draft
@@ -168,10 +219,12 @@ def whole_folder(out: Path) -> Iterator[Path]:
         if out.exists():
             os.replace(out, retired)
         os.replace(draft, out)
-    except BaseException:
+    except BaseException as error:
         if retired.exists() and not out.exists():
             os.replace(retired, out)
         shutil.rmtree(draft, ignore_errors=True)
+        if isinstance(error, OSError) and error.errno in _NO_ROOM:
+            raise unwritable(out, error, "--out") from None
         raise
     finally:
         shutil.rmtree(retired, ignore_errors=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -20,10 +21,14 @@ def load_device(path: Path | str) -> Device:
     table = read_toml(Path(path) / "scenario.toml" if (Path(path) / "scenario.toml").is_file() else path)
     if "device" in table and "kind" not in table:
         raise InputError(path, [Fault("file", f"is a scenario; name its device, {table['device']}")])
+    if "record" in table:
+        raise InputError(path, [Fault("file", "describes a recording; name the device file that it was made on")])
     kind = table.get("kind")
-    if kind not in Device.library:
+    if not isinstance(kind, str) or kind not in Device.library:
         known = ", ".join(f'"{name}"' for name in sorted(Device.library))
-        raise InputError(path, [Fault("kind", f"{kind!r} is not a kind of device I know; write kind = one of {known}")])
+        raise InputError(
+            path, [Fault("kind", f"{reprlib.repr(kind)} is not a kind of device I know; write kind = one of {known}")]
+        )
     return validate(Device.library[kind], table, path)
 
 

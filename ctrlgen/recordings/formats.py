@@ -90,6 +90,8 @@ class MeasurementTable:
 
 def read_table(path: Path) -> MeasurementTable:
     """The columns of a measurement file. Raises InputError: no such file, unknown or damaged format, missing package."""
+    if path.is_dir():
+        raise InputError(path, [Fault(path.name, "is a folder; name the file inside it")])
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(READERS)
@@ -109,7 +111,7 @@ def read_table(path: Path) -> MeasurementTable:
 
 def read_csv(path: Path) -> MeasurementTable:
     """Text separated by comma, semicolon or tab; a header unless row 1 is numbers; lines with # are left out."""
-    text = read_text(path).removeprefix("\ufeff")
+    text = read_text(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     separator = next((mark for mark in "\t;," if mark in first), ",")
     reader = csv.reader(io.StringIO(text), delimiter=separator)

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ctrlgen.core.files import read_toml, validate
 from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings import preprocessing, validation
-from ctrlgen.recordings.formats import MeasurementTable, read_table
+from ctrlgen.recordings.formats import READERS, MeasurementTable, read_table
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits
 
@@ -106,6 +107,17 @@ class _Content:
     faults: tuple[Fault, ...] = ()
 
 
+def _described(path: Path) -> dict[str, Any]:
+    """The tables of a recording.toml. Raises InputError, also for a file that is plainly something else."""
+    if path.suffix.lower() in READERS:
+        raise InputError(path, [Fault("file", f"is a measurement; name the {FILE} that describes it")])
+    table = read_toml(path)
+    if "record" not in table and ("path" in table or "name" in table):
+        what = f"describes a {'scenario' if 'path' in table else 'device'}; name a {FILE}"
+        raise InputError(path, [Fault("file", what)])
+    return table
+
+
 class _File:
     """One recording.toml and its faults against the model; `written` is None where it is not a valid file."""
 
@@ -114,7 +126,7 @@ class _File:
         self.prefix = f"{self.path}: " if several else ""
         self.written: RecordingFile | None = None
         try:
-            self.written = validate(RecordingFile, read_toml(self.path), self.path)
+            self.written = validate(RecordingFile, _described(self.path), self.path)
             faults: Sequence[Fault] = check(self.written, model)
         except InputError as error:
             faults = error.faults

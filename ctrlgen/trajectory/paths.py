@@ -220,8 +220,13 @@ def _through(corners: np.ndarray, times: np.ndarray, n: int) -> np.ndarray:
 
 def read_poses(path: Path, frame: Frame) -> np.ndarray:
     """A CSV of samples as (n, channels) in SI. Raises InputError listing every bad cell by line and column."""
-    table = csv.reader(io.StringIO(read_text(path)))
-    rows = [(line, row) for line, row in enumerate(table, start=1) if any(cell.strip() for cell in row)]
+    try:
+        lines = list(csv.reader(io.StringIO(read_text(path))))
+    except csv.Error as error:
+        raise InputError(
+            path, [Fault("file", f"is no CSV: {error}; write a header row and one row a sample")]
+        ) from None
+    rows = [(line, row) for line, row in enumerate(lines, start=1) if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         raise InputError(path, [Fault("file", "has no samples; write a header row and one row a sample")])
     columns: list[tuple[int, str, str]] = []

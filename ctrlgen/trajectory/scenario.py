@@ -136,6 +136,8 @@ def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:
     path = Path(path)
     file_path = path / FILE if path.is_dir() else path
     table = read_toml(file_path)
+    if "record" in table:
+        raise InputError(file_path, [Fault("file", "describes a recording; name a scenario, or diagnose it")])
     if "kind" in table and "device" not in table:
         what = 'describes a device; name a scenario, or write one that has device = "..." with this file\'s path'
         raise InputError(file_path, [Fault("file", what)])
