@@ -182,7 +182,7 @@ def split_unit(unit: str, words: tuple[str, ...]) -> tuple[dict[str, float], str
 
     ({"channel": 1.0, "travel": -2.0}, "s ** 2") for 'channel*s^2/travel^2'.
     """
-    powers = UnitsContainer(to_units_container(unit))
+    powers: Any = UnitsContainer(to_units_container(unit))  # its powers are typed as any number, complex too
     placed = {word: float(power) for word, power in powers.items() if word in words}
     return placed, str(powers.remove(placed))
 
