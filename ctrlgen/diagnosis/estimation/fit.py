@@ -62,9 +62,9 @@ class Fit:
         """R (k, k) of the unknowns with |R dp|^2 = dp' C^-1 dp: what the readings say of them whatever the starts are."""
         k = len(self.theta)
         if self.J.shape[1] == k:
-            return np.linalg.qr(self.J, "r")
+            return np.linalg.qr(self.J).R
         Q = np.linalg.qr(self.J[:, k:])[0]
-        return np.linalg.qr(self.J[:, :k] - Q @ (Q.T @ self.J[:, :k]), "r")
+        return np.linalg.qr(self.J[:, :k] - Q @ (Q.T @ self.J[:, :k])).R
 
     def values(self, cause: int) -> dict[str, float]:
         """The parameters of one cause [SI]."""
@@ -122,7 +122,7 @@ class Fitter:
         if nested is None or found.objective <= nested.objective:
             return found
         for i, u in enumerate(structure.free_parameters):
-            if u.amplitude and structure.causes[u.cause] not in nested.structure.causes:
+            if u.amplitude and structure.cause_of(u) not in nested.structure.causes:
                 begin[i] = u.nominal + FIT.restart_amplitude * (begin[i] - u.nominal)
         begin[problem.k :] = np.concatenate(nested.initial_states)
         stated = np.concatenate([structure.start, np.zeros(problem.n_starts)])

@@ -13,7 +13,7 @@ from itertools import pairwise
 import casadi as ca
 
 from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations
-from ctrlgen.model.integrators import ImplicitRadau
+from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau
 
 POINTS = 4  # of an explicit step
 Step = Callable[
@@ -61,15 +61,16 @@ def _steps(q: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: 
     """y and T after all steps of a sample; `seed` by what keeps its value meanwhile: `held`, then the constants."""
     y, u, u_next, e, c = given
     free = seed.size2() > held.numel()
-    on = _implicitly(q, free) if isinstance(q.steps, ImplicitRadau) else _explicitly(q, free)
-    for begin, end in pairwise(q.steps.drives(u, u_next, q.linear)):
+    steps = q.integrator
+    on = _implicitly(q, steps, free) if isinstance(steps, ImplicitRadau) else _explicitly(q, steps, free)
+    for begin, end in pairwise(steps.drives(u, u_next, q.linear)):
         y, T = on(T, seed, [y, begin, end, held, e, c])
     return y, T
 
 
-def _implicitly(q: SampleEquations, free: bool) -> Step:
+def _implicitly(q: SampleEquations, steps: ImplicitRadau, free: bool) -> Step:
     """A step through points Y = base + M n with n = N(Y): dn = (1 - N_Y M)^-1 (N_Y dbase + N_c dc)."""
-    steps, along = q.steps, _along(q, free)
+    along = _along(q, free)
     E_c, E, P, W, V = (M.T for M in (steps.E_c, steps.E, steps.P, steps.W, steps.V))
 
     def on(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
@@ -85,9 +86,8 @@ def _implicitly(q: SampleEquations, free: bool) -> Step:
     return on
 
 
-def _explicitly(q: SampleEquations, free: bool) -> Step:
+def _explicitly(q: SampleEquations, steps: ExponentialRungeKutta, free: bool) -> Step:
     """A step from point to point."""
-    steps = q.steps
     along = _along(q, free)
     read = sorted({row for i in range(1, 1 + POINTS) for row in along.sparsity_out(i).row()})  # the states N depends on
     half, Q, R = (_columns(M.T, read) for M in (steps.half, steps.Q, steps.R))
@@ -114,7 +114,7 @@ def _along(q: SampleEquations, free: bool) -> ca.Function:
     N, arguments, kept = _rest(q, free)
     y, u, end, *own = arguments
     slopes = ca.Function("slopes", [y, u, *own], _slopes([N(y, u, *own)], [y, kept]))
-    after, points = q.steps.points(lambda y, u: N(y, u, *own), y, u, end)
+    after, points = q.integrator.points(lambda y, u: N(y, u, *own), y, u, end)
     by_y, by_kept = zip(*(slopes(*point, *own) for point in points), strict=True)
     return ca.Function("along", arguments, [after, *by_y, *by_kept], {"cse": True})
 
@@ -123,7 +123,7 @@ def _rest(q: SampleEquations, free: bool) -> tuple[ca.Function, list[ca.SX], ca.
     """N (y, u, held, ambient, c); symbols y, u, u at the end, held, ambient, c; those of what keeps its value."""
     y, u, _, e, c = q.given
     own = [q.model.held, e, c]
-    N = ca.Function("N", [y, u, *own], [q.steps.rest(q.model)])
+    N = ca.Function("N", [y, u, *own], [q.integrator.rest(q.model)])
     return N, [y, u, ca.SX.sym("end", u.numel()), *own], ca.vertcat(q.model.held, c) if free else q.model.held
 
 

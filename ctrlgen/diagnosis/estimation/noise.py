@@ -115,8 +115,8 @@ def estimate_noise(recording: Recording, settling: float) -> Noise:
 
 def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     """Channel i of settled poses."""
-    if recording.noise[i]:
-        return _ChannelNoise(recording.noise[i], "as stated", np.inf)
+    if stated := recording.noise[i]:
+        return _ChannelNoise(stated, "as stated", np.inf)
     sd, count = _repeatability(recording.records, i)
     if count >= NOISE.fewest_repeats and sd > 0:
         return _ChannelNoise(sd, f"from repeated poses, {count} beyond the first of each", float(count))
@@ -141,8 +141,8 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
         quiet = _without_events([without_lines(_detrended(s, degree)) for s in long])
         if quiet:
             return _from_stretches(quiet, source, rounding)
-    if recording.noise[i]:
-        sd, _ = _with_rounding(recording.noise[i], np.zeros(0), rounding)
+    if stated := recording.noise[i]:
+        sd, _ = _with_rounding(stated, np.zeros(0), rounding)
         return _ChannelNoise(sd, "as stated, taken as white", NOISE.stated_samples)
     thirds = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
     # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance

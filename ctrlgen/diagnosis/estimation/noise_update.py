@@ -18,7 +18,7 @@ def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
     """Where the noise was guessed: from what `fit` leaves at the frequencies at which the readings move least."""
     noise, channels = fitter.noise, fitter.recording.channels
     sd, ar, count, said = noise.sd.copy(), list(noise.ar), noise.count.copy(), list(noise.notes)
-    for i in np.flatnonzero(noise.guessed):
+    for i in np.flatnonzero(noise.guessed).tolist():
         parts = [p for r in fitter.fit_records if (p := _quiet(fitter, fit, r, i)) is not None]
         if not parts:
             continue
@@ -54,11 +54,14 @@ def update_noise(fitter: Fitter, fit: Fit) -> Noise:
     smaller = found.floor < noise.floor
     if not smaller.any():
         return noise
-    pairs = {name: (getattr(found, name), getattr(noise, name)) for name in ("sd", "count")}
-    rows = {
-        name: tuple(getattr(found if s else noise, name)[i] for i, s in enumerate(smaller)) for name in ("ar", "notes")
-    }
-    return replace(noise, **{name: np.where(smaller, a, b) for name, (a, b) in pairs.items()}, **rows)
+    better = [found if s else noise for s in smaller]
+    return replace(
+        noise,
+        sd=np.where(smaller, found.sd, noise.sd),
+        count=np.where(smaller, found.count, noise.count),
+        ar=tuple(each.ar[i] for i, each in enumerate(better)),
+        notes=tuple(each.notes[i] for i, each in enumerate(better)),
+    )
 
 
 def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:
@@ -70,7 +73,7 @@ def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:
     sd, ar, floor = noise.sd.copy(), list(noise.ar), noise.floor
     learnt = False
     rests = [r for r in fitter.recording.records if r.role == "rest"]
-    for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.fit_records)):
+    for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.fit_records)).tolist():
         parts = [_left(fitter, fit, r, i) for r in fitter.fit_records]
         left = np.sqrt(np.mean(np.concatenate(parts) ** 2))
         if left >= NOISE_UPDATE.largest_residual * floor[i]:

@@ -55,7 +55,7 @@ def profiles(fitter: Fitter, fit: Fit) -> tuple[Profile, ...]:
 
 def _profile(surface: _Surface, fit: Fit, i: int, ratio: np.ndarray | None) -> Profile:
     unknown = fit.structure.free_parameters[i]
-    cause = fit.structure.causes[unknown.cause]
+    cause = fit.structure.cause_of(unknown)
     value, sd = float(fit.theta[i]), float(np.sqrt(max(fit.covariance[i, i], 0.0)))
     low, high = (_Side(surface, i, value, sd, bound) for bound in (unknown.low, unknown.high))
     wider = 1.0 if ratio is None or ratio[i] < ROBUST_COVARIANCE.agreement else float(ratio[i])

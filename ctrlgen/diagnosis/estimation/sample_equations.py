@@ -30,6 +30,13 @@ class SampleEquations:
     y: ca.SX
     given: list[ca.SX]
 
+    @property
+    def integrator(self) -> ExponentialRungeKutta | ImplicitRadau:
+        """The steps of a model with inertia. Raises ValueError for one without."""
+        if self.steps is None:
+            raise ValueError("a model in balance takes no steps")
+        return self.steps
+
 
 def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> SampleEquations:
     """Of `model` with readings `y`, settled where `sample_time` is infinite."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -82,14 +83,23 @@ class Structure:
         """The sum over its causes."""
         return sum(c.prior.log_prior_odds for c in self.causes)
 
+    def cause_of(self, parameter: FreeParameter) -> Hypothesis:
+        """The cause that a parameter belongs to. Raises ValueError for one of the device's own."""
+        if parameter.cause is None:
+            raise ValueError(f"{parameter.path} belongs to the device, not to a cause")
+        return self.causes[parameter.cause]
+
     def plausible_range(self, unknown: FreeParameter) -> tuple[float, float] | None:
         """The range [SI] outside of which an amplitude means something else than its effect's name says."""
-        cause = self.causes[unknown.cause]
+        cause = self.cause_of(unknown)
         if cause.effect == PARAMETER:
             return None
         p = cause.law.amplitude()
         plausible = cause.prior.of(p).plausible_range
-        return None if plausible is None else tuple(self.channel_of(cause).si(end, p) for end in plausible)
+        if plausible is None:
+            return None
+        channel = self.channel_of(cause)
+        return channel.si(plausible[0], p), channel.si(plausible[1], p)
 
     def channel_of(self, cause: Hypothesis) -> Channel:
         """The channel at which a cause acts; the first one where it acts at all of them."""
@@ -239,7 +249,7 @@ def _movable(device: Device) -> frozenset[str]:
 def changed(device: Device, values: dict[str, float]) -> Device:
     """The device with some of its numbers at other values [SI]."""
 
-    def walk(node: object, prefix: str) -> object:
+    def walk(node: Any, prefix: str) -> Any:
         if isinstance(node, Quantity):
             return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
         if isinstance(node, Section):

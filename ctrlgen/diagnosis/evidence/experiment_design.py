@@ -72,11 +72,10 @@ def _open(fitter: Fitter, search: Search, explained: bool) -> tuple[list[tuple[F
         return [], ""
     tried: dict[str, Fit] = {}
     for trial in search.rounds[-1].trials:  # none of them was good enough
-        tried.setdefault(trial.cause.effect, trial.fit)
-    fits = [*list(tried.values())[: EXPERIMENT.suspects], chosen][: EXPERIMENT.suspects]
-    return (
-        [tuple(fits)] if len(fits) == EXPERIMENT.suspects else []
-    ), "neither explains this recording; they come closest"
+        tried.setdefault(trial.cause.effect if trial.cause else "", trial.fit)
+    closest = [*list(tried.values())[: EXPERIMENT.suspects], chosen][: EXPERIMENT.suspects]
+    pairs = [(closest[0], closest[1])] if len(closest) == EXPERIMENT.suspects else []
+    return pairs, "neither explains this recording; they come closest"
 
 
 def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:
@@ -129,7 +128,7 @@ class _Sums:
             return float("nan")
         d = np.sqrt(np.maximum(np.diag(self.N), 1e-300))
         taken = (self.g / d) @ np.linalg.pinv(self.N / np.outer(d, d), rcond=1e-12) @ (self.g / d)
-        return float(np.sqrt(max(self.s - taken, 0.0)))
+        return float(np.sqrt(max(self.s - float(taken), 0.0)))
 
     @classmethod
     def present(cls, fitter: Fitter, truth: Fit, refitted: Fit) -> _Sums:

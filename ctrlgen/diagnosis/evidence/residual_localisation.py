@@ -82,7 +82,8 @@ def where(left: list[Along], channels: tuple[str, ...], units: tuple[str, ...], 
         maps.sizes(maps.white[:, i], maps.usable[:, i], [(name, np.ones(maps.n, bool))], maps.residual[:, i], unit)[0]
         for i, (name, unit) in enumerate(zip(channels, units, strict=True))
     )
-    actuators, regions, directions = [], {}, {}
+    actuators: list[Size] = []
+    regions, directions = {}, {}
     for i, axis in enumerate(axes):
         a, sized, unit = maps.actuators[:, i], maps.actuators_white[:, i], left[0].units[i]
         actuators += maps.sizes(sized, maps.complete, [(axis, np.ones(maps.n, bool))], a, unit)
@@ -91,7 +92,7 @@ def where(left: list[Along], channels: tuple[str, ...], units: tuple[str, ...], 
         directions[axis] = maps.sizes(
             sized, maps.complete, sides, _without_position(a, maps.z[:, i], maps.complete), unit
         )
-    norm, whole = np.sqrt(np.mean(maps.white**2, axis=1)), maps.usable.any(axis=1)
+    norm, whole = np.sqrt(np.mean(maps.white**2, axis=1)), np.any(maps.usable, axis=1)
     ambient = _quintiles(maps.ambient, "delta_degC") if maps.ambient is not None else []
     found = Where(
         maps.excess, _shared(outputs), _shared(tuple(actuators)), maps.coordinates(channels), _bands(left), regions,
@@ -137,7 +138,7 @@ class _Maps:
         self.z = np.concatenate([a.displacement for a in left])
         self.direction = np.concatenate([a.direction() for a in left])
         self.n = len(self.white)
-        self.complete = self.usable.all(axis=1)
+        self.complete = np.all(self.usable, axis=1)
         given = all(a.record.ambient is not None for a in left)
         self.ambient = np.concatenate([a.record.ambient for a in left]) if given else None
         self.block = _blocks([len(a.white) for a in left])
@@ -283,10 +284,12 @@ def _bands(left: list[Along]) -> tuple[Band, ...]:
         if count[k] == 0:
             continue
         level, m = power[k] / count[k], 2 * count[k]
-        ci = tuple(float(level * m / stats.chi2.ppf(q, m) - 1) for q in (0.975, 0.025))
-        seen = [c[k] for c, _ in coherences if c[k] is not None]
+        low, high = (float(level * m / stats.chi2.ppf(q, m) - 1) for q in (0.975, 0.025))
+        seen = [value for c, _ in coherences if (value := c[k]) is not None]
         floor = max((f for c, f in coherences if c[k] is not None), default=None)
-        found.append(Band(float(edges[k]), float(edges[k + 1]), float(level - 1), ci, max(seen, default=None), floor))
+        found.append(
+            Band(float(edges[k]), float(edges[k + 1]), float(level - 1), (low, high), max(seen, default=None), floor)
+        )
     return tuple(found)
 
 

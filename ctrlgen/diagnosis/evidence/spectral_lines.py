@@ -82,7 +82,9 @@ def _p(mean: np.ndarray, noise: np.ndarray, m: int) -> float:
 
 
 def _said(p: dict[str, float | None], both: bool) -> str:
-    odd, even = (p[kind] is not None and p[kind] < SPECTRAL_LINES.answer_p for kind in ("odd", "even"))
+    odd, even = (
+        (p[kind] or 0.0) < SPECTRAL_LINES.answer_p if p[kind] is not None else False for kind in ("odd", "even")
+    )
     if not odd and not even:
         return "answers only where it is driven: what is missing is linear and fixed in time, or below the noise"
     if both:

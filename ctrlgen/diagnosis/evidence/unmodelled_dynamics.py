@@ -88,9 +88,9 @@ def _maps(found: list[Free], i: int) -> tuple[Map, ...]:
             ("velocity", f"{travel}/s", joined("velocity"), everywhere),
             ("time", "s", np.concatenate([e.along.record.time[: len(e.f)] for e in found]), everywhere),
         ]  # fmt: skip
-    ambient = [e.along.record.ambient for e in found]
-    if all(values is not None for values in ambient):
-        T = np.concatenate([values[: len(e.f)] for values, e in zip(ambient, found, strict=True)])
+    ambient = [a[: len(e.f)] for e in found if (a := e.along.record.ambient) is not None]
+    if len(ambient) == len(found):
+        T = np.concatenate(ambient)
         rows += [("temperature", "K", T, everywhere)] if np.ptp(T) > 0 else []
     return tuple(_map(name, u, x[mask], f[mask], sd[mask], unit) for name, u, x, mask in rows if mask.sum() > MAPS.bins)
 
@@ -98,7 +98,11 @@ def _maps(found: list[Free], i: int) -> tuple[Map, ...]:
 def _map(name: str, unit: str, x: np.ndarray, f: np.ndarray, sd: np.ndarray, value_unit: str) -> Map:
     edges = np.linspace(x.min(), x.max(), MAPS.bins + 1)
     which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, MAPS.bins - 1)
-    at, mean, low, high, within = [], [], [], [], 0.0
+    at: list[float] = []
+    mean: list[float] = []
+    low: list[float] = []
+    high: list[float] = []
+    within = 0.0
     for k in range(MAPS.bins):
         inside = which == k
         within += float(np.sum((f[inside] - f[inside].mean()) ** 2)) if inside.any() else 0.0

@@ -20,7 +20,7 @@ class _Probe(Effect, listed=False):
 
     def __init__(self, place: Place, at: str, unit: str) -> None:
         super().__init__(at, {"delta": Quantity(0.0, f"0 {unit}")})
-        self.place = place
+        self.place = place  # type: ignore[misc]  # one class stands for all places
 
     def term(self, s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
         return p.delta
@@ -28,7 +28,8 @@ class _Probe(Effect, listed=False):
 
 def with_probes(device: Device, physics: DevicePhysics) -> tuple[Device, dict[tuple[Place, int], str]]:
     """The device with a probe everywhere, and the path of each by place and channel."""
-    probes, paths = [], {}
+    probes: list[_Probe] = []
+    paths: dict[tuple[Place, int], str] = {}
     for place in Place:
         if place is Place.HEAT and "heat" not in available(physics):
             continue

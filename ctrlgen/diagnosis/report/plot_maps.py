@@ -59,8 +59,8 @@ def excesses(value: Any, prefix: str = "") -> list[tuple[str, float, list[float]
     """(label, excess, its interval) of every part in one group of `where`."""
     rows = []
     if isinstance(value, dict) and isinstance(value.get("excess"), (int, float)):
-        bounds = [value.get("low"), value.get("high")]
-        label = value.get("label") or (f"{number(bounds[0], 3)} ... {number(bounds[1], 3)} Hz" if all(bounds) else "")
+        low, high = value.get("low"), value.get("high")
+        label = value.get("label") or (f"{number(low, 3)} ... {number(high, 3)} Hz" if low and high else "")
         ci = value.get("ci95")
         known = ci if ci and all(isinstance(v, (int, float)) for v in ci) else None
         return [(f"{prefix} {label}".strip(), float(value["excess"]), known)]
@@ -95,5 +95,5 @@ def _map(panel: Axes, title: str, m: dict[str, Any]) -> None:
     panel.plot(at, mean, "o-", ms=3, lw=1, color=COLOURS[0])
     panel.set_xlabel(f"{m['of']} [{m['unit']}]")
     panel.set_ylabel(f"[{m['value_unit']}]")
-    panel.xaxis.get_major_locator().set_params(nbins=5)
+    panel.locator_params("x", nbins=5)
     panel.set_title(f"{title}, {100 * m['share']:.0f} % goes with it", fontsize=8.5)

@@ -52,7 +52,9 @@ def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
         panel.barh(row, worse, color=colour, height=0.6)
         panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)
         _beside(panel, worse, row, number(worse, 3) if row else "best")
-    panel.set_yticks(range(len(round_.trials)), [hypothesis_name(t.cause) for t in round_.trials], fontsize=8)
+    panel.set_yticks(
+        range(len(round_.trials)), [hypothesis_name(t.cause) for t in round_.trials if t.cause], fontsize=8
+    )
     panel.invert_yaxis()
     panel.set_xscale("symlog", linthresh=SEARCH.rival_difference)
     panel.set_xlim(0, 30 * far)
@@ -79,7 +81,13 @@ def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
     for row, column in np.ndindex(values.shape):
         dark = values[row, column] > 0.6
         panel.text(
-            column, row, _cosine(values[row, column]), ha="center", va="center", fontsize=8, color="w" if dark else "k"
+            column,
+            row,
+            _cosine(float(values[row, column])),
+            ha="center",
+            va="center",
+            fontsize=8,
+            color="w" if dark else "k",
         )
     conspicuous = [f"{label}, |z| = {number(abs(s.z), 2)}" for label, s in zip(labels, top, strict=True)]
     panel.set_yticks(range(len(top)), conspicuous)
@@ -151,5 +159,5 @@ def _profile(panel: Axes, p: dict[str, Any]) -> None:
     unit = "" if p["unit"] == "1" else f" [{p['unit']}]"
     panel.set_xlabel(f"{p['parameter']}{unit}")
     panel.set_title(textwrap.fill(f"{p['effect']} at {p['location']}", LABEL), fontsize=8)
-    panel.xaxis.get_major_locator().set_params(nbins=4)
+    panel.locator_params("x", nbins=4)
     panel.tick_params(labelsize=7.5)

@@ -165,7 +165,7 @@ def _density(left: Residuals, parts: list[np.ndarray], records: list[int], i: in
     alike = [k for k in records if left.records[k].sample_time == h]
     stretches = [_judged(parts[k][:, i]) for k in alike]
     size = min(SEGMENT, *map(len, stretches))
-    total, weight = 0.0, 0
+    total, weight = np.zeros(size // 2 + 1), 0
     for values in map(np.nan_to_num, stretches):
         f, power = welch(values, 1 / h, nperseg=size, detrend=False)
         total, weight = total + len(values) * power, weight + len(values)

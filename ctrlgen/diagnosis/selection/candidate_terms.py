@@ -103,12 +103,14 @@ class Laws:
         law, where = h.law, structure.channel_of(h)
         names = [c.name for c in channels(nominal_physics(structure.device), law.place)]
         partner = names.index(h.of) if h.of else None
-        at = [(i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])]
-        if law.symmetric:
+        at: list[tuple[int, int | None]] = [
+            (i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])
+        ]
+        if law.symmetric and partner is not None:
             at += [(partner, i) for i, _ in at]
         amplitude = law.amplitude()
         low, high = (where.si(b, amplitude) for b in amplitude.bounds)
-        off, size = where.si(amplitude.off, amplitude), 1e-3 * (high - low)
+        off, size = where.si(amplitude.off or 0.0, amplitude), 1e-3 * (high - low)
         side = 1 if off <= low else -1 if off >= high else 0
         meant = h.prior.of(amplitude).fixed_range or (low - off, high - off)
         span = (meant[0] / size, meant[1] / size)

@@ -74,6 +74,7 @@ def _laws(channel: Channel, values: np.ndarray) -> Iterator[tuple[type[Effect], 
 
 def _only(recording: Recording, kept: list[int]) -> Recording:
     """The recording of these channels alone."""
-    fields = {name: tuple(getattr(recording, name)[i] for i in kept) for name in ("channels", "units", "noise")}
+    channels, units = (tuple(row[i] for i in kept) for row in (recording.channels, recording.units))
+    noise = tuple(recording.noise[i] for i in kept)
     records = tuple(replace(r, observed=r.observed[:, kept], valid=r.valid[:, kept]) for r in recording.records)
-    return replace(recording, **fields, records=records)
+    return replace(recording, channels=channels, units=units, noise=noise, records=records)

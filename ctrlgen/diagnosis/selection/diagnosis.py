@@ -207,7 +207,7 @@ def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, Chann
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         noise = float(floor[i] * scale) if known[i] else None
         beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
-        found[channel] = ChannelError(*rms, noise, unit, beside)
+        found[channel] = ChannelError(rms[0], rms[1], noise, unit, beside)
     return found
 
 
@@ -216,8 +216,8 @@ def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
     number better than its profile says."""
     found, profiled = {}, {p.path: p for p in profiles}
     for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
-        cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
-        if unknown.amplitude and cause.effect != PARAMETER:
+        cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
+        if cause is not None and cause.effect != PARAMETER:
             s = np.hypot(s, cause.prior.model_form_error * (value - unknown.nominal))
         ends = (value, max(value - STATISTICS.z_95 * s, unknown.low), min(value + STATISTICS.z_95 * s, unknown.high))
         value, low, high = (float(from_si(v, unknown.unit)) for v in ends)

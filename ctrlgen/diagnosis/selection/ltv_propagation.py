@@ -106,9 +106,9 @@ def _entries(columns: Sequence[Column], chosen: np.ndarray) -> dict[int, tuple[l
     return found
 
 
-def _runs(a: Sequence[int], b: Sequence[int]) -> list[Run]:
+def _runs(first: Sequence[int] | np.ndarray, second: Sequence[int] | np.ndarray) -> list[Run]:
     """Pairs of slices for two lists of places, each as long as both go on by one."""
-    a, b = np.asarray(a, int), np.asarray(b, int)
+    a, b = np.asarray(first, int), np.asarray(second, int)
     ends = np.flatnonzero((np.diff(a) != 1) | (np.diff(b) != 1)) + 1
     firsts, lasts = [0, *ends], [*ends, len(a)]
     return [

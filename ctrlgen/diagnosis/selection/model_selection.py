@@ -85,7 +85,7 @@ class Weighing:
             if cause.effect != PARAMETER and cause not in accepted and not cause.law.holds(trial.fit.values(k)):
                 return False
         for unknown, value in zip(structure.free_parameters, trial.fit.theta, strict=True):
-            if not unknown.amplitude or structure.causes[unknown.cause] in accepted:
+            if not unknown.amplitude or structure.cause_of(unknown) in accepted:
                 continue
             plausible = structure.plausible_range(unknown)
             if plausible and not plausible[0] <= value <= plausible[1]:

@@ -193,8 +193,10 @@ def _read_truly(fit: Fit) -> Fit:
     """The fit with every cause at a sensor off: fringes count what is there, not what they have made of it."""
     theta = fit.theta.copy()
     for k, u in enumerate(fit.structure.free_parameters):
-        cause = None if u.cause is None else fit.structure.causes[u.cause]
-        if u.amplitude and cause.effect != PARAMETER and cause.law.place is Place.SENSOR:
+        if not u.amplitude:
+            continue
+        cause = fit.structure.cause_of(u)
+        if cause.effect != PARAMETER and cause.law.place is Place.SENSOR:
             theta[k] = u.nominal
     return replace(fit, theta=theta)
 

@@ -56,7 +56,8 @@ class Searcher:
     def run(self, structure: Structure) -> Search:
         """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
         described = self.fitter.fit_described(structure.device)
-        current, rounds = self._measured(self.trial(cooled(described), steps=40)), []
+        rounds: list[Round] = []
+        current = self._measured(self.trial(cooled(described), steps=40))
         self.mismatch = current.fit.objective - self.weigh.n_fit
         for _ in range(SEARCH.most_noise_updates):
             current = self._rounds(current, rounds)
@@ -124,12 +125,12 @@ class Searcher:
         for k, cause in enumerate(trial.fit.structure.causes):
             if cause in before.fit.structure.causes or trial.fit.is_noise:
                 continue
-            structure, starts = cooled(trial.fit), others.get(cause, ())
-            size = cause.law.amplitude().name if starts else ""
-            starts = [*starts, *({**start, size: structure.starts[k][size]} for start in starts)]
-            if starts:
-                starts = [structure.restarted(k, start) for start in starts]
-                again = self.fitter.fit(min(starts, key=self.fitter.initial_objective), steps=SEARCH.trial_steps)
+            structure, shapes = cooled(trial.fit), others.get(cause, ())
+            size = cause.law.amplitude().name if shapes else ""
+            begins = [*shapes, *({**shape, size: structure.starts[k][size]} for shape in shapes)]
+            if begins:
+                restarted = [structure.restarted(k, begin) for begin in begins]
+                again = self.fitter.fit(min(restarted, key=self.fitter.initial_objective), steps=SEARCH.trial_steps)
                 if again.objective < trial.fit.objective:
                     trial = self._polished(self.weigh.judged(again, trial.cause))
         return trial
@@ -207,7 +208,8 @@ class Searcher:
                 and self.fitter.recording.kind == "series"
             ):
                 break
-            tried, used = 0, {}
+            tried = 0
+            used: dict[Hypothesis, int] = {}
             enough = best + max(self.weigh.need(current, screened), 0.05 * (excess - best))
             for promised, suspects in screened.together:
                 if len(suspects) != size or promised < enough or tried >= self.trials:
@@ -291,7 +293,7 @@ class Searcher:
         alike = [
             t
             for t in alike
-            if t.total < current.total + SEARCH.rival_difference or (special and t.cause.effect == special)
+            if t.total < current.total + SEARCH.rival_difference or (special and t.cause and t.cause.effect == special)
         ]
         return tuple(t for t in alike if self.weigh.meant(t, there))
 
