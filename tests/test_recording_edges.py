@@ -7,7 +7,7 @@ import pytest
 from recorded import csv_text, described, samples
 
 from ctrlgen.core.errors import InputError
-from ctrlgen.recordings.recording import load_recordings
+from ctrlgen.recordings.reader import load_recordings
 
 
 @pytest.mark.parametrize("shared, refused", [(4, False), (5, False), (6, True)])

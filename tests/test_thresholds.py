@@ -12,8 +12,8 @@ from scipy import stats
 from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.residual_tests import cross_correlation, judge
-from ctrlgen.diagnosis.estimation.structure import Structure, Unknown
+from ctrlgen.diagnosis.estimation.residual_tests import cross_correlation, run_residual_tests
+from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import Trial
 from ctrlgen.diagnosis.selection.model_selection import Weighing
@@ -47,8 +47,8 @@ class Numbers(SimpleNamespace):
         return self.usually
 
 
-def number(cause: int | None = None, low=0.0, high=1.0) -> Unknown:
-    return Unknown("p.gain", "1", 0.0, low, high, 1e-3, cause=cause, amplitude=cause is not None)
+def number(cause: int | None = None, low=0.0, high=1.0) -> FreeParameter:
+    return FreeParameter("p.gain", "1", 0.0, low, high, 1e-3, cause=cause, amplitude=cause is not None)
 
 
 def trial(
@@ -271,7 +271,7 @@ def judged(
         as_known=lambda fit, _: (fit, price, 0.0),
         whitened=lambda fit, r: white,
     )
-    return judge(fitter, fit)
+    return run_residual_tests(fitter, fit)
 
 
 def sized(ratio: float, n: int = 20000, n_y: int = 1) -> np.ndarray:
@@ -394,5 +394,5 @@ def test_tails_at_rest_that_noise_has_not_are_no_noise(tails, moves):
         as_known=lambda fit, _: (fit, 0.0, 0.0),
         whitened=lambda fit, r: r.observed,
     )
-    found = judge(fitter, SimpleNamespace(n=10**6, theta=np.zeros(0), chi2=1e6))
+    found = run_residual_tests(fitter, SimpleNamespace(n=10**6, theta=np.zeros(0), chi2=1e6))
     assert found.restless == (("reading.axis",) if moves else ()) and found.passed == (not moves)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ctrlgen.diagnosis.estimation.residual_tests import Adequacy
-from ctrlgen.diagnosis.estimation.structure import Unknown
+from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
+from ctrlgen.diagnosis.estimation.structure import FreeParameter
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.diagnosis import (
     AMBIGUOUS,
@@ -38,8 +38,8 @@ CREEP, DRIFT, GAIN, REVERSED = (
 )  # fmt: skip
 
 
-def number(path: str, nominal=1.0, sd=None, cause=None, unit="1") -> Unknown:
-    return Unknown(path, unit, nominal, -np.inf, np.inf, 1e-3, sd, cause, cause is not None)
+def number(path: str, nominal=1.0, sd=None, cause=None, unit="1") -> FreeParameter:
+    return FreeParameter(path, unit, nominal, -np.inf, np.inf, 1e-3, sd, cause, cause is not None)
 
 
 def fitted(objective=float(N), causes=(), theta=(), unknowns=(), penalty=0.0) -> SimpleNamespace:
@@ -133,7 +133,7 @@ def judged(
     chosen = trial(N + left**2 * 1e6, causes=causes, unknowns=unknowns, theta=theta)
     found = search(nominal, chosen, (trial(N + 500.0, N + confirmed),) * len(causes), rivals[: len(causes)])
     f = fitter(known, held_squares=lambda fit: worse if fit is chosen.fit else 0.0)
-    return verdict(f, found, Adequacy((1.0,), {}, passed), seen)
+    return verdict(f, found, ResidualTests((1.0,), {}, passed), seen)
 
 
 def test_a_verdict_says_what_is_known():
@@ -149,7 +149,7 @@ def test_a_verdict_says_what_is_known():
 
 def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_cause_first(monkeypatch):
     """Reversed 0.9 to 1.1 times: one."""
-    monkeypatch.setattr("ctrlgen.diagnosis.selection.diagnosis.deviations", lambda fit: np.full(len(fit.theta), 0.01))
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.diagnosis.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01))
     chosen = trial(N, N, causes=(GAIN, REVERSED), unknowns=(number("effect[0].gain", cause=0),), theta=(1.1,))
     bare = (trial(held=N + 100.0), trial(held=N + 300.0))
     first, second = findings(search(trial(held=1e3), chosen, bare, ((trial(cause=CREEP), trial()), ())))
@@ -163,7 +163,7 @@ def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_
 
 
 def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monkeypatch):
-    monkeypatch.setattr("ctrlgen.diagnosis.selection.diagnosis.uncertainty", lambda *_: np.array([5e-9]))
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.diagnosis.prediction_uncertainty", lambda *_: np.array([5e-9]))
     valid = np.ones((4, 1), bool)
     valid[3] = False
     nominal, chosen = trial(), trial()
