@@ -21,6 +21,7 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "thermal_lag": ("thermal_lag", "second_pole", "creep"),
     "viscous": ("viscous", "asymmetric_viscous"),
     "step": ("step", "force_step"),
+    "frame_turn": ("frame_turn", "frame_rotation_z"),
     "low_pass": ("low_pass", "thermal_lag"),
     "coulomb": ("coulomb",),
     "stribeck": ("stribeck",),
@@ -29,6 +30,10 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "stiffness": ("stiffness", "parameter@stiffness"),
     "finite_rotation": ("finite_rotation",),
 }
+SAME_LAW = {
+    "step": "force_step",
+    "frame_turn": "frame_rotation_z",
+}  # truth -> another name of the very same law and numbers
 # Places that are right beside the law's own, for the same reason.
 ALSO_AT = {
     "thermal_lag": ("actuator", "stage"),
@@ -135,7 +140,7 @@ class Judgement:
 
 
 def _covered(finding: dict[str, Any], truth: dict[str, Any]) -> list[tuple[str, str, bool]]:
-    if finding["effect"] not in {truth["name"], f"force_{truth['name']}"}:
+    if finding["effect"] not in {truth["name"], SAME_LAW.get(truth["name"])}:
         return []
     out = []
     given = finding.get("parameters", {})

@@ -29,7 +29,7 @@ LAWS = [
     Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("drive_gain", "actuator:1Y", "1Y"),
     Hypothesis("drive_gain", "actuator:all", "all"), Hypothesis("heater_resistance", "actuator:2X", "2X"),
     Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"), Hypothesis("low_pass", "sensor:theta_z", "theta_z"),
-    Hypothesis("swapped", "actuator:1X", "1X", "2X"), Hypothesis("frame_turn", "mechanism:delta_x", "delta_x"),
+    Hypothesis("swapped", "actuator:1X", "1X", "2X"), Hypothesis("frame_rotation_z", "mechanism:delta_x", "delta_x"),
     Hypothesis(PARAMETER, "actuator:thermal_resistance", path="actuator.thermal_resistance"),
 ]  # fmt: skip
 

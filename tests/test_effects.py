@@ -500,7 +500,17 @@ def test_logarithmic_creep_follows_the_logarithm_for_so_many_decades(D):
 
 def test_the_library_is_the_folder():
     files = {path.stem for path in Path(ctrlgen.effects.__path__[0]).glob("*.py") if not path.stem.startswith("_")}
-    assert set(Effect.library) == files
+    assert {law.__module__.rpartition(".")[2] for law in Effect.library.values()} == files
+
+
+def test_an_effect_is_called_as_its_class_and_titled_by_its_file_or_itself():
+    coulomb, turned = Effect.library["coulomb"], Effect.library["frame_rotation_x"]
+    assert coulomb.title == "Dry friction"
+    assert turned.title == "The platform's frame stands rotated about x against the drawing"
+    titles = [law.title for law in Effect.library.values()]
+    assert len(set(titles)) == len(titles)  # a report says which one it is
+    for kind, law in Effect.library.items():
+        assert kind == law.kind and kind.replace("_", "") == law.__name__.lower()
 
 
 def test_an_effect_without_an_off_value_is_refused():

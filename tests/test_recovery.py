@@ -38,6 +38,7 @@ COMPONENTS = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 TURNED, SHIFTED = 1e-6, 5e-9  # noise of a pose [rad, m]
 ALSO = {
     "softening": "stiffening",
+    "frame_turn": "frame_rotation_z",
     "step": "force_step",
     "viscous": "asymmetric_viscous",
 }  # the battery's names for them
@@ -200,8 +201,8 @@ def losing(u):
 ON_HEXAPOD = {
     "abbe_arm": (posed(lambda p: p + np.outer(p[:, 1] * 2e3, at(3, 1))), Planted("sensor:delta_x", {"arm": 2e-3}, "theta_y")),
     "link_compliance": (posed(lambda p: p + np.outer(p[:, 4] * 2e-5, at(0, 1))), Planted("mechanism:theta_x", {"tilt": 20.0}, "delta_y")),
-    "frame_tilt_x": (rotated("x", 0.01), Planted("mechanism:all", {"angle": 0.01})),
-    "frame_tilt_y": (rotated("y", -0.01), Planted("mechanism:all", {"angle": -0.01})),
+    "frame_rotation_x": (rotated("x", 0.01), Planted("mechanism:all", {"angle": 0.01})),
+    "frame_rotation_y": (rotated("y", -0.01), Planted("mechanism:all", {"angle": -0.01})),
     "screw_motion": (posed(along_a_screw), Planted("mechanism:all", {"share": 1.0})),
     "raised_point": (posed(raised), Planted("mechanism:all", {"height": 0.02})),
     "coupling": (lambda u: Hexapod(faults=Faults(coupling=at(2, 0.01))).settled(u), Planted("stage:2X", {"gain": 0.01}, "2Y")),

@@ -26,7 +26,7 @@ at = "2X"
 k3 = "5e-8 N/um^3"
 
 [[effect]]
-kind = "frame_turn"
+kind = "frame_rotation_z"
 at = "delta_y"
 angle = "3 mrad"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from enum import Enum
 from types import SimpleNamespace
 from typing import ClassVar
@@ -24,7 +26,7 @@ class Place(Enum):
 
 
 class Effect:
-    """Base of every effect: one law a file in `ctrlgen/effects/`.
+    """Base of every effect: one law a file in `ctrlgen/effects/`; one that acts at several places or axes is named for each.
 
     `term(s, p)` is the law's contribution, in the unit of the place. `p` holds the parameters in SI. `s` holds:
 
@@ -40,7 +42,8 @@ class Effect:
     """
 
     library: ClassVar[dict[str, type[Effect]]] = {}
-    kind: ClassVar[str]
+    kind: ClassVar[str]  # the class's name as a device file writes it: 'drive_gain' of DriveGain
+    title: ClassVar[str]  # what it is, without symbols, for a report; by default the first line of the law's file
     place: ClassVar[Place]
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
@@ -68,14 +71,17 @@ class Effect:
         self.of = of
 
     def __init_subclass__(cls, listed: bool = True) -> None:
+        cls.kind = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+        if "title" not in vars(cls):
+            cls.title = (sys.modules[cls.__module__].__doc__ or cls.kind).strip().split("\n")[0].rstrip(".")
+        if not listed:  # a law that is named once per place or axis, by its subclasses
+            return
         if not any(p.off is not None for p in cls.params):
             raise TypeError(
                 f"{cls.__name__}: give one parameter an `off` value, so that the model without this "
                 f"effect is a special case of the model with it"
             )
-        cls.kind = cls.__module__.rpartition(".")[2]
-        if listed:
-            Effect.library[cls.kind] = cls
+        Effect.library[cls.kind] = cls
 
     @classmethod
     def amplitude(cls) -> Param:

@@ -15,7 +15,7 @@ WHEN = (
 CLOCK = (State("t", "s", 1.0, clock=True),)
 
 
-def happened(s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
+def smooth_step(s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
     """(1 + tanh(pi (t - t_0)/T))/2 from 0 to 1, t from the common zero of the records' clock.
 
     It spreads in time as a straight rise from t_0 - T/2 to t_0 + T/2 does: 4 % are there at its begin, 96 % at its end.

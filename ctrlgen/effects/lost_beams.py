@@ -1,7 +1,7 @@
 """Beams, or a winding, that break at a moment."""
 
 from ctrlgen.effects import Effect, Param, Place
-from ctrlgen.effects._smooth_step import CLOCK, WHEN, happened
+from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
 
 
 class LostBeams(Effect):
@@ -17,4 +17,4 @@ class LostBeams(Effect):
     states = CLOCK
 
     def term(self, s, p):
-        return -p.share * s.value * happened(s, p)
+        return -p.share * s.value * smooth_step(s, p)

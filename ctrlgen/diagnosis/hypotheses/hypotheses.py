@@ -125,7 +125,8 @@ def hypotheses(
     device: Device, physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
 ) -> list[Hypothesis]:
     """All that can act on `device` and be seen in the channels `observed`."""
-    found = [h for law in Effect.library.values() for h in _of_law(law, physics, observed, sample_time, ambient)]
+    laws = (law for _, law in sorted(Effect.library.items()))  # in an order that does not depend on the files
+    found = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
     return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
 
 

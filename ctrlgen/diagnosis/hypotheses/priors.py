@@ -287,7 +287,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     **dict.fromkeys(
         (
             "abbe_arm", "asymmetric_viscous", "coupling", "cubic_sensor", "drive_gain", "drive_offset", "expansion",
-            "frame_tilt_x", "frame_tilt_y", "frame_turn", "heat_crosstalk", "heater_resistance", "home_offset",
+            "frame_rotation_x", "frame_rotation_y", "frame_rotation_z", "heat_crosstalk", "heater_resistance", "home_offset",
             "link_compliance", "quadratic_damping", "raised_point", "screw_motion", "sensor_gain", "stiffening", "stiffness",
         ),
         DEFAULT,

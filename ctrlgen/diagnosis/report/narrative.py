@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
@@ -38,12 +37,11 @@ HEADLINE = {
 
 
 def plain_name(effect: str) -> str:
-    """The first sentence of an effect file, which says it without symbols: 'A clamped flexure stretches as it bends'."""
+    """The title of an effect, which says it without symbols: 'A clamped flexure stretches as it bends'."""
     if effect == PARAMETER:
         return "A number of the device is off its nominal"
     law = Effect.library.get(effect)
-    text = sys.modules[law.__module__].__doc__ or "" if law else ""
-    return text.strip().split("\n")[0].rstrip(".") or effect
+    return law.title if law else effect
 
 
 def hypothesis_name(cause: Hypothesis) -> str:
