@@ -15,8 +15,10 @@ test: $(VENV)/installed-test
 test-long: $(VENV)/installed-test
 	$(BIN)/python -m pytest
 
+# make bench    times ctrlgen against named peers in the same run (minutes); REPEAT=1 is one round
+REPEAT ?= 5
 bench: $(VENV)/installed-test
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks --repeat $(REPEAT)
 
 # make battery SIZE=ci|small|full SEED=1: concealed cases (hours for full), diagnosed and scored; goes on where it was stopped
 SIZE ?= small
