@@ -179,7 +179,7 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
             j.places.append(place_is_right(_location(hit, truth), truth))
             j.covered += _covered(hit, truth)
     if [t["name"] for t in truths] == ["vibration"]:  # other laws have no band of their own
-        j.bands = [_in_band(diagnosis.get("where", {}), truths[0]["shape"]["frequency"])]
+        j.bands = [_in_band(diagnosis.get("residual_location", {}), truths[0]["shape"]["frequency"])]
     left = [f for f in left if not any(_harmonic(f, t) or _cubic(f, t) for t in truths)]
     spare = [f for f in left if not any(_among(f, t) for t in truths)]
     j.named += [("nothing", f["effect"]) for f in spare]
@@ -201,9 +201,9 @@ def _among(finding: dict[str, Any], truth: dict[str, Any], own: bool = False) ->
     return any(is_right(r["effect"], r.get("location", ""), truth) for r in rivals)
 
 
-def _in_band(where: dict[str, Any], frequency: float) -> bool:
+def _in_band(location: dict[str, Any], frequency: float) -> bool:
     """Whether the band with the largest excess over the noise, before any correction, holds the frequency [Hz]."""
-    bands = where.get("nominal", {}).get("band", [])
+    bands = location.get("before", {}).get("by_frequency", [])
     largest = max(bands, key=lambda b: b["excess"] or 0.0, default={"low": math.inf, "high": -math.inf})
     return largest["low"] <= frequency <= largest["high"]
 

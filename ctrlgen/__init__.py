@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ctrlgen.devices import load_device
     from ctrlgen.devices.user import user_device
     from ctrlgen.diagnosis.pipeline import diagnose
-    from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+    from ctrlgen.diagnosis.selection.result import Diagnosis
     from ctrlgen.firmware.folder import generate
     from ctrlgen.model.assembly import build_model
     from ctrlgen.model.feedforward import Controller, ControllerStatus
@@ -33,7 +33,7 @@ _EXPORTS = {
     "devices": ("load_device",),
     "devices.user": ("user_device",),
     "diagnosis.pipeline": ("diagnose",),
-    "diagnosis.selection.diagnosis": ("Diagnosis",),
+    "diagnosis.selection.result": ("Diagnosis",),
     "firmware.folder": ("generate",),
     "model.feedforward": ("Controller", "ControllerStatus"),
     "model.assembly": ("build_model",),

@@ -291,9 +291,9 @@ def test_a_line_is_looked_for_in_the_band_with_the_largest_excess(frequency, rig
     line = {"name": "vibration", "location": "disturbance:axis", "amplitude": 1.0, "shape": {"frequency": frequency}}
     answer = {"case": "x", "class": "single", "planted": [line]}
     bands = [{"low": 1.0, "high": 20.0, "excess": 0.1}, {"low": 20.0, "high": 100.0, "excess": 3.0}]
-    told = {"verdict": "explained", "findings": [], "where": {"nominal": {"band": bands}}}
+    told = {"verdict": "explained", "findings": [], "residual_location": {"before": {"by_frequency": bands}}}
     assert judge.judge(answer, told).bands == [right]
-    assert judge.judge(answer, told | {"where": {}}).bands == [False]
+    assert judge.judge(answer, told | {"residual_location": {}}).bands == [False]
     assert judge.judge(answer | {"planted": [line, ANSWERS[0]]}, told).bands == []
 
 

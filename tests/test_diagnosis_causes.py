@@ -19,13 +19,13 @@ from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import Trial
-from ctrlgen.diagnosis.selection.direct_detection import read_off
-from ctrlgen.diagnosis.selection.line_resolvability import resolved
-from ctrlgen.diagnosis.selection.model_selection import Weighing
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
+from ctrlgen.diagnosis.selection.line_resolvability import lines_resolved
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
-from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
+from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
 from ctrlgen.numerics.quantisation_step import quantisation_step
@@ -115,7 +115,9 @@ def test_readings_on_a_lattice_are_read_off_as_quantised():
     step = 10 * NOISE
     fitter = fitter_of(after=lambda y: step * np.round(y / step + 0.3))
     assert fitter.noise.floor[0] == pytest.approx(step / np.sqrt(12), rel=0.25)
-    (found,) = read_off(fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS)))
+    (found,) = directly_detected_findings(
+        fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))
+    )
     assert (found.effect, found.location) == ("quantisation", "sensor:axis")
     assert found.parameters["quantum"].value == pytest.approx(step * 1e6, rel=1e-6)
 
@@ -123,7 +125,12 @@ def test_readings_on_a_lattice_are_read_off_as_quantised():
 def test_printed_digits_below_the_noise_are_no_finding():
     fitter = fitter_of(after=lambda y: np.round(y, 10))
     assert quantisation_step(fitter.fit_records[0].observed[:, 0]) == pytest.approx(1e-10)
-    assert read_off(fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))) == ()
+    assert (
+        directly_detected_findings(
+            fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))
+        )
+        == ()
+    )
 
 
 def test_a_lattice_needs_every_reading_on_it():
@@ -183,9 +190,9 @@ def test_what_the_form_of_another_law_may_leave_is_given_no_name(first, lost, fi
     def fit(left, of=structure):
         return Fit(of, of.start, (), left, 1500, np.zeros(0), sure * np.eye(len(of.start)), 0.0)
 
-    weigh = Weighing(fitter_of(), lambda *_, **__: Trial(fit(1000.0), 1000.0, 0.0))
-    without, chosen = Trial(fit(fitted, structure.without(1)), lost, 0.0), Trial(fit(0.0), 0.0, 0.0)
-    assert weigh.doubtful(without, chosen, 1) == doubtful
+    weigh = ModelSelection(fitter_of(), lambda *_, **__: CandidateModel(fit(1000.0), 1000.0, 0.0))
+    without, chosen = CandidateModel(fit(fitted, structure.without(1)), lost, 0.0), CandidateModel(fit(0.0), 0.0, 0.0)
+    assert weigh.within_model_form_error(without, chosen, 1) == doubtful
 
 
 def test_a_place_has_one_form_of_hysteresis():
@@ -232,10 +239,10 @@ def test_a_pitch_is_found_that_is_a_thousandth_of_the_path():
     t = np.arange(4000) * H
     path = 4e-5 * np.sin(2 * np.pi * 1.3 * t) + 2e-5 * np.sin(2 * np.pi * 7.7 * t)
     noise = 7e-9 * rng.standard_normal(len(t))
-    first, *_ = pitches(path + noise, noise + 5e-9 * np.sin(2 * np.pi * path / pitch + 0.4))
+    first, *_ = spatial_periods(path + noise, noise + 5e-9 * np.sin(2 * np.pi * path / pitch + 0.4))
     assert first == pytest.approx(pitch, rel=1e-4)
-    assert pitches(path, noise) == ()
-    assert pitches(np.ones(50), noise[:50]) == ()
+    assert spatial_periods(path, noise) == ()
+    assert spatial_periods(np.ones(50), noise[:50]) == ()
 
 
 def test_fringes_that_bend_the_path_they_are_read_along_are_found_along_the_one_foreseen():
@@ -250,9 +257,9 @@ def test_fringes_that_bend_the_path_they_are_read_along_are_found_along_the_one_
     read = fitter.fit_records[0].observed[:, 0]
     foreseen = fitter.predict(fit, fitter.fit_records[0])[:, 0]
     near = pytest.approx(pitch, rel=1e-3)
-    assert near not in pitches(read, read - foreseen) and near in pitches(foreseen, read - foreseen)
-    suggested = Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["pitches"]
-    assert near in suggested and both([suggested, suggested]) == suggested
+    assert near not in spatial_periods(read, read - foreseen) and near in spatial_periods(foreseen, read - foreseen)
+    suggested = Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["spatial_periods"]
+    assert near in suggested and merged_periods([suggested, suggested]) == suggested
 
 
 def test_the_harmonic_of_a_fringe_that_is_known_is_found_along_what_the_fringe_counts():
@@ -273,8 +280,8 @@ def test_the_harmonic_of_a_fringe_that_is_known_is_found_along_what_the_fringe_c
     fit = fitter.fit(known)
     read, foreseen = fitter.fit_records[0].observed[:, 0], fitter.predict(fit, fitter.fit_records[0])[:, 0]
     near = pytest.approx(pitch / 2, rel=1e-3)
-    assert near not in pitches(foreseen, read - foreseen) and near not in pitches(read, read - foreseen)
-    assert near in Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["pitches"]
+    assert near not in spatial_periods(foreseen, read - foreseen) and near not in spatial_periods(read, read - foreseen)
+    assert near in Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["spatial_periods"]
 
 
 @pytest.mark.parametrize("place", [-6e-6, 1.5e-6, 1.1e-5])
@@ -300,8 +307,8 @@ def test_a_reading_that_jumps_at_a_place_is_found_there(place):
 def test_what_has_no_jump_suggests_no_jump_of_note():
     path = 4e-5 * np.sin(np.arange(4000) / 130)
     step = np.where(path > 1.3e-5, 2e-9, 0.0)
-    assert jumps(path, step + 1e-4 * path)[0] == pytest.approx(1.3e-5, abs=4e-7)
-    assert jumps(np.ones(50), np.zeros(50)) == ()
+    assert jump_positions(path, step + 1e-4 * path)[0] == pytest.approx(1.3e-5, abs=4e-7)
+    assert jump_positions(np.ones(50), np.zeros(50)) == ()
 
 
 def test_what_moves_at_rest_is_no_noise():
@@ -376,9 +383,9 @@ def test_numbers_that_the_fit_leaves_open_are_not_held_against_a_structure():
     n = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)
     off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
     plain = sum(float(np.sum(fitter.whitened_residual(off, r) ** 2)) for r in fitter.held_out_records)
-    loose = replace(off, J=off.J / 40)  # as if known 40 times worse
+    poorly_determined = replace(off, J=off.J / 40)  # as if known 40 times worse
     assert plain > 1.5 * n
-    assert fitter.held_out_deviance(loose) < 0.7 * plain
+    assert fitter.held_out_deviance(poorly_determined) < 0.7 * plain
     assert fitter.held_out_deviance(fit) < fitter.held_out_deviance(off)
 
 
@@ -386,9 +393,9 @@ def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
     off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
-    loose = replace(off, J=off.J / 40 * (np.arange(off.J.shape[1]) != 1))
-    assert fitter.held_out_deviance(loose) < 0.7 * fitter.held_out_deviance(replace(off, J=1e4 * off.J))
-    moved, *_ = fitter.refitted_to_held_out(loose)
+    poorly_determined = replace(off, J=off.J / 40 * (np.arange(off.J.shape[1]) != 1))
+    assert fitter.held_out_deviance(poorly_determined) < 0.7 * fitter.held_out_deviance(replace(off, J=1e4 * off.J))
+    moved, *_ = fitter.refitted_to_held_out(poorly_determined)
     assert moved.theta[1] == off.theta[1] and np.all(moved.theta[[0, 2, 3]] != off.theta[[0, 2, 3]])
 
 
@@ -476,8 +483,8 @@ def test_fringes_that_the_records_cannot_part_are_one():
     for apart, part in ((0.3, False), (0.8, True)):
         starts = tuple({"amplitude": 1e-8, "phase": 0.0, "period": path / periods} for periods in (5.0, 5.0 + apart))
         fit = fitter.fit(Structure(AXIS, (fringe, once_more), starts), steps=0)
-        assert resolved(fitter.recording, fit) == part
-        assert resolved(fitter.recording, fit, (fringe, once_more))
+        assert lines_resolved(fitter.recording, fit) == part
+        assert lines_resolved(fitter.recording, fit, (fringe, once_more))
 
 
 @pytest.mark.parametrize("share, meant", [(0.9, True), (1.1, False)])
@@ -488,6 +495,6 @@ def test_a_fringe_that_turns_the_reading_back_is_none(share, meant):
     fitter = fitter_of(after=lambda y: y + share * period / (2 * np.pi) * np.sin(2 * np.pi * y / period + 0.5))
     start = {"amplitude": 0.9 * share * period / (2 * np.pi), "period": period, "phase": 0.5}
     searcher = Searcher(fitter, Screen(fitter, [fringe]), lambda _: None)
-    trial = searcher.trial(Structure(AXIS).with_cause(fringe, start), steps=40)
+    trial = searcher.fit_candidate(Structure(AXIS).with_cause(fringe, start), steps=40)
     assert trial.fit.values(0)["amplitude"] == pytest.approx(share * period / (2 * np.pi), rel=0.02)
-    assert searcher.weigh.meant(trial) == meant
+    assert searcher.selection.physically_meaningful(trial) == meant

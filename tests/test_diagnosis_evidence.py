@@ -18,16 +18,16 @@ from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, profiles
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations, sandwich_over_model
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.evidence.detectability import detectable
-from ctrlgen.diagnosis.evidence.excitation_signals import admissible, shapes
+from ctrlgen.diagnosis.evidence.detectability import detectability
+from ctrlgen.diagnosis.evidence.excitation_signals import admissible, time_series
 from ctrlgen.diagnosis.evidence.experiment_design import separate
 from ctrlgen.diagnosis.evidence.experiment_files import files
-from ctrlgen.diagnosis.evidence.ltv_linearisation import along
-from ctrlgen.diagnosis.evidence.residual_localisation import where
-from ctrlgen.diagnosis.evidence.spectral_lines import lines
+from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
+from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
+from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.evidence.supporting_analyses import evidence
-from ctrlgen.diagnosis.evidence.unknown_input import free
-from ctrlgen.diagnosis.evidence.unmodelled_dynamics import unknown
+from ctrlgen.diagnosis.evidence.unknown_input import estimate_unknown_input
+from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, written
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
@@ -92,8 +92,8 @@ def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=No
 def mapped(fitter, structure=None):
     """The fit, its linearisations and the map of what it leaves."""
     fit = fitter.fit(structure or Structure(AXIS))
-    left = [along(fitter, fit, r) for r in (*fitter.fit_records, *fitter.held_out_records)]
-    return fit, left, where(left, fitter.recording.channels, fitter.recording.units)
+    left = [linearise_along(fitter, fit, r) for r in (*fitter.fit_records, *fitter.held_out_records)]
+    return fit, left, localise_residual(left, fitter.recording.channels, fitter.recording.units)
 
 
 def stop(t, q, v, memory):
@@ -118,27 +118,29 @@ def creeping(t, q, v, memory, gain=0.02, tau=0.6, fine=10):
 
 
 def test_a_stop_is_placed_at_the_end_of_the_travel_where_it_stands():
-    region = mapped(axis_fitter(stop))[2].region["axis"]
+    region = mapped(axis_fitter(stop))[2].by_travel["axis"]
     assert max(region, key=lambda s: s.share) is region[-1]
     assert region[-1].share > 0.5 and region[-1].ci95[0] > 10
 
 
 def test_a_clean_record_has_nothing_to_place():
     found = mapped(axis_fitter())[2]
-    assert found.output[0].ci95[0] < 0 < found.output[0].ci95[1]
-    assert found.coordinates.lives_in == "there is nothing left to place"
-    assert not any("direction" in said for said in found.said)
+    assert found.by_reading[0].ci95[0] < 0 < found.by_reading[0].ci95[1]
+    assert found.coordinates.located_in == "there is nothing left to place"
+    assert not any("direction" in said for said in found.statements)
 
 
 def test_friction_differs_by_direction_and_a_cubic_spring_does_not():
-    rubbed = mapped(axis_fitter(coulomb))[2].direction["axis"]
-    sprung = mapped(axis_fitter(cubic))[2].direction["axis"]
+    rubbed = mapped(axis_fitter(coulomb))[2].by_direction["axis"]
+    sprung = mapped(axis_fitter(cubic))[2].by_direction["axis"]
     assert rubbed[0].label == "forward" and rubbed[0].mean_ci95[1] < 0 < rubbed[1].mean_ci95[0]
     assert sprung[0].mean_ci95[1] > sprung[1].mean_ci95[0] and sprung[1].mean_ci95[1] > sprung[0].mean_ci95[0]
 
 
 def test_a_vibration_is_placed_in_its_band_and_owes_nothing_to_the_drive():
-    bands = mapped(axis_fitter(change=lambda y, u: y + 30e-9 * np.sin(2 * np.pi * 70 * np.arange(len(y)) * H)))[2].band
+    bands = mapped(axis_fitter(change=lambda y, u: y + 30e-9 * np.sin(2 * np.pi * 70 * np.arange(len(y)) * H)))[
+        2
+    ].by_frequency
     worst = max(bands, key=lambda b: b.excess)
     assert worst.low < 70 < worst.high and worst.ci95[0] > 1
     assert worst.coherence < 0.5
@@ -148,7 +150,7 @@ def test_a_step_is_placed_in_time():
     def late(y, u):
         return y + 40e-9 * (np.arange(len(y)) > 0.8 * len(y))
 
-    time = mapped(axis_fitter(change=late))[2].time
+    time = mapped(axis_fitter(change=late))[2].by_time
     loud = [k for k, s in enumerate(time[:10]) if s.excess > 20]
     assert loud and min(loud) >= 8  # tenths of the record to fit
 
@@ -160,7 +162,7 @@ def test_the_lines_of_a_periodic_drive_tell_the_class_of_the_nonlinearity(law, w
     t = np.arange(3000) * H
     u = sum(0.5 * np.cos(2 * np.pi * k * t + k**2) for k in (1, 3, 7))
     y = law(move(u)) + NOISE * np.random.default_rng(1).standard_normal(len(u))
-    said = lines(record(u, y, "fit"), 0, "reading.axis", "um").said
+    said = spectral_lines(record(u, y, "fit"), 0, "reading.axis", "um").statement
     assert word in said and ("even" in said) == (word == "even")
 
 
@@ -194,12 +196,14 @@ def test_a_weak_actuator_and_a_wrong_reading_are_told_apart(meso):
         (weak, 1.0, "actuator", "2y"), (1.0, wrong, "reading", "reading.delta_x"),
     ):  # fmt: skip
         found = mapped(pose_fitter(meso, on_drive, on_pose), Structure(device))[2]
-        assert found.coordinates.lives_in == kind
-        alone = found.coordinates.alone[kind]
+        assert found.coordinates.located_in == kind
+        alone = found.coordinates.explained_by_one[kind]
         assert max(alone, key=alone.get) == name and alone[name] > 0.9
-        assert not any("direction" in said for said in found.said)  # poses reached from below stand higher on the whole
+        assert not any(
+            "direction" in said for said in found.statements
+        )  # poses reached from below stand higher on the whole
         other = {"actuator": "reading", "reading": "actuator"}[kind]
-        assert found.coordinates.carried_by[kind] < 1.2 < found.coordinates.carried_by[other]
+        assert found.coordinates.participation_ratio[kind] < 1.2 < found.coordinates.participation_ratio[other]
 
 
 def test_the_free_force_is_the_hidden_one():
@@ -208,7 +212,7 @@ def test_the_free_force_is_the_hidden_one():
 
     fitter = axis_fitter(bumps)
     left = mapped(fitter)[1]
-    found = free(left[0], fitter.noise, np.array([0.05]))
+    found = estimate_unknown_input(left[0], fitter.noise, np.array([0.05]))
     true = np.array([bumps(t, 0, 0, 0)[0] for t in left[0].record.time])
     assert np.sqrt(np.mean((found.f[:, 0] - true) ** 2)) < 0.02 * np.abs(true).max()
     assert np.corrcoef(found.f[:, 0], true)[0, 1] > 0.99
@@ -219,7 +223,7 @@ def test_the_free_force_is_the_conditional_mean_with_its_deviation():
     fitter = axis_fitter(stop, n=150)
     left = mapped(fitter)[1][0]
     size, n = 0.05, len(left.white)
-    found = free(left, fitter.noise, np.array([size]))
+    found = estimate_unknown_input(left, fitter.noise, np.array([size]))
     D = np.hstack([np.eye(2), np.zeros((2, n))])  # of the state, by what it starts with and every f
     G = np.zeros((n, n + 2))
     for k in range(n):
@@ -239,19 +243,21 @@ def test_the_free_force_is_the_conditional_mean_with_its_deviation():
 def test_unknown_physics_is_mapped_and_described_but_not_named():
     fitter = axis_fitter(detent)
     fit, left, _ = mapped(fitter)
-    found = unknown(fitter, fit, left)
-    share = {m.of: m.share for m in found.maps["axis"]}
+    found = describe_unmodelled_force(fitter, fit, left)
+    share = {m.coordinate: m.variance_share for m in found.maps["axis"]}
     assert found.quantity == "force" and found.unit == "N"
     assert share["position"] > 3 * max(share["time"], share["velocity"])
     warm = [replace(a, record=replace(a.record, ambient=np.linspace(0, 1, len(a.record.time)))) for a in left]
-    assert {m.of for m in unknown(fitter, fit, warm).maps["axis"]} - share.keys() == {"temperature"}
+    assert {m.coordinate for m in describe_unmodelled_force(fitter, fit, warm).maps["axis"]} - share.keys() == {
+        "temperature"
+    }
     slow = axis_fitter(stop)
     fit, left, _ = mapped(slow)
-    term = unknown(slow, fit, left).empirical
+    term = describe_unmodelled_force(slow, fit, left).empirical_term
     assert term.label == "empirical" and term.held_out_gain > 0.7
     clean = axis_fitter()
     fit, left, _ = mapped(clean)
-    assert unknown(clean, fit, left).empirical is None
+    assert describe_unmodelled_force(clean, fit, left).empirical_term is None
 
 
 def test_profiles_are_finite_and_cover():
@@ -326,7 +332,7 @@ def test_a_drive_that_could_do_far_too_much_is_used_a_little():
     fitter = axis_fitter()
     template = fitter.fit_records[0]
     simulator = structure.simulators(fitter.recording, {})[template.sample_time, template.linear]
-    for shape in shapes(2000, 1, 1 / H, 0):
+    for shape in time_series(2000, 1, 1 / H, 0):
         record, strength = admissible(shape, simulator, structure.start, template, 0.0)
         assert strength < 0.02 and 0.3 < np.abs(record.drive).max() < 4.0
 
@@ -363,11 +369,11 @@ def test_what_is_called_detectable_is_seen_and_half_of_it_is_not():
     clean = axis_fitter()
     fit = clean.fit(Structure(AXIS))
     open_ = [CUBIC, CREEP, DRIFT]
-    found = detectable(fit, Screen(clean, open_).run(fit), fit.n).smallest["stiffening"]
+    found = detectability(fit, Screen(clean, open_).run(fit), fit.n).smallest["stiffening"]
     seen = {0.5: 0, 1.5: 0}
     for share in seen:
         for seed in range(3):
-            k3 = share * found.seen_from * 1e18  # N/um^3
+            k3 = share * found.detectable_from * 1e18  # N/um^3
             fitter = axis_fitter(lambda t, q, v, memory, k3=k3: (-k3 * q**3, memory), seed=20 + seed)
             screened = Screen(fitter, open_).run(fitter.fit(Structure(AXIS)))
             z = next(s.z for s in screened.suspects if s.hypothesis == CUBIC)
@@ -378,8 +384,8 @@ def test_what_is_called_detectable_is_seen_and_half_of_it_is_not():
 def test_what_a_record_at_one_place_hides_is_said():
     fitter = axis_fitter(u=np.full(600, 1e-9))
     fit = fitter.fit(Structure(AXIS))
-    found = detectable(fit, Screen(fitter, [CUBIC, DRIFT]).run(fit), fit.n)
-    assert [h.effect for h in found.hidden] == ["stiffening"] and "drift" in found.smallest
+    found = detectability(fit, Screen(fitter, [CUBIC, DRIFT]).run(fit), fit.n)
+    assert [h.effect for h in found.undetectable] == ["stiffening"] and "drift" in found.smallest
 
 
 def test_a_gain_shows_only_at_the_price_of_what_the_device_states():
@@ -387,8 +393,8 @@ def test_a_gain_shows_only_at_the_price_of_what_the_device_states():
     fitter = axis_fitter()
     fit = fitter.fit(Structure(AXIS))
     gain = Hypothesis("sensor_gain", "sensor:axis", "axis")
-    smallest = detectable(fit, Screen(fitter, [CUBIC, gain]).run(fit), fit.n).smallest["sensor_gain"]
-    assert 0.05 < smallest.seen_from < 4 * np.hypot(0.02, 0.05)
+    smallest = detectability(fit, Screen(fitter, [CUBIC, gain]).run(fit), fit.n).smallest["sensor_gain"]
+    assert 0.05 < smallest.detectable_from < 4 * np.hypot(0.02, 0.05)
 
 
 def test_evidence_is_numbers_that_json_knows():
@@ -397,15 +403,16 @@ def test_evidence_is_numbers_that_json_knows():
     search = searcher.run(Structure(AXIS))
     found = evidence(fitter, search, explained=False)
     text = json.dumps(
-        [found.where, found.detectable, found.next_experiment, found.history, found.extra], allow_nan=False
+        [found.residual_location, found.detectability, found.next_experiment, found.search_history, found.extra],
+        allow_nan=False,
     )
     assert len(text) < 1e6
-    assert found.extra["unknown"] and set(found.where) == {"nominal", "left"}
-    assert [row["round"] for row in found.history] == list(range(1, len(search.rounds) + 1))
-    first, last = found.history[0], found.history[-1]
-    assert first["decision"] == "added stiffening at stage:axis" and first["tried"][0]["causes"][0]["kept"]
+    assert found.extra["unmodelled_force"] and set(found.residual_location) == {"before", "after"}
+    assert [row["round"] for row in found.search_history] == list(range(1, len(search.rounds) + 1))
+    first, last = found.search_history[0], found.search_history[-1]
+    assert first["decision"] == "added stiffening at stage:axis" and first["candidates"][0]["causes"][0]["accepted"]
     assert last["decision"].endswith("stopped")
-    assert not any(cause["kept"] for trial in last["tried"] for cause in trial["causes"])
+    assert not any(cause["accepted"] for trial in last["candidates"] for cause in trial["causes"])
     assert plain({"a": np.array([np.nan, 1.0]), "b": np.bool_(True)}) == {"a": [None, 1.0], "b": True}
 
 
@@ -420,5 +427,5 @@ def test_noise_of_one_colour_is_taken_at_its_density():
     fitter = Fitter(recording, noise)
     fitter.cache = CACHE
     left = mapped(fitter)[1]
-    found = free(left[0], noise, np.array([K * NOISE]))
+    found = estimate_unknown_input(left[0], noise, np.array([K * NOISE]))
     assert np.mean(np.abs(found.f) < 1.96 * found.sd) > 0.9

@@ -13,7 +13,7 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.pipeline import diagnose_into
 from ctrlgen.diagnosis.report.narrative import next_steps, sentence
-from ctrlgen.diagnosis.selection.diagnosis import CONSISTENT, EXPLAINED, UNEXPLAINED
+from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, UNEXPLAINED
 from ctrlgen.effects import Effect
 
 

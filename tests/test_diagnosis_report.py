@@ -27,15 +27,8 @@ from ctrlgen.diagnosis.report.html_report import Provenance, page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
 from ctrlgen.diagnosis.report.plots import POINTS, _density, thinned
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.selection.diagnosis import (
-    AMBIGUOUS,
-    CONSISTENT,
-    EXPLAINED,
-    PARTLY,
-    UNEXPLAINED,
-    Estimate,
-    Finding,
-)
+from ctrlgen.diagnosis.selection.result import Estimate, Finding
+from ctrlgen.diagnosis.selection.verdict import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED
 from ctrlgen.effects import Effect
 from ctrlgen.effects.quantisation import Quantisation
 from ctrlgen.effects.saturation import Saturation
@@ -142,7 +135,15 @@ def same_prediction(diagnosis, text: str, folder: Path) -> None:
 
 def test_the_json_is_the_contract(found):
     result = json.loads(json.dumps(as_dict(found), allow_nan=False))
-    assert list(result) == ["verdict", "findings", "where", "held_out", "detectable", "next_experiment", "history"]
+    assert list(result) == [
+        "verdict",
+        "findings",
+        "residual_location",
+        "held_out",
+        "detectability",
+        "next_experiment",
+        "search_history",
+    ]
     assert result["verdict"] == EXPLAINED
     (finding,) = result["findings"]
     assert set(finding) == {"effect", "location", "parameters", "alternatives", "held_out_gain", "source"}
@@ -278,18 +279,28 @@ def test_a_title_cannot_write_html(found):
 
 def test_the_page_shows_whatever_evidence_there_is(found):
     part = {"label": "reading.axis", "excess": 4.0, "ci95": (3.0, 5.0)}
-    nominal = {"output": [part], "direction": {"axis": [{**part, "label": "forward"}]}, "said": ["more below 1 Hz"]}
-    where = {"nominal": nominal, "left": {"said": []}}
+    nominal = {
+        "by_reading": [part],
+        "by_direction": {"axis": [{**part, "label": "forward"}]},
+        "statements": ["more below 1 Hz"],
+    }
+    location = {"before": nominal, "after": {"statements": []}}
     profile = Profile(
         "effect[0].tau", "creep", "stage:axis", "tau", 0.2, (0.1, 0.3), "s", ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)), BOUNDED,
         True, None,
     )  # fmt: skip
     experiment = {"drive": "multisine", "duration": {"value": 20.0, "unit": "s"}}
     term = {"axis": "axis", "terms": {"d": 2.0, "d |v|": -0.5}, "unit": "mN", "held_out_gain": 0.43}
-    extra = {"unknown": {"said": ["axis: 80% of the free disturbance goes with position"], "empirical": term}}
+    extra = {
+        "unmodelled_force": {
+            "statements": ["axis: 80% of the free disturbance goes with position"],
+            "empirical_term": term,
+        }
+    }
     told = replace(
-        found, where=where, next_experiment=experiment, history=({"was": "before"},), extra=extra, profiles=(profile,),
-        detectable={"drift": {"value": float("nan"), "unit": "nm/s"}},
+        found, residual_location=location, next_experiment=experiment,
+        search_history=({"was": "before"},), extra=extra, profiles=(profile,),
+        detectability={"drift": {"value": float("nan"), "unit": "nm/s"}},
     )  # fmt: skip
     text = page(told, Provenance({}, 0))
     assert text.count("<figure>") == 7

@@ -15,8 +15,12 @@ from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import Search, Trial, freed
-from ctrlgen.diagnosis.selection.diagnosis import (
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, SearchResult, linearised_optimum
+from ctrlgen.diagnosis.selection.line_resolvability import lines_resolved
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
+from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.verdict import (
     AMBIGUOUS,
     CONSISTENT,
     EXPLAINED,
@@ -25,10 +29,6 @@ from ctrlgen.diagnosis.selection.diagnosis import (
     unconfirmed,
     verdict,
 )
-from ctrlgen.diagnosis.selection.line_resolvability import resolved
-from ctrlgen.diagnosis.selection.model_selection import Weighing
-from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
-from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 
 
@@ -42,18 +42,18 @@ def test_what_is_left_without_a_cause_is_what_the_free_numbers_cannot_take_over(
     best = fitter.fit(Structure(AXIS))
     off = fitter.fit(Structure(AXIS), theta=best.theta * np.array([1.002, *np.ones(len(best.theta) - 1)]), steps=0)
     assert off.objective > 20 * best.objective
-    assert freed(off) == pytest.approx(best.objective, rel=0.1)
+    assert linearised_optimum(off) == pytest.approx(best.objective, rel=0.1)
 
 
 def test_a_structure_is_fitted_again_from_a_better_start_only():
     fitter = fitter_of()
     searcher = searcher_of(fitter)
-    poor = searcher.trial(Structure(AXIS), steps=40)
+    poor = searcher.fit_candidate(Structure(AXIS), steps=40)
     poor = replace(poor, fit=replace(poor.fit, chi2=10 * poor.fit.chi2))  # as if it had ended in a far minimum
-    searcher.known[frozenset()] = poor, 40
-    again = searcher.trial(Structure(AXIS))
+    searcher.fitted[frozenset()] = poor, 40
+    again = searcher.fit_candidate(Structure(AXIS))
     assert again.fit.objective < 0.2 * poor.fit.objective
-    assert searcher.trial(Structure(AXIS)).fit is again.fit
+    assert searcher.fit_candidate(Structure(AXIS)).fit is again.fit
 
 
 def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
@@ -62,13 +62,15 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     fitter = fitter_of(lambda u: move(u) + 20 * NOISE * np.sin(2 * np.pi * 50.0 * H * np.arange(len(u)) + 0.4))
     searcher = searcher_of(fitter)
     start = {"amplitude": 10 * NOISE, "frequency": 60.0, "phase": 0.0}
-    nominal, stuck = (searcher.trial(s, steps=40) for s in (Structure(AXIS), Structure(AXIS).with_cause(hum, start)))
+    nominal, stuck = (
+        searcher.fit_candidate(s, steps=40) for s in (Structure(AXIS), Structure(AXIS).with_cause(hum, start))
+    )
     others = tuple({**start, "frequency": f} for f in (100.0, 50.0, 33.0))
     screened = Screened((Suspect(hum, start, 100.0, 1.0, 0, others),), np.eye(1), 4.0, {})
-    found = searcher._reshaped(stuck, nominal, screened)
+    found = searcher._restarted_elsewhere(stuck, nominal, screened)
     assert not stuck.fit.is_noise and found.fit.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
-    assert searcher._reshaped(found, nominal, screened) is found
+    assert searcher._restarted_elsewhere(found, nominal, screened) is found
 
 
 @pytest.mark.parametrize("breakaway, sd, special", [(1.0, 0.03, "coulomb"), (1.4, 0.03, None), (1.4, 0.3, "coulomb")])
@@ -90,13 +92,13 @@ def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common(
     searcher = searcher_of(model)
     model.recording = replace(model.recording, records=(rubbed,))
     far, bare = {"force": 0.001, "reach": 3e-6, "smoothing": 1e-9}, Structure(AXIS)
-    begun = searcher._in_place(fit, 0, bare, Suspect(other, far, 100.0, 1.0, 0)).starts[0]
+    begun = searcher._replaced(fit, 0, bare, Suspect(other, far, 100.0, 1.0, 0)).starts[0]
     assert begun == {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
     elsewhere = Hypothesis("backlash", "stage:axis", "axis")
-    assert searcher._in_place(fit, 0, bare, Suspect(elsewhere, {"gap": 1e-8}, 100.0, 1.0, 0)).starts == ({"gap": 1e-8},)
+    assert searcher._replaced(fit, 0, bare, Suspect(elsewhere, {"gap": 1e-8}, 100.0, 1.0, 0)).starts == ({"gap": 1e-8},)
     near = {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
     wrong = replace(fit, theta=fit.theta * np.array([*np.ones(len(fit.theta) - 1), 100.0]))
-    assert searcher._in_place(wrong, 0, bare, Suspect(other, near, 100.0, 1.0, 0)).starts[0] == near
+    assert searcher._replaced(wrong, 0, bare, Suspect(other, near, 100.0, 1.0, 0)).starts[0] == near
 
 
 def test_the_price_of_a_number_is_what_the_fit_knows_of_it():
@@ -150,13 +152,13 @@ def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, pa
     nominal = replace(fitter.fit(Structure(AXIS)), chi2=1e7)
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
     left = fit.n + share**2 * (nominal.objective - fit.n)
-    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(fit), 0.0)
-    bare = Trial(nominal, 1e9, 0.0)
-    search = Search(bare, chosen, (bare,), ((chosen,) * rivals,), (), None)
+    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(fit), 0.0)
+    bare = CandidateModel(nominal, 1e9, 0.0)
+    search = SearchResult(bare, chosen, (bare,), ((chosen,) * rivals,), (), None)
     assert verdict(fitter, search, ResidualTests((1.2,), {}, passed)) == says
-    nothing = replace(search, chosen=search.nominal, bare=(), rivals=())
+    nothing = replace(search, chosen=search.nominal, without_cause=(), rivals=())
     for left in (nominal.chi2, 0.5 * nominal.n):  # also where only the rest is no noise
-        clean = Trial(replace(nominal, chi2=left, penalty=0.0), 0.0, 0.0)
+        clean = CandidateModel(replace(nominal, chi2=left, penalty=0.0), 0.0, 0.0)
         said = verdict(fitter, replace(nothing, chosen=clean, nominal=clean), ResidualTests((1.2,), {}, passed))
         assert said == (CONSISTENT if passed else UNEXPLAINED)
 
@@ -166,45 +168,47 @@ def test_a_law_that_says_how_rough_it_is_may_leave_as_much(share, says):
     """What drifts wanders, by a tenth."""
     drift = Hypothesis("drift", "sensor:axis", "axis")
     fitter = fitter_of()
-    bare = Trial(replace(fitter.fit(Structure(AXIS)), chi2=1e7), 1e7, 0.0)
+    bare = CandidateModel(replace(fitter.fit(Structure(AXIS)), chi2=1e7), 1e7, 0.0)
     fit = fitter.fit(Structure(AXIS).with_cause(drift, {"rate": 1e-7}), steps=0)
     left = fit.n + share**2 * (bare.fit.objective - fit.n)
-    chosen = Trial(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(bare.fit), 0.0)
-    search = Search(bare, chosen, (bare,), ((),), (), None)
+    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(bare.fit), 0.0)
+    search = SearchResult(bare, chosen, (bare,), ((),), (), None)
     assert verdict(fitter, search, ResidualTests((1.2,), {}, False)) == says
 
 
 @pytest.mark.parametrize("mismatch, sizes", [(2e4, {2, 3}), (2e6, {2})])
 def test_three_at_once_are_sought_only_while_most_is_unexplained(monkeypatch, mismatch, sizes):
     searcher = searcher_of(fitter_of(played))
-    current = searcher.trial(Structure(AXIS))
-    excess = current.fit.objective - searcher.weigh.n_fit
+    current = searcher.fit_candidate(Structure(AXIS))
+    excess = current.fit.objective - searcher.selection.n_fit
     assert excess > 1e4
     searcher.mismatch, tried = mismatch, set()
-    monkeypatch.setattr(searcher, "_attempt", lambda structure, *_: tried.add(len(structure.causes)) or [])
+    monkeypatch.setattr(searcher, "_fit_if_buildable", lambda structure, *_: tried.add(len(structure.causes)) or [])
     starts = {BACKLASH: {"gap": 3e-8}, LATE: {"gain": 0.01, "tau": 1.0, "decades": 3.0}, LIMIT: {"level": 0.5}}
     three = tuple(Suspect(h, s, 100.0, 1.0, k) for k, (h, s) in enumerate(starts.items()))
     together = ((0.8 * excess, three[:2]), (0.9 * excess, three))
-    searcher._together(current, Screened(tuple(three), np.eye(3), 4.0, {}, together), ())
+    searcher._fit_subsets(current, Screened(tuple(three), np.eye(3), 4.0, {}, together), ())
     assert tried == sizes
 
 
 def test_nothing_is_sought_in_what_the_form_of_a_law_leaves():
     """A law that is right to a hundredth of itself, which takes away 1e6 squares, may leave 100."""
     fitter = fitter_of()
-    weigh = Weighing(fitter, lambda *_, **__: trial(1e6))
+    weigh = ModelSelection(fitter, lambda *_, **__: trial(1e6))
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
     gain = fitter.fit(
         Structure(AXIS).with_cause(Hypothesis("drive_gain", "actuator:axis", "axis"), {"gain": 0.1}), steps=0
     )
 
     def trial(left, of=fit):
-        return Trial(replace(of, chi2=weigh.n_fit + left, penalty=0.0), weigh.n_held + left, 0.0)
+        return CandidateModel(replace(of, chi2=weigh.n_fit + left, penalty=0.0), weigh.n_held + left, 0.0)
 
-    assert weigh.of_form(trial(60.0)) and not weigh.of_form(trial(150.0))
-    assert not weigh.of_form(trial(60.0, gain))  # its form is right
+    assert weigh.residual_within_model_form_error(trial(60.0)) and not weigh.residual_within_model_form_error(
+        trial(150.0)
+    )
+    assert not weigh.residual_within_model_form_error(trial(60.0, gain))  # its form is right
     hidden = trial(60.0)
-    assert not weigh.of_form(replace(hidden, fit=replace(hidden.fit, penalty=100.0)))
+    assert not weigh.residual_within_model_form_error(replace(hidden, fit=replace(hidden.fit, penalty=100.0)))
 
 
 @pytest.mark.parametrize(
@@ -214,20 +218,22 @@ def test_nothing_is_sought_in_what_the_form_of_a_law_leaves():
 def test_what_no_held_out_record_reaches_is_named_where_it_explains_nearly_all(left, held, before_held, worth):
     """Hit in the record to fit alone, where it leaves 1e4 squares beside 1500 of noise."""
     searcher = searcher_of(fitter_of(played))
-    nominal = searcher.trial(Structure(AXIS), steps=40)
+    nominal = searcher.fit_candidate(Structure(AXIS), steps=40)
     fit = searcher.fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
 
     def trial(of, squares, held_squares):
-        return Trial(
-            replace(of, chi2=searcher.weigh.n_fit + squares, penalty=0.0), searcher.weigh.n_held + held_squares, 0.0
+        return CandidateModel(
+            replace(of, chi2=searcher.selection.n_fit + squares, penalty=0.0),
+            searcher.selection.n_held + held_squares,
+            0.0,
         )
 
     before, after = trial(nominal.fit, 1e4, before_held), trial(fit, 1e4 * left, held)
-    assert searcher.weigh.worth(before, after) == worth
-    search = Search(before, after, (before,), ((),), (), None)
+    assert searcher.selection.improves_enough(before, after) == worth
+    search = SearchResult(before, after, (before,), ((),), (), None)
     assert unconfirmed(search) == (BACKLASH,)
     assert verdict(searcher.fitter, search, ResidualTests((1.0,), {}, True)) == PARTLY
-    shown = replace(search, bare=(trial(nominal.fit, 1e4, held + 50.0),))
+    shown = replace(search, without_cause=(trial(nominal.fit, 1e4, held + 50.0),))
     assert unconfirmed(shown) == () and verdict(searcher.fitter, shown, ResidualTests((1.0,), {}, True)) == EXPLAINED
 
 
@@ -236,9 +242,9 @@ def test_numbers_that_foresee_worse_than_none_are_not_the_whole_answer():
     nominal = fitter.fit(Structure(AXIS))
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}))
     far = replace(fit, theta=fit.theta * np.where([u.cause is None for u in fit.structure.free_parameters], 1.0, 4.0))
-    bare = Trial(nominal, 1e9, 0.0)
+    bare = CandidateModel(nominal, 1e9, 0.0)
     for of, says in ((fit, EXPLAINED), (far, PARTLY)):  # as where one touch in the record to fit tells little of a stop
-        search = Search(bare, Trial(of, fitter.held_out_deviance(fit), 0.0), (bare,), ((),), (), None)
+        search = SearchResult(bare, CandidateModel(of, fitter.held_out_deviance(fit), 0.0), (bare,), ((),), (), None)
         assert verdict(fitter, search, ResidualTests((1.0,), {}, True)) == says
 
 
@@ -319,5 +325,5 @@ def test_fringes_as_short_as_the_steps_of_a_reading_are_its_rounding(steps, told
     fringe = Hypothesis("cyclic", "sensor:axis", "axis")
     start = {"amplitude": NOISE, "period": steps * step, "phase": 0.0}
     fit = fitter.fit(Structure(AXIS).with_cause(fringe, start), steps=0)
-    assert resolved(fitter.recording, fit) == told
-    assert resolved(fitter.recording, fit, accepted=(fringe,))
+    assert lines_resolved(fitter.recording, fit) == told
+    assert lines_resolved(fitter.recording, fit, accepted=(fringe,))

@@ -16,8 +16,8 @@ from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis
 from ctrlgen.diagnosis.selection import score_gradient as slopes_module
-from ctrlgen.diagnosis.selection.ltv_propagation import Spread
-from ctrlgen.diagnosis.selection.score_gradient import Slopes
+from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
+from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.recordings.recording import Record, Recording
@@ -89,7 +89,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
     monkeypatch.setattr(slopes_module, "CANDIDATE_TERMS", replace(CANDIDATE_TERMS, block=123))
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = Slopes(hexapod, fit, record, LAWS, shows_nothing)
+    slopes = ScoreGradient(hexapod, fit, record, LAWS, shows_nothing)
     white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
     found = slopes.sums(white, J, fit.initial_states[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
@@ -109,7 +109,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = Slopes(hexapod, fit, record, [law], shows_nothing)
+    slopes = ScoreGradient(hexapod, fit, record, [law], shows_nothing)
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
     slope = brute(slopes, start)[:, :, -1]
@@ -125,7 +125,7 @@ def test_groups_carry_only_what_enters_them():
     F_p = np.array([[1, 0, 0], [0, 0, 0], [0, 1, 0]], bool)
     H_S, H_p = np.array([[0, 1, 0], [0, 0, 1]], bool), np.array([[0, 0, 0], [0, 0, 1]], bool)
     columns = [SimpleNamespace(probes=p, terms=range(len(p))) for p in ((0,), (1,), (2,), (0, 1))]
-    spread = Spread((F_S, F_p, H_S, H_p), columns)
+    spread = LtvPropagation((F_S, F_p, H_S, H_p), columns)
     assert [(list(g.states), list(g.columns)) for g in spread.groups] == [([0, 1], [0, 3]), ([2], [1, 3])]
     assert [list(seen) for seen in spread.seen] == [[0, 3], [1, 2, 3]]
 

@@ -15,8 +15,8 @@ from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.residual_tests import cross_correlation, run_residual_tests
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import Trial
-from ctrlgen.diagnosis.selection.model_selection import Weighing
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.recordings.recording import Record, Recording
 
 N = 1000  # samples to fit, and held out
@@ -31,13 +31,13 @@ def record(role: str, n: int = N, n_y: int = 1, observed=None, drive=None) -> Re
     return Record(role, role, 1e-3 * np.arange(n), 1e-3, u, y, False, None, np.ones(y.shape, bool))
 
 
-def weighing(n_fit: int = N, n_held: int = N, known: bool = True, trial=None) -> Weighing:
+def weighing(n_fit: int = N, n_held: int = N, known: bool = True, trial=None) -> ModelSelection:
     noise = Noise(NOISE.sd, NOISE.ar, np.array([known]), NOISE.said, NOISE.count)
     recording = Recording("t", "any", "series", ("reading.axis",), ("um",), (1.0,), (record("fit", 10),), ())
     fitter = SimpleNamespace(
         noise=noise, to_fit=[record("fit", n_fit)], held=[record("hold_out", n_held)], recording=recording
     )
-    return Weighing(fitter, trial or (lambda *_, **__: None))
+    return ModelSelection(fitter, trial or (lambda *_, **__: None))
 
 
 class Numbers(SimpleNamespace):
@@ -63,7 +63,7 @@ def trial(
         theta=np.full(numbers, 0.5) if theta is None else np.array(theta), covariance=sd**2 * np.eye(numbers),
         is_noise=objective < n + 4 * np.sqrt(2 * n), values=lambda k: {"gain": 0.5, "tau": 1.0, "slow": 0.0},
     )  # fmt: skip
-    return Trial(fit, n + held, objective + n + held + price)
+    return CandidateModel(fit, n + held, objective + n + held + price)
 
 
 def pair(gained: float, confirmed: float, added: int = 1, hidden: float = 0.0, left: float = 0.0, unseen: float = 0.0):
@@ -81,37 +81,43 @@ def test_a_cause_is_worth_its_numbers_from_a_gain_of_14_and_ln_n_a_number(added)
     """Fitted and held out together, the held-out part at most as large as the other."""
     need, w = 14 + added * np.log(N), weighing()
     for confirmed in (3.0, 8.0):
-        assert w.worth(*pair(need - confirmed + JUST, confirmed, added))
-        assert not w.worth(*pair(need - confirmed - JUST, confirmed, added))
-    assert w.worth(*pair(need / 2 + JUST, 1000.0, added)) and not w.worth(*pair(need / 2 - JUST, 1000.0, added))
+        assert w.improves_enough(*pair(need - confirmed + JUST, confirmed, added))
+        assert not w.improves_enough(*pair(need - confirmed - JUST, confirmed, added))
+    assert w.improves_enough(*pair(need / 2 + JUST, 1000.0, added)) and not w.improves_enough(
+        *pair(need / 2 - JUST, 1000.0, added)
+    )
 
 
 def test_the_held_out_records_must_show_two_squares_of_a_cause():
     w = weighing()
-    assert w.worth(*pair(100.0, 2 + JUST)) and not w.worth(*pair(100.0, 2 - JUST))
+    assert w.improves_enough(*pair(100.0, 2 + JUST)) and not w.improves_enough(*pair(100.0, 2 - JUST))
 
 
 def test_the_held_out_records_must_lose_a_twentieth_of_what_they_have_beyond_the_noise():
     w, excess = weighing(), 900.0
-    assert w.worth(*pair(400.0, 0.05 * excess + JUST, left=400.0, unseen=0.95 * excess))
-    assert not w.worth(*pair(400.0, 0.05 * excess - JUST, left=400.0, unseen=0.95 * excess))
+    assert w.improves_enough(*pair(400.0, 0.05 * excess + JUST, left=400.0, unseen=0.95 * excess))
+    assert not w.improves_enough(*pair(400.0, 0.05 * excess - JUST, left=400.0, unseen=0.95 * excess))
 
 
 def test_a_cause_below_a_tenth_of_the_noise_is_not_named():
     n = 100_000
     w = weighing(n, n)
     before, after = trial(0.01 * n + JUST, 900.0, n=n), trial(0.0, 0.0, numbers=2, n=n)
-    assert w.worth(before, after)
-    assert not w.worth(trial(0.01 * n - JUST, 900.0, n=n), after)
+    assert w.improves_enough(before, after)
+    assert not w.improves_enough(trial(0.01 * n - JUST, 900.0, n=n), after)
 
 
 def test_what_the_device_hid_at_a_price_needs_no_held_out_record_to_show_it():
     w = weighing()
-    assert w.worth(*pair(NEEDED + JUST, 0.0, hidden=0.5 * NEEDED + 1)) and not w.worth(
+    assert w.improves_enough(*pair(NEEDED + JUST, 0.0, hidden=0.5 * NEEDED + 1)) and not w.improves_enough(
         *pair(NEEDED - JUST, 0.0, hidden=NEEDED)
     )
-    assert w.worth(*pair(100.0, -4 + JUST, hidden=51.0)) and not w.worth(*pair(100.0, -4 - JUST, hidden=51.0))
-    assert w.worth(*pair(100.0, 0.0, hidden=50 + JUST)) and not w.worth(*pair(100.0, 0.0, hidden=50 - JUST))
+    assert w.improves_enough(*pair(100.0, -4 + JUST, hidden=51.0)) and not w.improves_enough(
+        *pair(100.0, -4 - JUST, hidden=51.0)
+    )
+    assert w.improves_enough(*pair(100.0, 0.0, hidden=50 + JUST)) and not w.improves_enough(
+        *pair(100.0, 0.0, hidden=50 - JUST)
+    )
 
 
 OVER = (1.1**2 - 1) * N  # squares beyond the noise by which a gate of 1.10 is passed
@@ -121,7 +127,7 @@ def test_what_no_held_out_record_reaches_must_take_away_nine_tenths():
     w, excess = weighing(), 2 * OVER
 
     def worth(gained, held_before=0.0, confirmed=0.0):
-        return w.worth(trial(excess, held_before), trial(excess - gained, held_before - confirmed, numbers=2))
+        return w.improves_enough(trial(excess, held_before), trial(excess - gained, held_before - confirmed, numbers=2))
 
     assert worth(0.9 * excess + JUST) and not worth(0.9 * excess - JUST)
     assert worth(0.95 * excess, confirmed=-4 + JUST) and not worth(0.95 * excess, confirmed=-4 - JUST)
@@ -132,37 +138,37 @@ def test_a_few_samples_that_show_nearly_all_must_still_show_enough():
     w = weighing(50)
     needed = 12 + np.log(50)
     assert needed > 0.21 * 50  # so few samples alone are beyond the gate
-    assert w.worth(trial(needed + JUST, n=50), trial(0.0, numbers=2, n=50))
-    assert not w.worth(trial(needed - JUST, n=50), trial(0.0, numbers=2, n=50))
+    assert w.improves_enough(trial(needed + JUST, n=50), trial(0.0, numbers=2, n=50))
+    assert not w.improves_enough(trial(needed - JUST, n=50), trial(0.0, numbers=2, n=50))
 
 
 @pytest.mark.parametrize("fitted, held, out", [(1, -1, True), (-1, -1, False), (1, 1, False), (-1, 1, False)])
 def test_out_of_reach_is_beyond_the_gate_where_fitted_and_within_it_where_held_out(fitted, held, out):
-    assert weighing().out_of_reach(trial(OVER + fitted * JUST, OVER + held * JUST)) == out
+    assert weighing().unseen_in_held_out(trial(OVER + fitted * JUST, OVER + held * JUST)) == out
 
 
 @pytest.mark.parametrize("numbers", [1, 4])
 def test_numbers_that_cost_sixteen_squares_and_two_each_may_hide_a_cause(numbers):
     w, most = weighing(), 16.0 + 2 * numbers
-    assert w.hides(trial(penalty=most + JUST, numbers=numbers).fit)
-    assert not w.hides(trial(penalty=most - JUST, numbers=numbers).fit)
+    assert w.parameters_may_mask_cause(trial(penalty=most + JUST, numbers=numbers).fit)
+    assert not w.parameters_may_mask_cause(trial(penalty=most - JUST, numbers=numbers).fit)
 
 
 def test_what_a_cause_must_show_is_its_size_or_where_the_device_hides_it_its_price():
     screened = SimpleNamespace(threshold=4.0)
-    assert weighing(1000).need(trial(), screened) == 16.0
-    assert weighing(10_000).need(trial(), screened) == pytest.approx(100.0)
-    assert weighing(10_000).need(trial(penalty=30.0), screened) == 16.0
+    assert weighing(1000).required_z2(trial(), screened) == 16.0
+    assert weighing(10_000).required_z2(trial(), screened) == pytest.approx(100.0)
+    assert weighing(10_000).required_z2(trial(penalty=30.0), screened) == 16.0
 
 
 def test_the_price_of_a_structure_is_half_of_bics_logarithm_twice_and_its_rarity():
     w = weighing()
     w.fitter.held_out = lambda fit: 1234.0
-    found = w.judged(trial(50.0, numbers=3, rarity=2.3).fit, None)
-    assert found.held == 1234.0 and found.price == pytest.approx(2 * np.log(N) + 2 * 2.3)
+    found = w.scored(trial(50.0, numbers=3, rarity=2.3).fit, None)
+    assert found.held_out_deviance == 1234.0 and found.complexity_penalty == pytest.approx(2 * np.log(N) + 2 * 2.3)
     few = weighing(1)
     few.fitter.held_out = lambda fit: 0.0
-    assert few.judged(trial(numbers=2).fit, None).price == pytest.approx(np.log(2))
+    assert few.scored(trial(numbers=2).fit, None).complexity_penalty == pytest.approx(np.log(2))
 
 
 def test_squares_that_none_explains_do_not_choose():
@@ -170,54 +176,59 @@ def test_squares_that_none_explains_do_not_choose():
     w = weighing()
     a, b = trial(2.0 * N, 2.0 * N), trial(2.0 * N + 90, 2.0 * N + 60, price=5.0)
     slack = 0.01 * 2 * N * (1 - 1 / 3)
-    assert w.ahead(a, b) == pytest.approx(90 / 3 + 60 / 3 + 5 - slack)
-    assert w.ahead(b, a) == pytest.approx(-(90 / 3 + 60 / 3 + 5) - slack)
+    assert w.advantage(a, b) == pytest.approx(90 / 3 + 60 / 3 + 5 - slack)
+    assert w.advantage(b, a) == pytest.approx(-(90 / 3 + 60 / 3 + 5) - slack)
 
 
 @pytest.mark.parametrize("known, slack", [(True, 0.25), (False, 0.01)])
 def test_where_either_explains_all_that_was_fitted_a_quarter_of_what_is_held_out_does_not_choose(known, slack):
     w = weighing(known=known)
     a, b = trial(0.0, N), trial(0.0, N + 100)
-    assert w.ahead(a, b) == pytest.approx(100 / 2 - slack * N / 2)
+    assert w.advantage(a, b) == pytest.approx(100 / 2 - slack * N / 2)
     poor = trial(5 * np.sqrt(2 * N), N + 100)  # one of them leaves more than noise
-    assert w.ahead(a, poor) == pytest.approx(5 * np.sqrt(2 * N) + 100 / 2 - 0.01 * N / 2)
+    assert w.advantage(a, poor) == pytest.approx(5 * np.sqrt(2 * N) + 100 / 2 - 0.01 * N / 2)
 
 
 def test_among_equals_the_plainer_is_named():
     w = weighing()
     best, rare, plain = trial(0.0, N), trial(0.0, N, rarity=2.0), trial(0.0, N + 200, rarity=-1.0)
-    assert w.plainest([rare, best]) is best and w.plainest([best, rare]) is best
-    assert w.plainest([best, plain]) is plain  # 200/2 squares are within a quarter of 1000/2, or not:
-    assert w.ahead(best, trial(0.0, N + 300)) > 0 and w.plainest([best, trial(0.0, N + 300, rarity=-1.0)]) is best
-    assert w.plainest([best, trial(0.0, N + 200, rarity=-1.0, numbers=2)]) is best  # with more numbers
+    assert w.most_parsimonious([rare, best]) is best and w.most_parsimonious([best, rare]) is best
+    assert w.most_parsimonious([best, plain]) is plain  # 200/2 squares are within a quarter of 1000/2, or not:
+    assert (
+        w.advantage(best, trial(0.0, N + 300)) > 0
+        and w.most_parsimonious([best, trial(0.0, N + 300, rarity=-1.0)]) is best
+    )
+    assert w.most_parsimonious([best, trial(0.0, N + 200, rarity=-1.0, numbers=2)]) is best  # with more numbers
 
 
 @pytest.mark.parametrize("value, means", [(0.5, True), (1 - 2e-6, True), (1 - 5e-7, False), (5e-7, True), (1.0, False)])
 def test_an_amplitude_at_its_bound_means_nothing_but_off(value, means):
     w = weighing()
-    assert w.meant(trial(numbers=2, causes=(GAIN,), theta=[0.5, value])) == means
-    assert w.meant(trial(numbers=2, causes=(GAIN,), theta=[0.5, value]), (GAIN,))
+    assert w.physically_meaningful(trial(numbers=2, causes=(GAIN,), theta=[0.5, value])) == means
+    assert w.physically_meaningful(trial(numbers=2, causes=(GAIN,), theta=[0.5, value]), (GAIN,))
 
 
 def test_an_amplitude_at_a_bound_that_is_not_off_means_nothing_either():
     t = trial(numbers=2, causes=(GAIN,), theta=[0.5, -1 + 5e-7])
     t.fit.structure.unknowns = (number(), number(0, low=-1.0))
-    assert not weighing().meant(t)
+    assert not weighing().physically_meaningful(t)
     t.fit.theta = np.array([0.5, -1 + 3e-6])
-    assert weighing().meant(t)
+    assert weighing().physically_meaningful(t)
 
 
 @pytest.mark.parametrize("value, means", [(0.79, False), (0.81, True), (1.19, True), (1.21, False)])
 def test_an_amplitude_that_is_not_usual_is_something_else(value, means):
     t = trial(numbers=2, causes=(GAIN,), theta=[0.5, value], usual=(0.8, 1.2))
     t.fit.structure.unknowns = (number(), number(0, high=2.0))
-    assert weighing().meant(t) == means
+    assert weighing().physically_meaningful(t) == means
 
 
 AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
 
 
-def fitted(squares: float, held: float, *causes: Hypothesis, amplitude: float = 0.3, sd: float = 0.01) -> Trial:
+def fitted(
+    squares: float, held: float, *causes: Hypothesis, amplitude: float = 0.3, sd: float = 0.01
+) -> CandidateModel:
     """A fit of the axis with causes, of which the first has this `amplitude`, known to `sd`."""
     structure = Structure(AXIS)
     for cause in causes:
@@ -230,7 +241,7 @@ def fitted(squares: float, held: float, *causes: Hypothesis, amplitude: float = 
     if first is not None:
         theta[first], deviations[first] = amplitude, sd
     fit = Fit(structure, theta, (), N + squares, N, np.zeros(len(theta)), np.diag(1 / deviations), 0.0)
-    return Trial(fit, N + held, 0.0)
+    return CandidateModel(fit, N + held, 0.0)
 
 
 @pytest.mark.parametrize("sd, times", [(0.15, 1.0), (0.16, 5.0)])
@@ -244,8 +255,8 @@ def test_what_a_law_that_is_right_to_a_hundredth_may_leave_is_doubtful(sd, times
         bare = fitted(2 * squares, squares / 2, CREEP)
         # the records without the creep leave 4e6 and 1e6 in place of what the bare fit leaves
         rest = np.sqrt((4e6 - 2 * squares) * (1e6 - squares / 2)) / np.sqrt(4e6 * 1e6)
-        assert w.doubtful(bare, current, 0) == (squares < 200.0 * times**2 * rest)
-    assert not w.doubtful(fitted(2 * 190.0, 190.0 / 2, GAIN), current, 0)  # a gain has its own form
+        assert w.within_model_form_error(bare, current, 0) == (squares < 200.0 * times**2 * rest)
+    assert not w.within_model_form_error(fitted(2 * 190.0, 190.0 / 2, GAIN), current, 0)  # a gain has its own form
 
 
 def judged(

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
-from ctrlgen.diagnosis.selection.diagnosis import EXPLAINED
+from ctrlgen.diagnosis.selection.verdict import EXPLAINED
 from ctrlgen.effects import Effect
 
 INERTIA, WEIGHT, DAMPING, MOTOR = 2e-4, 0.02, 4e-4, 0.015

@@ -11,23 +11,22 @@ from scipy import stats
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.structure import FreeParameter
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.diagnosis import (
+from ctrlgen.diagnosis.selection.line_resolvability import lines_resolved
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.result import findings, held_out_errors
+from ctrlgen.diagnosis.selection.verdict import (
     AMBIGUOUS,
     CONSISTENT,
     EXPLAINED,
     PARTLY,
     UNEXPLAINED,
-    errors,
-    excluded,
-    findings,
-    loose,
-    remaining,
-    tolerated,
+    contradicts_datasheet,
+    model_error_allowance,
+    poorly_determined,
     unconfirmed,
+    unexplained_share,
     verdict,
 )
-from ctrlgen.diagnosis.selection.line_resolvability import resolved
-from ctrlgen.diagnosis.selection.model_selection import Weighing
 
 N, JUST = 1000, 1e-6
 CREEP, DRIFT, GAIN, REVERSED = (
@@ -51,11 +50,11 @@ def fitted(objective=float(N), causes=(), theta=(), unknowns=(), penalty=0.0) ->
 
 
 def trial(objective=float(N), held=float(N), cause=None, **more) -> SimpleNamespace:
-    return SimpleNamespace(fit=fitted(objective, **more), held=held, cause=cause)
+    return SimpleNamespace(fit=fitted(objective, **more), held_out_deviance=held, cause=cause)
 
 
 def search(nominal, chosen, bare=(), rivals=()) -> SimpleNamespace:
-    return SimpleNamespace(nominal=nominal, chosen=chosen, bare=bare, rivals=rivals)
+    return SimpleNamespace(nominal=nominal, chosen=chosen, without_cause=bare, rivals=rivals)
 
 
 def fitter(known: bool = True, **squares: float) -> SimpleNamespace:
@@ -68,21 +67,23 @@ CHANCE = 4 * np.sqrt(2 * N)  # squares by which N of them differ by chance
 
 def test_nothing_remains_that_is_within_four_deviations_of_the_noise():
     before = trial(N + 1e4, N + 1e4)
-    assert remaining(fitter(), search(before, trial(N + CHANCE - JUST, N + CHANCE - JUST))) == 0.0
-    assert remaining(fitter(), search(before, trial(N + CHANCE + JUST))) > 0.0
-    assert remaining(fitter(), search(before, trial(held=N + CHANCE + JUST))) > 0.0
+    assert unexplained_share(fitter(), search(before, trial(N + CHANCE - JUST, N + CHANCE - JUST))) == 0.0
+    assert unexplained_share(fitter(), search(before, trial(N + CHANCE + JUST))) > 0.0
+    assert unexplained_share(fitter(), search(before, trial(held=N + CHANCE + JUST))) > 0.0
 
 
 def test_what_remains_is_a_share_of_root_mean_squares_fitted_or_held_out_whichever_is_larger():
     before = trial(N + 4e5, N + 1e6)
-    assert remaining(fitter(), search(before, trial(N + 1e3, N + 4e3))) == pytest.approx(np.sqrt(4e3 / 1e6))
-    assert remaining(fitter(), search(before, trial(N + 4e3, N + 1e3))) == pytest.approx(np.sqrt(4e3 / 4e5))
-    assert remaining(fitter(), search(trial(N + 1e3), trial(N + 5e3))) == pytest.approx(1.0)  # worse than before is all
+    assert unexplained_share(fitter(), search(before, trial(N + 1e3, N + 4e3))) == pytest.approx(np.sqrt(4e3 / 1e6))
+    assert unexplained_share(fitter(), search(before, trial(N + 4e3, N + 1e3))) == pytest.approx(np.sqrt(4e3 / 4e5))
+    assert unexplained_share(fitter(), search(trial(N + 1e3), trial(N + 5e3))) == pytest.approx(
+        1.0
+    )  # worse than before is all
 
 
 @pytest.mark.parametrize("causes, most", [((), 0.05), ((GAIN,), 0.05), ((CREEP, GAIN), 0.05), ((DRIFT, CREEP), 0.1)])
 def test_the_roughest_law_may_leave_what_it_says_and_any_law_a_twentieth(causes, most):
-    assert tolerated(search(None, trial(causes=causes))) == most
+    assert model_error_allowance(search(None, trial(causes=causes))) == most
 
 
 @pytest.mark.parametrize("side, is_loose", [(-JUST, False), (JUST, True)])
@@ -90,7 +91,7 @@ def test_numbers_are_loose_that_foresee_worse_than_none_beyond_four_deviations(s
     squares = {"chosen": 5e4 + CHANCE + side, "nominal": 5e4}
     chosen, nominal = trial(), trial()
     f = fitter(held_squares=lambda fit: squares["chosen" if fit is chosen.fit else "nominal"])
-    assert loose(f, search(nominal, chosen)) == is_loose
+    assert poorly_determined(f, search(nominal, chosen)) == is_loose
 
 
 @pytest.mark.parametrize("confirmed, shown", [(2 - JUST, False), (2 + JUST, True)])
@@ -115,13 +116,15 @@ def off(*deviations: float) -> SimpleNamespace:
 def test_numbers_are_excluded_that_chance_puts_so_far_off_once_in_a_million():
     for count in (1, 4):
         z = float(np.sqrt(stats.chi2.isf(1e-6, count) / count))
-        assert excluded(off(*[z * (1 - 1e-6)] * count)) == {}
-        assert excluded(off(*[z * (1 + 1e-6)] * count)) == pytest.approx({f"p{k}": z for k in range(count)}, rel=1e-5)
+        assert contradicts_datasheet(off(*[z * (1 - 1e-6)] * count)) == {}
+        assert contradicts_datasheet(off(*[z * (1 + 1e-6)] * count)) == pytest.approx(
+            {f"p{k}": z for k in range(count)}, rel=1e-5
+        )
 
 
 def test_of_excluded_numbers_those_beyond_two_deviations_are_named():
-    assert excluded(off(-9.0, 2.01, 1.99)) == pytest.approx({"p0": -9.0, "p1": 2.01})
-    many = excluded(off(*[1.5] * 60))  # none alone is far off
+    assert contradicts_datasheet(off(-9.0, 2.01, 1.99)) == pytest.approx({"p0": -9.0, "p1": 2.01})
+    many = contradicts_datasheet(off(*[1.5] * 60))  # none alone is far off
     assert len(many) == 60 and set(np.round(list(many.values()), 9)) == {1.5}
 
 
@@ -149,7 +152,9 @@ def test_a_verdict_says_what_is_known():
 
 def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_cause_first(monkeypatch):
     """Reversed 0.9 to 1.1 times: one."""
-    monkeypatch.setattr("ctrlgen.diagnosis.selection.diagnosis.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01))
+    monkeypatch.setattr(
+        "ctrlgen.diagnosis.selection.result.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
+    )
     chosen = trial(N, N, causes=(GAIN, REVERSED), unknowns=(number("effect[0].gain", cause=0),), theta=(1.1,))
     bare = (trial(held=N + 100.0), trial(held=N + 300.0))
     first, second = findings(search(trial(held=1e3), chosen, bare, ((trial(cause=CREEP), trial()), ())))
@@ -163,19 +168,19 @@ def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_
 
 
 def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monkeypatch):
-    monkeypatch.setattr("ctrlgen.diagnosis.selection.diagnosis.prediction_uncertainty", lambda *_: np.array([5e-9]))
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.result.prediction_uncertainty", lambda *_: np.array([5e-9]))
     valid = np.ones((4, 1), bool)
     valid[3] = False
     nominal, chosen = trial(), trial()
     f = fitter(predicted=lambda fit, r: np.full((4, 1), 1e-6 if fit is nominal.fit else 3e-6))
     f.held = [SimpleNamespace(valid=valid, observed=np.array([[4e-6], [5e-6], [6e-6], [9.0]]))]
     f.recording = SimpleNamespace(channels=("reading.axis",), units=("um",))
-    found = errors(f, search(nominal, chosen), np.array([True]))["reading.axis"]
+    found = held_out_errors(f, search(nominal, chosen), np.array([True]))["reading.axis"]
     wanted = (np.sqrt((9 + 16 + 25) / 3), np.sqrt((1 + 4 + 9) / 3), 2e-3, 5e-3)
     assert (found.rms_before, found.rms_after, found.noise_floor, found.uncertainty) == pytest.approx(wanted)
-    assert errors(f, search(nominal, chosen), np.array([False]))["reading.axis"].noise_floor is None
+    assert held_out_errors(f, search(nominal, chosen), np.array([False]))["reading.axis"].noise_floor is None
     f.held = []
-    assert np.isnan(errors(f, search(nominal, chosen), np.array([True]))["reading.axis"].rms_after)
+    assert np.isnan(held_out_errors(f, search(nominal, chosen), np.array([True]))["reading.axis"].rms_after)
 
 
 def lines(*frequencies: float | None, accepted=(), path=10.0) -> bool:
@@ -190,7 +195,7 @@ def lines(*frequencies: float | None, accepted=(), path=10.0) -> bool:
     observed = np.linspace(0, path, 11)[:, None]
     record = SimpleNamespace(role="fit", time=np.arange(11), valid=np.ones((11, 1), bool), observed=observed)
     recording = SimpleNamespace(records=[record], channels=("reading.axis",))
-    return resolved(recording, fit, [causes[k] for k in accepted])
+    return lines_resolved(recording, fit, [causes[k] for k in accepted])
 
 
 def test_two_lines_are_told_apart_by_half_a_period_over_the_path():
@@ -210,5 +215,9 @@ def test_a_cause_whose_law_does_not_hold_means_nothing(period, means):
     cause = Hypothesis("cyclic", "sensor:axis", "axis")
     fit = fitted(causes=(cause, GAIN))
     fit.values = lambda k: {"amplitude": 1.0, "period": period} if k == 0 else {"gain": 0.1}
-    weigh = Weighing(SimpleNamespace(to_fit=[], held=[], recording=SimpleNamespace(channels=(), records=())), None)
-    assert weigh.meant(SimpleNamespace(fit=fit)) == means and weigh.meant(SimpleNamespace(fit=fit), (cause,))
+    weigh = ModelSelection(
+        SimpleNamespace(to_fit=[], held=[], recording=SimpleNamespace(channels=(), records=())), None
+    )
+    assert weigh.physically_meaningful(SimpleNamespace(fit=fit)) == means and weigh.physically_meaningful(
+        SimpleNamespace(fit=fit), (cause,)
+    )

@@ -25,7 +25,7 @@ from ctrlgen.trajectory.metrics import in_unit
 if TYPE_CHECKING:
     from ctrlgen.app.batch import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
-    from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+    from ctrlgen.diagnosis.selection.result import Diagnosis
     from ctrlgen.reporting.build_record import Build
     from ctrlgen.reproduce.row import PrintedNumber
 

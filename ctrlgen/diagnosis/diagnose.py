@@ -24,11 +24,12 @@ from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence.supporting_analyses import evidence
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_physics
-from ctrlgen.diagnosis.selection.dead_channels import alive
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, errors, findings, verdict
-from ctrlgen.diagnosis.selection.direct_detection import read_off
+from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
+from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
+from ctrlgen.diagnosis.selection.result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.verdict import verdict
 from ctrlgen.diagnosis.settings import NOISE_UPDATE, SIMULATION
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
@@ -63,7 +64,7 @@ def _diagnose(
     if missing:
         raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
     step("noise")
-    live = alive(device, recording)
+    live = without_dead_channels(device, recording)
     recording = live.recording
     noise = estimate_noise(recording, settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time)))
     fitter = Fitter(recording, noise, checkpoint)
@@ -85,7 +86,7 @@ def _diagnose(
     found = Searcher(fitter, Screen(fitter, open_, seed), step).run(Structure(device))
     step("judging")
     after = run_residual_tests(fitter, found.chosen.fit)
-    seen = (*live.findings, *read_off(fitter, found))
+    seen = (*live.findings, *directly_detected_findings(fitter, found))
     said = verdict(fitter, found, after, bool(seen))
     step("evidence")
     sure = profiles(fitter, found.chosen.fit)
@@ -93,12 +94,12 @@ def _diagnose(
     return Diagnosis(
         verdict=said,
         findings=(*findings(found, sure), *seen),
-        held_out=errors(fitter, found, noise.known),
+        held_out=held_out_errors(fitter, found, noise.known),
         residual_tests=after,
-        where=beside.where,
-        detectable=beside.detectable,
+        residual_location=beside.residual_location,
+        detectability=beside.detectability,
         next_experiment=beside.next_experiment,
-        history=beside.history,
+        search_history=beside.search_history,
         notes=(
             *recording.notes,
             *live.said,

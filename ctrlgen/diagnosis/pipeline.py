@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
 from ctrlgen.diagnosis.report.diagnosis_json import as_dict
 from ctrlgen.diagnosis.report.html_report import Provenance, page
 from ctrlgen.diagnosis.report.writeback import write_next
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording

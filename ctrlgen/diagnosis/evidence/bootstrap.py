@@ -22,7 +22,7 @@ from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, Estimate
+from ctrlgen.diagnosis.selection.result import Diagnosis, Estimate
 from ctrlgen.diagnosis.settings import BOOTSTRAP
 from ctrlgen.recordings.recording import Record, Recording
 

@@ -16,38 +16,38 @@ from ctrlgen.diagnosis.settings import DETECTABILITY, MODEL_SELECTION
 
 
 @dataclass(frozen=True)
-class Smallest:
-    """The smallest amplitude of one kind that would have been seen, `named_from` which it would also have been named,
-    in `unit`, at the place where it shows most; `alike` what it would be taken for there."""
+class SmallestDetectable:
+    """The smallest amplitude of one kind that would have been seen, `identifiable_from` which it would also have been named,
+    in `unit`, at the place where it shows most; `confusable_with` what it would be taken for there."""
 
     effect: str
     location: str
     amplitude: str
-    seen_from: float
-    named_from: float
+    detectable_from: float
+    identifiable_from: float
     unit: str
-    alike: tuple[tuple[str, str], ...]
-    everywhere: dict[str, float]
+    confusable_with: tuple[tuple[str, str], ...]
+    by_location: dict[str, float]
 
 
 @dataclass(frozen=True)
-class Hidden:
+class Undetectable:
     """A cause that this recording cannot show, and what it hides behind."""
 
     effect: str
     location: str
-    behind: str
+    masked_by: str
 
 
 @dataclass(frozen=True)
-class Detectable:
+class Detectability:
     """`smallest` by kind, and the `hidden` causes."""
 
-    smallest: dict[str, Smallest]
-    hidden: tuple[Hidden, ...]
+    smallest: dict[str, SmallestDetectable]
+    undetectable: tuple[Undetectable, ...]
 
 
-def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
+def detectability(fit: Fit, screened: Screened, n: int) -> Detectability:
     """What would have been seen besides the causes of `fit`, by the screen of its residual over `n` samples.
 
     Where `fit` leaves more than the noise, that counts as noise here.
@@ -69,11 +69,15 @@ def detectable(fit: Fit, screened: Screened, n: int) -> Detectable:
     kinds = {kind: left for kind, p in kinds.items() if (left := {h: row for h, row in p.items() if h not in beyond})}
     smallest = {kind: _smallest(kind, places, screened, need) for kind, places in sorted(kinds.items())}
     free = {u.path for u in fit.structure.free_parameters}
-    hidden = tuple(
-        Hidden(h.effect, h.location, _behind(fit, k)) for h, k in screened.hidden.items() if h.path not in free
+    undetectable = tuple(
+        Undetectable(h.effect, h.location, _masking_parameter(fit, k))
+        for h, k in screened.undetectable.items()
+        if h.path not in free
     )
-    too_small = tuple(Hidden(h.effect, h.location, "the noise: it would show only beyond its bounds") for h in beyond)
-    return Detectable(smallest, hidden + too_small)
+    too_small = tuple(
+        Undetectable(h.effect, h.location, "the noise: it would show only beyond its bounds") for h in beyond
+    )
+    return Detectability(smallest, undetectable + too_small)
 
 
 def _span(h: Hypothesis) -> float:
@@ -83,21 +87,25 @@ def _span(h: Hypothesis) -> float:
 
 def _smallest(
     kind: str, places: dict[Hypothesis, tuple[float, float, str]], screened: Screened, need: float
-) -> Smallest:
+) -> SmallestDetectable:
     best = min(places, key=lambda h: places[h][1])
     sd, _, unit = places[best]
     own = next(s for s in screened.suspects if s.hypothesis == best)
-    others = sorted((s for s in screened.suspects if s.hypothesis != best), key=lambda s: -screened.alike(own, s))
-    alike = tuple(
+    others = sorted(
+        (s for s in screened.suspects if s.hypothesis != best), key=lambda s: -screened.confusability(own, s)
+    )
+    confusable_with = tuple(
         (s.hypothesis.effect, s.hypothesis.location)
-        for s in others[:DETECTABILITY.most_alike] if screened.alike(own, s) >= DETECTABILITY.alike
+        for s in others[:DETECTABILITY.most_alike] if screened.confusability(own, s) >= DETECTABILITY.alike
     )  # fmt: skip
     name = best.path.rpartition(".")[2] if kind == PARAMETER else best.law.amplitude().name
-    everywhere = {h.location: screened.threshold * value for h, (value, *_) in places.items()}
-    return Smallest(kind, best.location, name, screened.threshold * sd, need * sd, unit, alike, everywhere)
+    by_location = {h.location: screened.threshold * value for h, (value, *_) in places.items()}
+    return SmallestDetectable(
+        kind, best.location, name, screened.threshold * sd, need * sd, unit, confusable_with, by_location
+    )
 
 
-def _behind(fit: Fit, column: int) -> str:
+def _masking_parameter(fit: Fit, column: int) -> str:
     """The free number in words."""
     unknowns = fit.structure.free_parameters
     if column < 0:

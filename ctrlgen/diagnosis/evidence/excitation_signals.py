@@ -12,21 +12,21 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
+from ctrlgen.diagnosis.evidence.ltv_linearisation import simulate_motion
 from ctrlgen.diagnosis.settings import EXCITATION
 from ctrlgen.recordings.recording import Record
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class ExcitationSignal:
     """A drive of order one, (n, n_u), with what it is in words."""
 
     kind: str
-    said: str
+    description: str
     values: np.ndarray
 
 
-def shapes(n: int, n_u: int, rate: float, seed: int) -> Iterator[Shape]:
+def time_series(n: int, n_u: int, rate: float, seed: int) -> Iterator[ExcitationSignal]:
     """Series of `n` samples for `n_u` actuators; `rate` samples a second."""
     rng, s = np.random.default_rng(seed), np.arange(n) / n
     for kind, highest in (("slow multisine", 40), ("fast multisine", n // 10)):
@@ -34,37 +34,41 @@ def shapes(n: int, n_u: int, rate: float, seed: int) -> Iterator[Shape]:
         waves = np.cos(2 * np.pi * (np.multiply.outer(s, harmonics)[:, None] + rng.random((n_u, len(harmonics)))))
         values = waves.sum(axis=2)
         top = harmonics.max() * rate / n
-        yield Shape(kind, f"{kind}, odd lines up to {top:.3g} Hz", values / np.abs(values).max())
+        yield ExcitationSignal(kind, f"{kind}, odd lines up to {top:.3g} Hz", values / np.abs(values).max())
     triangle = 1 - 2 * np.abs(2 * ((2 * s + 0.25) % 1) - 1)
-    yield Shape("slow triangle", "two slow triangles, without rest", _together(triangle, n_u))
+    yield ExcitationSignal("slow triangle", "two slow triangles, without rest", _together(triangle, n_u))
     levels = np.array(EXCITATION.levels)[
         np.minimum((s * len(EXCITATION.levels)).astype(int), len(EXCITATION.levels) - 1)
     ]
-    yield Shape(
+    yield ExcitationSignal(
         "steps and rests", f"steps with rests of {n / len(EXCITATION.levels) / rate:.3g} s", _together(levels, n_u)
     )
     once = np.where((s >= 0.1) & (s < 0.5), 1.0, 0.0)
-    yield Shape("on and off", "off, on for 40 % of the time, off for the rest", _together(once, n_u))
+    yield ExcitationSignal("on and off", "off, on for 40 % of the time, off for the rest", _together(once, n_u))
     square = np.where((8 * s) % 2 < 1, 1.0, -1.0)
-    yield Shape("on/off cycles", "four cycles between the limits", _together(square, n_u))
+    yield ExcitationSignal("on/off cycles", "four cycles between the limits", _together(square, n_u))
     if n_u > 1:
         turns = np.minimum((s * n_u).astype(int), n_u - 1)
         own = (s * n_u) % 1
         wave = np.where(own < 0.25, 0.0, np.where(own < 0.6, 1.0, -1.0))
-        yield Shape(
+        yield ExcitationSignal(
             "one axis at a time", "each actuator stepped and returned alone", wave[:, None] * np.eye(n_u)[turns]
         )
 
 
-def poses(n: int, n_u: int, seed: int) -> Iterator[Shape]:
+def pose_sets(n: int, n_u: int, seed: int) -> Iterator[ExcitationSignal]:
     """Sets of `n` settled poses."""
     rng = np.random.default_rng(seed)
     turns, steps = np.arange(n) % n_u, np.arange(n) // n_u
     level = np.linspace(-1, 1, max(steps.max() + 1, 2))[steps]
-    yield Shape("one axis at a time", "each actuator alone over its range", level[:, None] * np.eye(n_u)[turns])
-    yield Shape("all together", "all actuators alike over their range", _together(np.linspace(-1, 1, n), n_u))
-    yield Shape("corners", "every actuator at one of its ends", rng.choice([-1.0, 1.0], (n, n_u)))
-    yield Shape("anywhere", "poses spread evenly over the range", rng.uniform(-1, 1, (n, n_u)))
+    yield ExcitationSignal(
+        "one axis at a time", "each actuator alone over its range", level[:, None] * np.eye(n_u)[turns]
+    )
+    yield ExcitationSignal(
+        "all together", "all actuators alike over their range", _together(np.linspace(-1, 1, n), n_u)
+    )
+    yield ExcitationSignal("corners", "every actuator at one of its ends", rng.choice([-1.0, 1.0], (n, n_u)))
+    yield ExcitationSignal("anywhere", "poses spread evenly over the range", rng.uniform(-1, 1, (n, n_u)))
 
 
 def _together(values: np.ndarray, n_u: int) -> np.ndarray:
@@ -72,7 +76,7 @@ def _together(values: np.ndarray, n_u: int) -> np.ndarray:
 
 
 def admissible(
-    shape: Shape, simulator: Simulator, p: np.ndarray, template: Record, first: float
+    shape: ExcitationSignal, simulator: Simulator, p: np.ndarray, template: Record, first: float
 ) -> tuple[Record, float] | None:
     """`shape` as a record from time `first` [s] as strong as every limit of the device allows, and its strength; None
     where even the weakest breaks one. `template` gives clock, convention and, where the device states none, the range.
@@ -104,7 +108,7 @@ def admissible(
 def _kept(simulator: Simulator, p: np.ndarray, record: Record) -> bool:
     """Whether the predicted motion breaks no limit."""
     m = simulator.model
-    after = motion(simulator, record, p, None)[1]
+    after = simulate_motion(simulator, record, p, None)[1]
     if not np.all(np.isfinite(after)):
         return False
     given = [ca.vertcat(m.x, m.z), m.u, m.p, simulator.ambient]

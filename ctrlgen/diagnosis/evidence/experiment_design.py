@@ -15,18 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
-from ctrlgen.diagnosis.evidence.excitation_signals import admissible, poses, shapes
-from ctrlgen.diagnosis.selection.candidate_model import Search
+from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
+from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.recordings.recording import Record
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateExperiment:
     """One drive and the separation in standard deviations that it promises, with this recording."""
 
     kind: str
-    said: str
+    description: str
     strength: float
     separation: float
 
@@ -40,7 +40,7 @@ class Experiment:
     reason: str
     before: float
     after: float
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateExperiment, ...]
     record: Record
 
     @property
@@ -49,7 +49,7 @@ class Experiment:
         return self.after >= EXPERIMENT.settles
 
 
-def next_experiment(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> Experiment | None:
+def next_experiment(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 0) -> Experiment | None:
     """The drive that best tells the chosen structure from its rivals or, where the recording stays unexplained, the two
     most conspicuous suspects from one another; None where nothing is open that a drive of the family could settle."""
     pairs, reason = _open(fitter, search, explained)
@@ -62,16 +62,16 @@ def next_experiment(fitter: Fitter, search: Search, explained: bool, seed: int =
     )
 
 
-def _open(fitter: Fitter, search: Search, explained: bool) -> tuple[list[tuple[Fit, Fit]], str]:
+def _open(fitter: Fitter, search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]], str]:
     """Pairs of fits between which the recording does not decide."""
-    rivals = sorted((t for rows in search.rivals for t in rows), key=lambda t: t.total)
+    rivals = sorted((t for rows in search.rivals for t in rows), key=lambda t: t.criterion)
     chosen = search.chosen.fit
     if rivals:
         return [(chosen, t.fit) for t in rivals[: EXPERIMENT.most_rivals]], "both explain this recording alike"
     if explained or not search.rounds or search.rounds[-1].before.fit is not chosen:
         return [], ""
     tried: dict[str, Fit] = {}
-    for trial in search.rounds[-1].trials:  # none of them was good enough
+    for trial in search.rounds[-1].candidates:  # none of them was good enough
         tried.setdefault(trial.cause.effect if trial.cause else "", trial.fit)
     closest = [*list(tried.values())[: EXPERIMENT.suspects], chosen][: EXPERIMENT.suspects]
     pairs = [(closest[0], closest[1])] if len(closest) == EXPERIMENT.suspects else []
@@ -86,7 +86,7 @@ def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Expe
         min(len(template.time), EXPERIMENT.most_poses if settled else EXPERIMENT.most_samples),
         template.drive.shape[1],
     )
-    family = poses(n, n_u, seed) if settled else shapes(n, n_u, 1 / template.sample_time, seed)
+    family = pose_sets(n, n_u, seed) if settled else time_series(n, n_u, 1 / template.sample_time, seed)
     first = 0.0 if settled else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
     simulator = a.structure.simulators(fitter.recording, fitter.cache)[template.sample_time, template.linear]
     now = [_Sums.present(fitter, *pair) for pair in ((a, b), (b, a))]
@@ -98,7 +98,7 @@ def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Expe
         record, strength = given
         both = [s.plus(fitter, *pair, record).separation for s, pair in zip(now, ((a, b), (b, a)), strict=True)]
         if np.all(np.isfinite(both)):
-            rows.append((Candidate(shape.kind, shape.said, strength, min(both)), record))
+            rows.append((CandidateExperiment(shape.kind, shape.description, strength, min(both)), record))
     if not rows:
         return None
     rows.sort(key=lambda row: -row[0].separation)

@@ -12,7 +12,7 @@ from ctrlgen.devices import BalancedPhysics
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment
-from ctrlgen.diagnosis.evidence.ltv_linearisation import motion
+from ctrlgen.diagnosis.evidence.ltv_linearisation import simulate_motion
 from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.model.model import Model
 
@@ -57,7 +57,7 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
     n = len(record.drive)
     cut = int(EXPERIMENT.fitted_share * n)
     lines = [
-        f"# {chosen.candidates[0].said}. Add the readings as columns of {DRIVE}, under the names below.",
+        f"# {chosen.candidates[0].description}. Add the readings as columns of {DRIVE}, under the names below.",
         f"title  = {json.dumps(f'next experiment after: {recording.title}')}",
         f"device = {json.dumps(recording.device)}",
         f"kind   = {json.dumps(recording.kind)}",
@@ -81,7 +81,7 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
 def _scenario(simulator: Simulator, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
     """The predicted displacements as a command; the solver finds the drives again."""
     m, record = simulator.model, chosen.record
-    after = motion(simulator, record, fit.theta, None)[1]
+    after = simulate_motion(simulator, record, fit.theta, None)[1]
     f = ca.Function("z", [ca.vertcat(m.x, m.z)], [m.z]).map(len(after))
     signal = m.signals["displacement"]
     z = f(after.T).full().T
@@ -89,7 +89,7 @@ def _scenario(simulator: Simulator, fit: Fit, chosen: Experiment, device_file: s
     header = [f"{c} [{u}]" for c, u in zip(signal.channels, signal.units, strict=True)]
     rate = f'sample_rate = "{1 / record.sample_time:.9g} Hz"\n' if np.isfinite(record.sample_time) else ""
     text = (
-        f"title = {json.dumps(f'next experiment: {chosen.candidates[0].said}')}\n"
+        f"title = {json.dumps(f'next experiment: {chosen.candidates[0].description}')}\n"
         f"device = {json.dumps(device_file)}\n"
         f'follow = "displacement"\n{rate}\n[path]\nkind = "poses"\nfile = "{COMMAND}"\n'
     )

@@ -24,7 +24,7 @@ from ctrlgen.recordings.recording import Record
 
 
 @dataclass(frozen=True, eq=False)
-class Along:
+class LtvModel:
     """One record along the motion of one fit, SI.
 
     `residual` (n, n_y) observed - predicted, zero where not valid; `white` the same as unit white noise, zero where not
@@ -78,18 +78,18 @@ class Along:
         return np.where(np.abs(self.velocity) > LTV_MODEL.standing * fastest, np.sign(self.velocity), 0.0)
 
 
-def acts_at(physics: DevicePhysics) -> Place:
+def unknown_input_place(physics: DevicePhysics) -> Place:
     """Where unknown physics is sought: a force, where one moves a mass or is read; else a displacement."""
     return Place.DISPLACEMENT if isinstance(physics, BalancedPhysics) else Place.FORCE
 
 
-def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
+def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
     """The linearisation of `fit` along `record`."""
     physics = nominal_physics(fit.structure.device)
-    place = acts_at(physics)
+    place = unknown_input_place(physics)
     simulator, p, chosen = _probed(fitter, fit, record, place)
     start = _start(fitter, fit, record)
-    before, after, y = motion(simulator, record, p, start)
+    before, after, y = simulate_motion(simulator, record, p, start)
     if start is None:
         y = fitter.predict(fit, record)
     F_S, F_f, H_S, H_f = _linearised(simulator, record, p, chosen, before)
@@ -102,7 +102,7 @@ def along(fitter: Fitter, fit: Fit, record: Record) -> Along:
     placed = [probe for probe in probes if probe.place is place]
     sd = np.zeros(simulator.n_s)
     sd[list(simulator.free_initial_states)] = start_sizes(simulator)
-    return Along(
+    return LtvModel(
         record, place, tuple(probe.at for probe in placed),
         tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), physics.travel_unit,
         residual,
@@ -131,7 +131,7 @@ def _start(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray | None:
     return fit.initial_states[places[0]] if places and fit.initial_states else None
 
 
-def motion(
+def simulate_motion(
     r: Simulator, record: Record, p: np.ndarray, start: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """S before and after each sample, (n, n_s), and the readings (n, n_y)."""

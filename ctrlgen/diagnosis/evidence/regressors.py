@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
+from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.settings import REGRESSORS
 
 
 @dataclass(frozen=True, eq=False)
-class Sizes:
+class Scales:
     """What features are counted in: the largest `travel` and `speed` [SI] of an axis, the largest `drives` (n_u,), the
     longest `time` [s]; `lags` [s] the relaxation times."""
 
@@ -23,7 +23,7 @@ class Sizes:
     lags: tuple[float, ...]
 
 
-def sizes(to_fit: list[Along], axis: int) -> Sizes:
+def scales_of(to_fit: list[LtvModel], axis: int) -> Scales:
     """Of the records to fit."""
     travel, speed = (
         max(float(np.abs(getattr(a, k)[:, axis]).max()) for a in to_fit) for k in ("displacement", "velocity")
@@ -32,10 +32,10 @@ def sizes(to_fit: list[Along], axis: int) -> Sizes:
     h, longest = to_fit[0].record.sample_time, max(len(a.white) for a in to_fit)
     lags = () if to_fit[0].settled else tuple(np.geomspace(4 * h, longest * h / 3, REGRESSORS.lags))
     time = max(float(np.abs(a.record.time).max()) for a in to_fit)
-    return Sizes(travel or 1.0, speed or 1.0, np.where(drives > 0, drives, 1.0), time or 1.0, lags)
+    return Scales(travel or 1.0, speed or 1.0, np.where(drives > 0, drives, 1.0), time or 1.0, lags)
 
 
-def features(left: Along, axis: int, size: Sizes) -> dict[str, np.ndarray]:
+def features(left: LtvModel, axis: int, size: Scales) -> dict[str, np.ndarray]:
     """Features (n,) by their formula, of order one. Separate poses have neither speed nor history."""
     d = left.displacement[:, axis] / size.travel
     found = {"1": np.ones_like(d), "d": d, "d^2": d**2, "d^3": d**3, "d^4": d**4, "d^5": d**5, "|d|": np.abs(d)}

@@ -14,13 +14,13 @@ import numpy as np
 from scipy import signal, stats
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
-from ctrlgen.diagnosis.evidence.spectral_lines import Lines, lines
+from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
+from ctrlgen.diagnosis.evidence.spectral_lines import SpectralLines, spectral_lines
 from ctrlgen.diagnosis.settings import LOCALISATION
 
 
 @dataclass(frozen=True)
-class Size:
+class ResidualPart:
     """One part of the recording: `excess` of squares over the noise's, its interval, `share` of the whole excess, and
     the mean of what is left with its interval, in `unit`."""
 
@@ -35,7 +35,7 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Band:
+class FrequencyBand:
     """One band [Hz]: excess of the whitened spectrum, and the largest coherence of any reading with any drive; above
     `coherence_floor` it is there with 95 %."""
 
@@ -49,32 +49,34 @@ class Band:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """How sparse the excess is: `carried_by` how many numbers (participation ratio), of readings and of actuators;
+    """How sparse the excess is: `participation_ratio` how many numbers (participation ratio), of readings and of actuators;
     `alone` the share that each could explain by itself; `lives_in` the better kind, or that neither stands out."""
 
-    carried_by: dict[str, float]
-    alone: dict[str, dict[str, float]]
-    lives_in: str
+    participation_ratio: dict[str, float]
+    explained_by_one: dict[str, dict[str, float]]
+    located_in: str
 
 
 @dataclass(frozen=True)
-class Where:
+class ResidualLocation:
     """Where what one fit leaves is; `said` the sentences that follow from it."""
 
     excess: float
-    output: tuple[Size, ...]
-    actuator: tuple[Size, ...]
+    by_reading: tuple[ResidualPart, ...]
+    by_actuator: tuple[ResidualPart, ...]
     coordinates: Coordinates
-    band: tuple[Band, ...]
-    region: dict[str, tuple[Size, ...]]
-    direction: dict[str, tuple[Size, ...]]
-    time: tuple[Size, ...]
-    ambient: tuple[Size, ...]
-    lines: tuple[Lines, ...]
-    said: tuple[str, ...]
+    by_frequency: tuple[FrequencyBand, ...]
+    by_travel: dict[str, tuple[ResidualPart, ...]]
+    by_direction: dict[str, tuple[ResidualPart, ...]]
+    by_time: tuple[ResidualPart, ...]
+    by_temperature: tuple[ResidualPart, ...]
+    spectral_lines: tuple[SpectralLines, ...]
+    statements: tuple[str, ...]
 
 
-def where(left: list[Along], channels: tuple[str, ...], units: tuple[str, ...], seed: int = 0) -> Where:
+def localise_residual(
+    left: list[LtvModel], channels: tuple[str, ...], units: tuple[str, ...], seed: int = 0
+) -> ResidualLocation:
     """The map of what is left along the records; `channels` the readings' names with the reader's `units`."""
     maps = _Maps(left, seed)
     axes = left[0].axes
@@ -82,7 +84,7 @@ def where(left: list[Along], channels: tuple[str, ...], units: tuple[str, ...], 
         maps.sizes(maps.white[:, i], maps.usable[:, i], [(name, np.ones(maps.n, bool))], maps.residual[:, i], unit)[0]
         for i, (name, unit) in enumerate(zip(channels, units, strict=True))
     )
-    actuators: list[Size] = []
+    actuators: list[ResidualPart] = []
     regions, directions = {}, {}
     for i, axis in enumerate(axes):
         a, sized, unit = maps.actuators[:, i], maps.actuators_white[:, i], left[0].units[i]
@@ -94,13 +96,13 @@ def where(left: list[Along], channels: tuple[str, ...], units: tuple[str, ...], 
         )
     norm, whole = np.sqrt(np.mean(maps.white**2, axis=1)), np.any(maps.usable, axis=1)
     ambient = _quintiles(maps.ambient, "delta_degC") if maps.ambient is not None else []
-    found = Where(
+    found = ResidualLocation(
         maps.excess, _shared(outputs), _shared(tuple(actuators)), maps.coordinates(channels), _bands(left), regions,
         directions, maps.sizes(norm, whole, maps.times(), norm, "1"), maps.sizes(norm, whole, ambient, norm, "1"),
-        tuple(found for a in left for i in range(len(channels)) if (found := lines(a.record, i, channels[i], units[i]))),
+        tuple(found for a in left for i in range(len(channels)) if (found := spectral_lines(a.record, i, channels[i], units[i]))),
         (),
     )  # fmt: skip
-    return Where(**{**found.__dict__, "said": _said(found)})
+    return ResidualLocation(**{**found.__dict__, "statements": _statements(found)})
 
 
 def _quintiles(values: np.ndarray, unit: str) -> list[tuple[str, np.ndarray]]:
@@ -120,16 +122,16 @@ def _without_position(values: np.ndarray, d: np.ndarray, usable: np.ndarray) -> 
     return values - powers @ np.linalg.lstsq(powers[usable], values[usable], rcond=1e-10)[0]
 
 
-def _shared(sizes: tuple[Size, ...]) -> tuple[Size, ...]:
+def _shared(sizes: tuple[ResidualPart, ...]) -> tuple[ResidualPart, ...]:
     """Shares among these parts, which together are the whole."""
     total = sum(max(s.excess, 0.0) for s in sizes)
-    return tuple(Size(**{**s.__dict__, "share": max(s.excess, 0.0) / total if total else 0.0}) for s in sizes)
+    return tuple(ResidualPart(**{**s.__dict__, "share": max(s.excess, 0.0) / total if total else 0.0}) for s in sizes)
 
 
 class _Maps:
     """All records behind one another, in the coordinates of the readings and of the actuators."""
 
-    def __init__(self, left: list[Along], seed: int) -> None:
+    def __init__(self, left: list[LtvModel], seed: int) -> None:
         self.left = left
         self.rng = np.random.default_rng(seed)
         self.white, self.residual, self.usable = (
@@ -143,7 +145,7 @@ class _Maps:
         self.ambient = np.concatenate([a.record.ambient for a in left]) if given else None
         self.block = _blocks([len(a.white) for a in left])
         self.excess = float(np.sum(self.white**2) / max(self.usable.sum(), 1) - 1)
-        coordinates = [projected(a) for a in left]
+        coordinates = [equivalent_inputs(a) for a in left]
         self.actuators = np.concatenate([c[0] for c in coordinates])
         self.actuators_white = np.concatenate([c[1] for c in coordinates])
         self.along_each = np.concatenate([c[2] for c in coordinates])
@@ -155,7 +157,7 @@ class _Maps:
         cells: list[tuple[str, np.ndarray]],
         values: np.ndarray,
         unit: str,
-    ) -> tuple[Size, ...]:
+    ) -> tuple[ResidualPart, ...]:
         """The size of each cell (label, mask), with intervals."""
         found = []
         weights = self.rng.multinomial(
@@ -179,7 +181,7 @@ class _Maps:
             share = float(np.clip((squares.sum() - n) / total, 0, 1))
             mean = float(difference(sums.sum() / n, unit))
             found.append(
-                Size(
+                ResidualPart(
                     label, excess, (float(low), float(high)), share, mean, (float(bounds[0]), float(bounds[1])), unit, n
                 )
             )
@@ -235,7 +237,7 @@ def _blocks(lengths: list[int]) -> np.ndarray:
     return np.concatenate(blocks)
 
 
-def projected(a: Along) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def equivalent_inputs(a: LtvModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Disturbances of the axes that would explain each sample at rest, (n, n_axes): SI, in units of their noise, and
     the whitened residual along each axis' own direction."""
     per_noise = np.where(a.usable.any(axis=0), _per_noise(a), 0.0)
@@ -252,7 +254,7 @@ def projected(a: Along) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return values, white, own
 
 
-def _per_noise(a: Along) -> np.ndarray:
+def _per_noise(a: LtvModel) -> np.ndarray:
     """Whitened over plain residual, root mean square: the inverse of the noise where it is white."""
     plain = np.sqrt(np.sum(np.where(a.usable, a.residual, 0.0) ** 2, axis=0))
     return np.sqrt(np.sum(a.white**2, axis=0)) / np.where(plain > 0, plain, 1.0)
@@ -264,7 +266,7 @@ def _participation(w: np.ndarray) -> float:
     return float(e.sum() ** 2 / np.sum(e**2)) if np.any(e > 0) else float("nan")
 
 
-def _bands(left: list[Along]) -> tuple[Band, ...]:
+def _bands(left: list[LtvModel]) -> tuple[FrequencyBand, ...]:
     """Logarithmic bands from the longest record's own frequency to half the sample rate."""
     if left[0].settled:
         return ()
@@ -288,12 +290,14 @@ def _bands(left: list[Along]) -> tuple[Band, ...]:
         seen = [value for c, _ in coherences if (value := c[k]) is not None]
         floor = max((f for c, f in coherences if c[k] is not None), default=None)
         found.append(
-            Band(float(edges[k]), float(edges[k + 1]), float(level - 1), (low, high), max(seen, default=None), floor)
+            FrequencyBand(
+                float(edges[k]), float(edges[k + 1]), float(level - 1), (low, high), max(seen, default=None), floor
+            )
         )
     return tuple(found)
 
 
-def _coherence(a: Along, edges: np.ndarray) -> tuple[list[float | None], float]:
+def _coherence(a: LtvModel, edges: np.ndarray) -> tuple[list[float | None], float]:
     """Per band the largest coherence of a reading's residual with a drive, and what chance reaches with 5 %."""
     segment = max(len(a.white) // LOCALISATION.coherence_segments * 2, 8)
     averages = max(2 * len(a.white) // segment - 1, 2)
@@ -310,20 +314,20 @@ def _coherence(a: Along, edges: np.ndarray) -> tuple[list[float | None], float]:
     return best, float(1 - 0.05 ** (1 / (averages - 1)))
 
 
-def _said(found: Where) -> tuple[str, ...]:
+def _statements(found: ResidualLocation) -> tuple[str, ...]:
     said = []
-    if found.output:
-        most = max(found.output, key=lambda s: s.share)
+    if found.by_reading:
+        most = max(found.by_reading, key=lambda s: s.share)
         if most.ci95[0] > 0:
             said.append(f"{most.label} carries {most.share:.0%} of what is left over the noise")
-    lives = found.coordinates.lives_in
+    lives = found.coordinates.located_in
     if lives in ("actuator", "reading"):
-        name, share = max(found.coordinates.alone[lives].items(), key=lambda item: item[1])
+        name, share = max(found.coordinates.explained_by_one[lives].items(), key=lambda item: item[1])
         said.append(f"{lives} {name} alone could carry {share:.0%} of it")
-    for axis, sides in found.direction.items():
+    for axis, sides in found.by_direction.items():
         if len(sides) == 2:
             (a, b), (c, d) = sides[0].mean_ci95, sides[1].mean_ci95
             if a > d or c > b:
                 gap = sides[0].mean - sides[1].mean
                 said.append(f"{axis} differs by direction: {gap:.3g} {sides[0].unit} between forward and backward")
-    return (*said, *(f"{line.channel} in {line.record}: {line.said}" for line in found.lines))
+    return (*said, *(f"{line.channel} in {line.record}: {line.statement}" for line in found.spectral_lines))

@@ -12,13 +12,13 @@ import numpy as np
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
-from ctrlgen.diagnosis.evidence.regressors import Sizes, features, sizes
+from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
+from ctrlgen.diagnosis.evidence.regressors import Scales, features, scales_of
 from ctrlgen.diagnosis.settings import SPARSE_REGRESSION
 
 
 @dataclass(frozen=True)
-class Empirical:
+class EmpiricalTerm:
     """sum of `terms` (coefficient [`unit`] by feature) at `axis`; d is counted in `travel`, v in `speed`, u in `drives`
     (SI). `held_out_gain` is the share of the squares left over the noise on the held-out records that goes with it."""
 
@@ -32,10 +32,10 @@ class Empirical:
     held_out_gain: float
 
 
-def empirical(fitter: Fitter, fit: Fit, left: list[Along], i: int) -> Empirical | None:
+def fit_empirical_term(fitter: Fitter, fit: Fit, left: list[LtvModel], i: int) -> EmpiricalTerm | None:
     """The term at axis `i` for what `fit` leaves, None where the held-out records do not gain by it."""
     to_fit = [a for a in left if a.record.role == "fit"]
-    size = sizes(to_fit, i)
+    size = scales_of(to_fit, i)
     parts = [_slopes(fitter, a, i, size) for a in to_fit]
     names, S = parts[0][1], np.vstack([values for values, _ in parts])
     scale = np.linalg.norm(fit.J, axis=0)
@@ -55,12 +55,12 @@ def empirical(fitter: Fitter, fit: Fit, left: list[Along], i: int) -> Empirical 
     unit = left[0].units[i]
     terms = {name: float(difference(value, unit)) for name, value in zip(names, a, strict=True) if value}
     drives = tuple(float(u) for u in size.drives)
-    return Empirical(
+    return EmpiricalTerm(
         "empirical", left[0].axes[i], terms, unit, size.travel, size.speed, drives, float(1 - after / before)
     )
 
 
-def _slopes(fitter: Fitter, a: Along, i: int, size: Sizes) -> tuple[np.ndarray, list[str]]:
+def _slopes(fitter: Fitter, a: LtvModel, i: int, size: Scales) -> tuple[np.ndarray, list[str]]:
     """Whitened readings per unit [SI] of each feature, (n * n_y, features)."""
     given = features(a, i, size)
     y = a.readings(np.column_stack(list(given.values())), np.full(len(given), i))
@@ -91,7 +91,7 @@ def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n:
     return a / size
 
 
-def _held(fitter: Fitter, fit: Fit, held: Along, term: np.ndarray, delta: np.ndarray) -> tuple[float, float]:
+def _held(fitter: Fitter, fit: Fit, held: LtvModel, term: np.ndarray, delta: np.ndarray) -> tuple[float, float]:
     """Excess squares of one held-out record without the term and with it, the start fitted anew."""
     simulator = fit.structure.simulators(fitter.recording, fitter.cache)[held.record.sample_time, held.record.linear]
     slopes = simulator.sensitivities(held.record, fit.theta)[1]

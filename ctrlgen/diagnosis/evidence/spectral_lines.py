@@ -19,7 +19,7 @@ from ctrlgen.recordings.recording import Record
 
 
 @dataclass(frozen=True)
-class Lines:
+class SpectralLines:
     """Root mean square per kind of line, in `unit`: at excited lines, at odd and even ones that are not excited, and
     of the noise in as many lines; None where there is no such line."""
 
@@ -33,10 +33,10 @@ class Lines:
     noise: float
     p_odd: float | None
     p_even: float | None
-    said: str
+    statement: str
 
 
-def lines(record: Record, i: int, channel: str, unit: str) -> Lines | None:
+def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralLines | None:
     """The lines of reading `i`; None where the drive does not repeat three times or readings are missing."""
     P = drive_period(record.drive)
     if P is None or len(record.time) < 3 * P:
@@ -64,9 +64,9 @@ def lines(record: Record, i: int, channel: str, unit: str) -> Lines | None:
         levels[kind] = None if not chosen.any() else _rms(np.abs(mean[chosen]) ** 2, unit)
         p[kind] = None if not chosen.any() else _p(mean[chosen], noise[chosen], m)
     both = bool(np.any(excited & kinds["odd"]) and np.any(excited & kinds["even"]))
-    return Lines(
+    return SpectralLines(
         record.name, channel, unit, m, _rms(np.abs(mean[excited]) ** 2, unit), levels["odd"], levels["even"],
-        _rms(noise[near], unit), p["odd"], p["even"], _said(p, both),
+        _rms(noise[near], unit), p["odd"], p["even"], _statement(p, both),
     )  # fmt: skip
 
 
@@ -81,7 +81,7 @@ def _p(mean: np.ndarray, noise: np.ndarray, m: int) -> float:
     return float(stats.f.sf(f, 2 * len(mean), 2 * len(mean) * (m - 1)))
 
 
-def _said(p: dict[str, float | None], both: bool) -> str:
+def _statement(p: dict[str, float | None], both: bool) -> str:
     odd, even = (
         (p[kind] or 0.0) < SPECTRAL_LINES.answer_p if p[kind] is not None else False for kind in ("odd", "even")
     )

@@ -7,13 +7,13 @@ from typing import Any
 
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.evidence.detectability import detectable
+from ctrlgen.diagnosis.evidence.detectability import detectability
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment, next_experiment
 from ctrlgen.diagnosis.evidence.experiment_files import files
-from ctrlgen.diagnosis.evidence.ltv_linearisation import along
-from ctrlgen.diagnosis.evidence.residual_localisation import where
-from ctrlgen.diagnosis.evidence.unmodelled_dynamics import unknown
-from ctrlgen.diagnosis.selection.candidate_model import Round, Search, Trial
+from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
+from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
+from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
 
 NEXT_DEVICE = "../device.next.toml"  # from the folder of the next experiment
 
@@ -23,46 +23,46 @@ class Evidence:
     """`where`, `detectable`, `next_experiment`, `history` and `extra` (unknown, files of the next experiment)
     as plain numbers and words, in the reader's units."""
 
-    where: dict[str, Any]
-    detectable: dict[str, Any]
+    residual_location: dict[str, Any]
+    detectability: dict[str, Any]
     next_experiment: dict[str, Any] | None
-    history: tuple[dict[str, Any], ...]
+    search_history: tuple[dict[str, Any], ...]
     extra: dict[str, Any]
 
 
-def evidence(fitter: Fitter, search: Search, explained: bool, seed: int = 0) -> Evidence:
+def evidence(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 0) -> Evidence:
     """Everything beside the findings. `explained`: the chosen structure leaves nothing over."""
     recording = fitter.recording
     nominal, chosen = search.nominal.fit, search.chosen.fit
     records = [*fitter.fit_records, *fitter.held_out_records]
 
     def place(fit: Fit, lefts: list) -> dict[str, Any]:
-        return plain(where(lefts, recording.channels, recording.units, seed))
+        return plain(localise_residual(lefts, recording.channels, recording.units, seed))
 
-    before = [along(fitter, nominal, record) for record in records]
-    after = before if chosen is nominal else [along(fitter, chosen, record) for record in records]
-    extra: dict[str, Any] = {"unknown": None, "files": {}}
+    before = [linearise_along(fitter, nominal, record) for record in records]
+    after = before if chosen is nominal else [linearise_along(fitter, chosen, record) for record in records]
+    extra: dict[str, Any] = {"unmodelled_force": None, "files": {}}
     if not explained:
-        found = vars(unknown(fitter, chosen, after))
-        extra["unknown"] = plain(
-            {key: value for key, value in found.items() if key != "free"}
+        found = vars(describe_unmodelled_force(fitter, chosen, after))
+        extra["unmodelled_force"] = plain(
+            {key: value for key, value in found.items() if key != "estimates"}
         )  # that is sample by sample
     left = place(chosen, after)
-    if extra["unknown"]:
-        left["unknown"] = {key: extra["unknown"][key] for key in ("said", "empirical")}
+    if extra["unmodelled_force"]:
+        left["unmodelled_force"] = {key: extra["unmodelled_force"][key] for key in ("statements", "empirical_term")}
     experiment = next_experiment(fitter, search, explained, seed)
     if experiment is not None:
         extra["files"] = files(fitter, chosen, experiment, NEXT_DEVICE)
     return Evidence(
-        where={"nominal": place(nominal, before), "left": left},
-        detectable=plain(detectable(chosen, search.last, chosen.n)),
+        residual_location={"before": place(nominal, before), "after": left},
+        detectability=plain(detectability(chosen, search.final_screen, chosen.n)),
         next_experiment=_next(experiment),
-        history=history(search),
+        search_history=search_history(search),
         extra=extra,
     )
 
 
-def history(search: Search) -> tuple[dict[str, Any], ...]:
+def search_history(search: SearchResult) -> tuple[dict[str, Any], ...]:
     """The rounds in order: what was tried, with T before and after and the z of the screen, and what was decided."""
     rows = []
     following = [*(r.before for r in search.rounds[1:]), search.chosen]
@@ -73,28 +73,35 @@ def history(search: Search) -> tuple[dict[str, Any], ...]:
                 "round": number,
                 "threshold": float(round_.screened.threshold),
                 "suspects": len(round_.screened.suspects),
-                "total_before": float(round_.before.total),
-                "tried": [_tried(t, round_, then) for t in round_.trials],
-                "kept": [[c.effect, c.location] for c in then.fit.structure.causes],
-                "decision": _decision(round_.before, then, bool(round_.trials)),
+                "criterion_before": float(round_.before.criterion),
+                "candidates": [_tried(t, round_, then) for t in round_.candidates],
+                "causes_after": [[c.effect, c.location] for c in then.fit.structure.causes],
+                "decision": _decision(round_.before, then, bool(round_.candidates)),
             }
         )
     return tuple(rows)
 
 
-def _tried(trial: Trial, round_: Round, then: Trial) -> dict[str, Any]:
+def _tried(trial: CandidateModel, round_: Round, then: CandidateModel) -> dict[str, Any]:
     """The causes that one trial added, alone or together."""
     earlier = round_.before.fit.structure.causes
     z = {s.hypothesis: s.z for s in round_.screened.suspects}
     causes = [
-        {"effect": c.effect, "location": c.location, "z": z.get(c), "kept": c in then.fit.structure.causes}
+        {"effect": c.effect, "location": c.location, "z": z.get(c), "accepted": c in then.fit.structure.causes}
         for c in trial.fit.structure.causes
         if c not in earlier
     ]
-    return plain({"causes": causes, "total": trial.total, "objective": trial.fit.objective, "held_out": trial.held})
+    return plain(
+        {
+            "causes": causes,
+            "criterion": trial.criterion,
+            "objective": trial.fit.objective,
+            "held_out_deviance": trial.held_out_deviance,
+        }
+    )
 
 
-def _decision(before: Trial, then: Trial, tried: bool) -> str:
+def _decision(before: CandidateModel, then: CandidateModel, tried: bool) -> str:
     if not tried:
         return "nothing stands out: stopped"
     added = [c for c in then.fit.structure.causes if c not in before.fit.structure.causes]
@@ -111,7 +118,7 @@ def _next(found: Experiment | None) -> dict[str, Any] | None:
     best = found.candidates[0]
     return plain(
         {
-            "separates": list(found.rivals), "why": found.reason, "drive": best.said, "kind": best.kind,
+            "discriminates_between": list(found.rivals), "reason": found.reason, "description": best.description, "kind": best.kind,
             "strength": best.strength, "samples": len(found.record.drive), "sample_time": found.record.sample_time,
             "separation_now": found.before, "separation_after": found.after, "settles": found.settles,
             "candidates": list(found.candidates),

@@ -12,21 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
+from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.settings import UNKNOWN_INPUT
 
 
 @dataclass(frozen=True, eq=False)
-class Free:
+class UnknownInput:
     """Along one record: `f` (n, n_axes) [SI] with its standard deviation `sd`, and the `speed` chosen."""
 
-    along: Along
+    model: LtvModel
     f: np.ndarray
     sd: np.ndarray
     speed: float
 
 
-def free(left: Along, noise: Noise, size: np.ndarray) -> Free:
+def estimate_unknown_input(left: LtvModel, noise: Noise, size: np.ndarray) -> UnknownInput:
     """The most likely disturbance of typical `size` (n_axes,) [SI] along one record."""
     problem = _Problem(left, noise, size)
     speeds = UNKNOWN_INPUT.pose_random_walks if left.settled else UNKNOWN_INPUT.random_walks
@@ -38,13 +38,13 @@ def free(left: Along, noise: Noise, size: np.ndarray) -> Free:
     likely = problem.likelihood(np.array(speeds), start, min(start + UNKNOWN_INPUT.tried_samples, problem.n))
     speed = speeds[int(np.argmax(likely))]
     f, sd = problem.smoothed(speed)
-    return Free(left, f, sd, float(speed))
+    return UnknownInput(left, f, sd, float(speed))
 
 
 class _Problem:
     """The augmented linear system of one record, in numbers of order one."""
 
-    def __init__(self, left: Along, noise: Noise, size: np.ndarray) -> None:
+    def __init__(self, left: LtvModel, noise: Noise, size: np.ndarray) -> None:
         self.n = min(len(left.white), UNKNOWN_INPUT.most_samples)
         self.m, self.k = left.F_S.shape[1], left.F_f.shape[2]
         self.left, self.size = left, size

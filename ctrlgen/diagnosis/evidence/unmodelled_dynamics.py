@@ -12,90 +12,92 @@ import numpy as np
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.evidence.ltv_linearisation import Along
-from ctrlgen.diagnosis.evidence.residual_localisation import projected
-from ctrlgen.diagnosis.evidence.sparse_regression import Empirical, empirical
-from ctrlgen.diagnosis.evidence.unknown_input import Free, free
+from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
+from ctrlgen.diagnosis.evidence.residual_localisation import equivalent_inputs
+from ctrlgen.diagnosis.evidence.sparse_regression import EmpiricalTerm, fit_empirical_term
+from ctrlgen.diagnosis.evidence.unknown_input import UnknownInput, estimate_unknown_input
 from ctrlgen.diagnosis.settings import MAPS, STATISTICS
 
 
 @dataclass(frozen=True)
-class Map:
-    """The mean disturbance in bins of one coordinate, with 95 % intervals; `share` of its variance that goes with it."""
+class DependenceMap:
+    """The mean disturbance in bins of one coordinate, with 95 % intervals; `variance_share` of its variance that goes with it."""
 
-    of: str
+    coordinate: str
     unit: str
-    at: tuple[float, ...]
+    centres: tuple[float, ...]
     mean: tuple[float, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
     value_unit: str
-    share: float
+    variance_share: float
 
 
 @dataclass(frozen=True, eq=False)
-class Unknown:
+class UnmodelledForce:
     """The free disturbance of each axis (`quantity`, `unit`), root mean square, its maps, and the empirical term."""
 
     quantity: str
     rms: dict[str, float]
     unit: str
-    maps: dict[str, tuple[Map, ...]]
-    empirical: Empirical | None
-    said: tuple[str, ...]
-    free: tuple[Free, ...]
+    maps: dict[str, tuple[DependenceMap, ...]]
+    empirical_term: EmpiricalTerm | None
+    statements: tuple[str, ...]
+    estimates: tuple[UnknownInput, ...]
 
 
-def unknown(fitter: Fitter, fit: Fit, left: list[Along]) -> Unknown:
+def describe_unmodelled_force(fitter: Fitter, fit: Fit, left: list[LtvModel]) -> UnmodelledForce:
     """What would explain the rest of `fit`; `left` its linearisations, the records to fit first."""
     to_fit = [a for a in left if a.record.role == "fit"]
-    size = np.sqrt(np.mean(np.concatenate([projected(a)[0] for a in to_fit]) ** 2, axis=0))
-    found = [free(a, fitter.noise, np.maximum(size, 1e-12 * size.max(initial=1e-300))) for a in to_fit]
+    size = np.sqrt(np.mean(np.concatenate([equivalent_inputs(a)[0] for a in to_fit]) ** 2, axis=0))
+    found = [
+        estimate_unknown_input(a, fitter.noise, np.maximum(size, 1e-12 * size.max(initial=1e-300))) for a in to_fit
+    ]
     axes, units = left[0].axes, left[0].units
     rms = {axis: float(difference(_rms(found, i), units[i])) for i, axis in enumerate(axes)}
     maps = {axis: _maps(found, i) for i, axis in enumerate(axes)}
     loudest = sorted(range(len(axes)), key=lambda i: -_rms(found, i) / max(_sd(found, i), 1e-300))[: MAPS.most_axes]
-    terms = [e for i in loudest if (e := empirical(fitter, fit, left, i)) is not None]
+    terms = [e for i in loudest if (e := fit_empirical_term(fitter, fit, left, i)) is not None]
     best = max(terms, key=lambda e: e.held_out_gain, default=None)
-    said = [_said(axis, maps[axis]) for axis in (axes[i] for i in loudest)]
+    said = [_statement(axis, maps[axis]) for axis in (axes[i] for i in loudest)]
     if best is None:
         said.append("no empirical term of position, speed, history and drive helps on the held-out records")
-    return Unknown(left[0].place.value, rms, units[0], maps, best, tuple(s for s in said if s), tuple(found))
+    return UnmodelledForce(left[0].place.value, rms, units[0], maps, best, tuple(s for s in said if s), tuple(found))
 
 
-def _rms(found: list[Free], i: int) -> float:
+def _rms(found: list[UnknownInput], i: int) -> float:
     return float(np.sqrt(np.mean(np.concatenate([e.f[:, i] for e in found]) ** 2)))
 
 
-def _sd(found: list[Free], i: int) -> float:
+def _sd(found: list[UnknownInput], i: int) -> float:
     return float(np.mean(np.concatenate([e.sd[:, i] for e in found])))
 
 
-def _maps(found: list[Free], i: int) -> tuple[Map, ...]:
+def _maps(found: list[UnknownInput], i: int) -> tuple[DependenceMap, ...]:
     """Maps of the disturbance of axis `i`."""
     f, sd = np.concatenate([e.f[:, i] for e in found]), np.concatenate([e.sd[:, i] for e in found])
 
     def joined(name: str) -> np.ndarray:
-        return np.concatenate([getattr(e.along, name)[: len(e.f), i] for e in found])
+        return np.concatenate([getattr(e.model, name)[: len(e.f), i] for e in found])
 
-    unit, travel, settled = found[0].along.units[i], found[0].along.travel_unit, found[0].along.settled
+    unit, travel, settled = found[0].model.units[i], found[0].model.travel_unit, found[0].model.settled
     d, everywhere = joined("displacement"), np.ones(len(f), bool)
     rows = [("position", travel, d, everywhere)]
     if not settled:
-        direction = np.concatenate([e.along.direction()[: len(e.f), i] for e in found])
+        direction = np.concatenate([e.model.direction()[: len(e.f), i] for e in found])
         rows += [
             ("position, forward", travel, d, direction > 0), ("position, backward", travel, d, direction < 0),
             ("velocity", f"{travel}/s", joined("velocity"), everywhere),
-            ("time", "s", np.concatenate([e.along.record.time[: len(e.f)] for e in found]), everywhere),
+            ("time", "s", np.concatenate([e.model.record.time[: len(e.f)] for e in found]), everywhere),
         ]  # fmt: skip
-    ambient = [a[: len(e.f)] for e in found if (a := e.along.record.ambient) is not None]
+    ambient = [a[: len(e.f)] for e in found if (a := e.model.record.ambient) is not None]
     if len(ambient) == len(found):
         T = np.concatenate(ambient)
         rows += [("temperature", "K", T, everywhere)] if np.ptp(T) > 0 else []
     return tuple(_map(name, u, x[mask], f[mask], sd[mask], unit) for name, u, x, mask in rows if mask.sum() > MAPS.bins)
 
 
-def _map(name: str, unit: str, x: np.ndarray, f: np.ndarray, sd: np.ndarray, value_unit: str) -> Map:
+def _map(name: str, unit: str, x: np.ndarray, f: np.ndarray, sd: np.ndarray, value_unit: str) -> DependenceMap:
     edges = np.linspace(x.min(), x.max(), MAPS.bins + 1)
     which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, MAPS.bins - 1)
     at: list[float] = []
@@ -114,16 +116,16 @@ def _map(name: str, unit: str, x: np.ndarray, f: np.ndarray, sd: np.ndarray, val
             values.append(float(difference(value, value_unit)))
     total = float(np.sum((f - f.mean()) ** 2))
     share = 1 - within / total if total else 0.0
-    return Map(name, unit, tuple(at), tuple(mean), tuple(low), tuple(high), value_unit, share)
+    return DependenceMap(name, unit, tuple(at), tuple(mean), tuple(low), tuple(high), value_unit, share)
 
 
-def _said(axis: str, maps: tuple[Map, ...]) -> str:
-    single = [m for m in maps if "," not in m.of]
+def _statement(axis: str, maps: tuple[DependenceMap, ...]) -> str:
+    single = [m for m in maps if "," not in m.coordinate]
     if not single:
         return ""
-    best = max(single, key=lambda m: m.share)
-    text = f"{axis}: {best.share:.0%} of the free disturbance goes with {best.of}"
-    sides = {m.of: m for m in maps if "," in m.of}
+    best = max(single, key=lambda m: m.variance_share)
+    text = f"{axis}: {best.variance_share:.0%} of the free disturbance goes with {best.coordinate}"
+    sides = {m.coordinate: m for m in maps if "," in m.coordinate}
     if len(sides) == 2:
         forward, backward = sides["position, forward"], sides["position, backward"]
         middle = min(len(forward.mean), len(backward.mean)) // 2

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from ctrlgen.core.to_json import plain
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, Finding
+from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
 
 
 def as_dict(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -14,11 +14,11 @@ def as_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     return plain({
         "verdict": diagnosis.verdict,
         "findings": [_finding(found) for found in diagnosis.findings],
-        "where": diagnosis.where,
+        "residual_location": diagnosis.residual_location,
         "held_out": {channel: dataclasses.asdict(error) for channel, error in diagnosis.held_out.items()},
-        "detectable": diagnosis.detectable,
+        "detectability": diagnosis.detectability,
         "next_experiment": diagnosis.next_experiment,
-        "history": diagnosis.history,
+        "search_history": diagnosis.search_history,
     })  # fmt: skip
 
 

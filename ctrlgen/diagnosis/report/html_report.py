@@ -23,7 +23,7 @@ from ctrlgen.diagnosis.report.narrative import (
     unknown_lines,
 )
 from ctrlgen.diagnosis.report.plots import draw_all
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis, Finding
+from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
 from ctrlgen.reporting.html import render
 
 CAPTIONS = {

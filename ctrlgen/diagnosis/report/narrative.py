@@ -7,19 +7,16 @@ import re
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.selection.diagnosis import (
+from ctrlgen.diagnosis.selection.result import ChannelError, Diagnosis, Estimate, Finding
+from ctrlgen.diagnosis.selection.verdict import (
     AMBIGUOUS,
     CONSISTENT,
     EXPLAINED,
     PARTLY,
     UNEXPLAINED,
-    ChannelError,
-    Diagnosis,
-    Estimate,
-    Finding,
-    excluded,
-    loose,
-    tolerated,
+    contradicts_datasheet,
+    model_error_allowance,
+    poorly_determined,
 )
 from ctrlgen.effects import Effect
 
@@ -147,7 +144,7 @@ def sentence(diagnosis: Diagnosis) -> str:
             f"{head}: nothing that this recording can show is missing from the device file ({diagnosis.device.title})"
         )
         said += f"{_blind(diagnosis)}."
-    elif (far := excluded(diagnosis.search.chosen.fit)) and diagnosis.residual_tests.passed:
+    elif (far := contradicts_datasheet(diagnosis.search.chosen.fit)) and diagnosis.residual_tests.passed:
         said = f"{head}: {_beyond(diagnosis, far)}{f'; what helps is {named(found)}' if found else ''}."
     elif not found:
         said = f"{head}: the recording differs from {diagnosis.device.title}, and no cause I know explains it."
@@ -199,7 +196,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     known = all(e.noise_floor is not None for e in diagnosis.held_out.values())
     rest = "" if known else " Record a rest (drive off) or repeat poses, so that the noise is known."
     if verdict == CONSISTENT:
-        unseen = " Effects smaller than those listed below would not have been seen." if diagnosis.detectable else ""
+        unseen = " Effects smaller than those listed below would not have been seen." if diagnosis.detectability else ""
         return [f"Nothing to correct.{unseen}{rest}"]
     if verdict == EXPLAINED:
         return [use]
@@ -214,9 +211,9 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     if verdict == PARTLY:
         left = f"Whether something remains cannot be said.{rest}"
         if known:
-            most = number(100 * tolerated(diagnosis.search))
+            most = number(100 * model_error_allowance(diagnosis.search))
             left = f"A little remains above the noise, less than {most} % of what was wrong: see where below."
-        if loose(diagnosis.fitter, diagnosis.search):
+        if poorly_determined(diagnosis.fitter, diagnosis.search):
             return [
                 "The cause is there, but its numbers are known too loosely to foresee the held-out records: fit those too, or "
                 "record more of where it acts. Until then device.next.toml foresees worse than the device file.",
@@ -233,11 +230,11 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
 
 def unknown_lines(diagnosis: Diagnosis) -> list[str]:
     """What the free disturbance goes with, and the empirical term: a description of the rest, never a cause."""
-    found = diagnosis.extra.get("unknown")
+    found = diagnosis.extra.get("unmodelled_force")
     if not found:
         return []
-    term = found["empirical"]
-    lines = list(found["said"])
+    term = found["empirical_term"]
+    lines = list(found["statements"])
     if term:
         formula = " ".join(f"{value:+.3g} {name}" for name, value in term["terms"].items()).removeprefix("+")
         lines.append(

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.report.narrative import number
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6
@@ -23,7 +23,7 @@ SHARE = 0.01  # of its variance: maps that show less are left out
 def draw_where(diagnosis: Diagnosis) -> Figure | None:
     """Excess of squares of the device as described over the noise's by output, actuator, band, region, time, direction;
     None where nothing is known."""
-    found = plain(diagnosis.where).get("nominal", {}).items()
+    found = plain(diagnosis.residual_location).get("before", {}).items()
     groups = {name: rows for name, value in found if (rows := excesses(value))}
     if not groups:
         return None
@@ -75,9 +75,11 @@ def excesses(value: Any, prefix: str = "") -> list[tuple[str, float, list[float]
 
 def draw_unknown(diagnosis: Diagnosis) -> Figure | None:
     """The disturbance that would explain the rest against position, speed, time and temperature; None where none was sought."""
-    found = plain(diagnosis.extra.get("unknown")) or {}
+    found = plain(diagnosis.extra.get("unmodelled_force")) or {}
     maps = [(axis, m) for axis, several in (found.get("maps") or {}).items() for m in several]
-    maps = sorted((row for row in maps if row[1]["share"] >= SHARE), key=lambda row: -row[1]["share"])[:PANELS]
+    maps = sorted(
+        (row for row in maps if row[1]["variance_share"] >= SHARE), key=lambda row: -row[1]["variance_share"]
+    )[:PANELS]
     if not maps:
         return None
     rows = -(-len(maps) // 2)
@@ -90,10 +92,10 @@ def draw_unknown(diagnosis: Diagnosis) -> Figure | None:
 
 
 def _map(panel: Axes, title: str, m: dict[str, Any]) -> None:
-    at, mean, low, high = (np.array(m[key], float) for key in ("at", "mean", "low", "high"))
+    at, mean, low, high = (np.array(m[key], float) for key in ("centres", "mean", "low", "high"))
     panel.fill_between(at, low, high, color=COLOURS[0], alpha=0.25, lw=0)
     panel.plot(at, mean, "o-", ms=3, lw=1, color=COLOURS[0])
-    panel.set_xlabel(f"{m['of']} [{m['unit']}]")
+    panel.set_xlabel(f"{m['coordinate']} [{m['unit']}]")
     panel.set_ylabel(f"[{m['value_unit']}]")
     panel.locator_params("x", nbins=5)
-    panel.set_title(f"{title}, {100 * m['share']:.0f} % goes with it", fontsize=8.5)
+    panel.set_title(f"{title}, {100 * m['variance_share']:.0f} % goes with it", fontsize=8.5)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.report.narrative import hypothesis_name, number
 from ctrlgen.diagnosis.selection.candidate_model import Round
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.diagnosis.settings import SEARCH, STATISTICS
 from ctrlgen.reporting.plots import COLOURS
 
@@ -27,33 +27,33 @@ FOUND, ALIKE, WORSE = COLOURS[0], COLOURS[2], "#b0b0b0"
 
 def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
     """Round by round: by how much each suspect explains worse than the best one of its round."""
-    rounds = [r for r in diagnosis.search.rounds if r.trials]
+    rounds = [r for r in diagnosis.search.rounds if r.candidates]
     if not rounds:
         return None
-    heights = [0.55 + 0.3 * len(r.trials) for r in rounds]
+    heights = [0.55 + 0.3 * len(r.candidates) for r in rounds]
     figure, axes = plt.subplots(
         len(rounds), 1, figsize=(FIGURE_WIDTH, 0.6 + sum(heights)), height_ratios=heights, sharex=True, squeeze=False
     )
     kept = set(diagnosis.search.chosen.fit.structure.causes)
     for k, (panel, round_) in enumerate(zip(axes[:, 0], rounds, strict=True)):
         _rival_bars(panel, round_, kept)
-        gained = round_.before.total - round_.trials[0].total
+        gained = round_.before.criterion - round_.candidates[0].criterion
         panel.set_title(f"round {k + 1}: the best one gains {number(gained, 3)}", fontsize=9, loc="left")
     axes[-1, 0].set_xlabel("worse than the best of the round, difference of T (dotted: nearer than that is alike)")
     return figure
 
 
 def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
-    best = round_.trials[0].total
-    far = max(10 * SEARCH.rival_difference, *(t.total - best for t in round_.trials))
-    for row, trial in enumerate(round_.trials):
-        worse = trial.total - best
-        colour = FOUND if trial.cause in kept else ALIKE if worse < SEARCH.rival_difference else WORSE
+    best = round_.candidates[0].criterion
+    far = max(10 * SEARCH.rival_difference, *(t.criterion - best for t in round_.candidates))
+    for row, candidate in enumerate(round_.candidates):
+        worse = candidate.criterion - best
+        colour = FOUND if candidate.cause in kept else ALIKE if worse < SEARCH.rival_difference else WORSE
         panel.barh(row, worse, color=colour, height=0.6)
         panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)
         _beside(panel, worse, row, number(worse, 3) if row else "best")
     panel.set_yticks(
-        range(len(round_.trials)), [hypothesis_name(t.cause) for t in round_.trials if t.cause], fontsize=8
+        range(len(round_.candidates)), [hypothesis_name(t.cause) for t in round_.candidates if t.cause], fontsize=8
     )
     panel.invert_yaxis()
     panel.set_xscale("symlog", linthresh=SEARCH.rival_difference)
@@ -70,11 +70,11 @@ def _beside(panel: Axes, x: float, y: float, text: str) -> None:
 def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
     """|cos| between what the most conspicuous suspects of the first round do to the readings."""
     search = diagnosis.search
-    screened = search.rounds[0].screened if search.rounds else search.last
+    screened = search.rounds[0].screened if search.rounds else search.final_screen
     top = screened.suspects[:SUSPECTS]
     if len(top) < 2:
         return None
-    values = np.array([[screened.alike(a, b) for b in top] for a in top])
+    values = np.array([[screened.confusability(a, b) for b in top] for a in top])
     labels = [textwrap.fill(hypothesis_name(s.hypothesis), LABEL, break_long_words=False) for s in top]
     figure, panel = plt.subplots(figsize=(FIGURE_WIDTH, 1.9 + 0.42 * len(top)))
     panel.imshow(values, cmap="Blues", vmin=0, vmax=1, aspect="auto")

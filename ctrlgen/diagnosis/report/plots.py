@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.report.plot_uncertainty import (
     draw_profiles,
     draw_rivals,
 )
-from ctrlgen.diagnosis.selection.diagnosis import Diagnosis
+from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 

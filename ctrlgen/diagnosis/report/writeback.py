@@ -23,7 +23,8 @@ from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.structure import FreeParameter
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
 from ctrlgen.diagnosis.report.narrative import HARD_SPACE, channel_sentence, hard, sentence
-from ctrlgen.diagnosis.selection.diagnosis import UNEXPLAINED, Diagnosis
+from ctrlgen.diagnosis.selection.result import Diagnosis
+from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
 
 DIGITS = 12  # nine would leave 5e-9 of a number, more than the prediction may differ by
 SD_DIGITS = 3

@@ -27,7 +27,7 @@ REACHED = ("channel", "travel", "travel/s")
 
 
 @dataclass(frozen=True)
-class Column:
+class CandidateTerm:
     """One hypothesis with one choice of shape. `probes` where it enters, `terms` which term enters at each; `size` [SI]
     of the amplitude's unit, `one_sided` the only sign it may have (0: both)."""
 
@@ -40,7 +40,7 @@ class Column:
     range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
 
 
-def peaks(fitter: Fitter, fit: Fit) -> Peaks:
+def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
     """How far the signals at every place go in the records to fit."""
     found: Peaks = {}
     physics = nominal_physics(fit.structure.device)
@@ -81,7 +81,7 @@ class _Term:
     clocks: list[bool]
 
 
-class Laws:
+class CandidateTerms:
     """The terms of `hypotheses` on the motions of `response`, and one column for every choice of shape."""
 
     def __init__(
@@ -99,7 +99,7 @@ class Laws:
         structure: Structure,
         probes: dict[tuple[Place, int], int],
         seen: Callable[[Place, int], DataHints],
-    ) -> Iterator[Column]:
+    ) -> Iterator[CandidateTerm]:
         law, where = h.law, structure.channel_of(h)
         names = [c.name for c in channels(nominal_physics(structure.device), law.place)]
         partner = names.index(h.of) if h.of else None
@@ -119,7 +119,7 @@ class Laws:
         for shape in h.shapes(where, here):
             for finite in (0.0, *h.secants(where, here)):
                 terms = tuple(self._term(law(h.at, {}, h.of), i, other, shape, off, size, finite) for i, other in at)
-                yield Column(h, shape, entered, terms, size, side, span)
+                yield CandidateTerm(h, shape, entered, terms, size, side, span)
 
     def _term(
         self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float, finite: float

@@ -13,8 +13,8 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
-from ctrlgen.diagnosis.selection.diagnosis import Finding
-from ctrlgen.diagnosis.selection.direct_detection import named
+from ctrlgen.diagnosis.selection.direct_detection import unfitted_finding
+from ctrlgen.diagnosis.selection.result import Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.model.effect_terms import channels
@@ -22,7 +22,7 @@ from ctrlgen.recordings.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
-class Alive:
+class LiveChannels:
     """A recording without the channels that say nothing, what was found of these, and a sentence on each."""
 
     recording: Recording
@@ -30,13 +30,13 @@ class Alive:
     said: tuple[str, ...] = ()
 
 
-def alive(device: Device, recording: Recording) -> Alive:
+def without_dead_channels(device: Device, recording: Recording) -> LiveChannels:
     """The channels that read more than one number. Raises InputError where there is none."""
     moving = [r for r in recording.records if r.role != "rest"]
     values = [np.concatenate([r.observed[r.valid[:, i], i] for r in moving]) for i in range(len(recording.channels))]
     dead = {i: float(y[0]) for i, y in enumerate(values) if len(y) and np.ptp(y) == 0}
     if not dead:
-        return Alive(recording)
+        return LiveChannels(recording)
     if len(dead) == len(recording.channels):
         faults = [
             Fault(
@@ -59,8 +59,8 @@ def alive(device: Device, recording: Recording) -> Alive:
         said.append(f"{name}: reads {show(level, unit)} throughout, {moves}; it is left out of every fit.")
         channel = places.get(name)
         if channel is not None and way > DIRECT_DETECTION.dead_motion * channel.scale:
-            findings += [named(law, channel, read) for law, read in _laws(channel, values[i])]
-    return Alive(
+            findings += [unfitted_finding(law, channel, read) for law, read in _laws(channel, values[i])]
+    return LiveChannels(
         _only(recording, [i for i in range(len(recording.channels)) if i not in dead]), tuple(findings), tuple(said)
     )
 

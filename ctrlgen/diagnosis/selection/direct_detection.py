@@ -11,14 +11,14 @@ from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_physics
-from ctrlgen.diagnosis.selection.candidate_model import Search
-from ctrlgen.diagnosis.selection.diagnosis import Estimate, Finding
+from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.result import Estimate, Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.model.effect_terms import channels
 
 
-def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
+def directly_detected_findings(fitter: Fitter, search: SearchResult) -> tuple[Finding, ...]:
     """Findings of every sensor's law that reads itself off the recorded values, where the device and the search have none."""
     recording, structure = fitter.recording, search.chosen.fit.structure
     if recording.kind != "series":
@@ -39,11 +39,11 @@ def read_off(fitter: Fitter, search: Search) -> tuple[Finding, ...]:
                 or {(law.kind, channel.name), (law.kind, "all")} & known
             ):
                 continue
-            found.append(named(law, channel, seen[0]))
+            found.append(unfitted_finding(law, channel, seen[0]))
     return tuple(found)
 
 
-def named(law: type[Effect], channel: Channel, values: dict[str, float]) -> Finding:
+def unfitted_finding(law: type[Effect], channel: Channel, values: dict[str, float]) -> Finding:
     """A sensor's law with parameters [SI] that were not fitted."""
     parameters = {}
     for p in law.params:

@@ -16,7 +16,7 @@ from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
 
 
-def resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()) -> bool:
+def lines_resolved(recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = ()) -> bool:
     """Whether every two causes of one kind at one place part, and none repeats with the rounding of its reading; those
     `accepted` are not compared with one another."""
     causes = fit.structure.causes

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from ctrlgen.diagnosis.selection.candidate_terms import Column
+from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm
 
 Run = tuple[slice, slice]
 
@@ -19,7 +19,7 @@ Run = tuple[slice, slice]
 class _Group:
     """States that act on one another, with the columns that move them: `D` (states, columns) before the next sample."""
 
-    def __init__(self, states: np.ndarray, F_p: np.ndarray, columns: Sequence[Column]) -> None:
+    def __init__(self, states: np.ndarray, F_p: np.ndarray, columns: Sequence[CandidateTerm]) -> None:
         self.states = states
         moved = [any(F_p[states, probe].any() for probe in c.probes) for c in columns]
         self.columns = np.flatnonzero(moved)
@@ -45,13 +45,13 @@ class _Group:
         return X[:-1]
 
 
-class Spread:
+class LtvPropagation:
     """The columns' slopes of the readings, block by block of samples.
 
     `patterns`: which entries of F_S, F_p, H_S and H_p can differ from zero. `seen[i]`: the columns that channel i reads.
     """
 
-    def __init__(self, patterns: Sequence[np.ndarray], columns: Sequence[Column]) -> None:
+    def __init__(self, patterns: Sequence[np.ndarray], columns: Sequence[CandidateTerm]) -> None:
         F_S, F_p, H_S, H_p = patterns
         count, label = connected_components(F_S, directed=False)
         self.groups = [_Group(np.flatnonzero(label == g), F_p, columns) for g in range(count)]
@@ -95,7 +95,7 @@ class Spread:
             yield Y
 
 
-def _entries(columns: Sequence[Column], chosen: np.ndarray) -> dict[int, tuple[list[int], list[int]]]:
+def _entries(columns: Sequence[CandidateTerm], chosen: np.ndarray) -> dict[int, tuple[list[int], list[int]]]:
     """By probe: the places among the `chosen` columns of those that enter there, and the terms that do."""
     found: dict[int, tuple[list[int], list[int]]] = {}
     for place, j in enumerate(chosen):

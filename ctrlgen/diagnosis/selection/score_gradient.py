@@ -15,8 +15,8 @@ from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
-from ctrlgen.diagnosis.selection.candidate_terms import Column, Laws
-from ctrlgen.diagnosis.selection.ltv_propagation import Spread
+from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, CandidateTerms
+from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
 from ctrlgen.numerics.batched_evaluation import evaluate
@@ -42,7 +42,7 @@ class Sums:
         return Sums(self.US + other.US, self.Sr + other.Sr, self.SS + other.SS)
 
 
-class Slopes:
+class ScoreGradient:
     """The slopes of the readings by every hypothesis' amplitude on one record."""
 
     def __init__(
@@ -68,15 +68,15 @@ class Slopes:
         self.p[len(known) + len(number_paths) :] = 0.0
         entered = {where: free.index(path) for where, path in probes.items()}
         others = [h for h in hypotheses if h.effect != PARAMETER]
-        self.laws = Laws(self.simulator, fit.structure, others, entered, seen)
+        self.laws = CandidateTerms(self.simulator, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]
         self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
         self.columns = list(self.laws.columns)
         for k, (h, i) in enumerate(zip(numbers, places, strict=True)):
             term, size = len(self.laws.terms) + k, float(self.sizes[k])
-            self.columns.append(Column(h, {"value": self.p[i]}, (i,), (term,), size, 0, (-500.0, 500.0)))
+            self.columns.append(CandidateTerm(h, {"value": self.p[i]}, (i,), (term,), size, 0, (-500.0, 500.0)))
         self.linear = self.simulator.linearise(self.p, range(len(free)))
-        self.spread = Spread(self.linear.patterns, self.columns)
+        self.spread = LtvPropagation(self.linear.patterns, self.columns)
 
     def sums(self, white: np.ndarray, U: np.ndarray, start: np.ndarray | None) -> Sums:
         """This record's inner products with its whitened residual `white` (n, n_y) and free directions U (n, n_y, k)."""

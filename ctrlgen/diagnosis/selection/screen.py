@@ -18,10 +18,10 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
-from ctrlgen.diagnosis.selection.candidate_terms import Column, Peaks, peaks
-from ctrlgen.diagnosis.selection.score_gradient import Slopes, Sums
-from ctrlgen.diagnosis.selection.spatial_periods import both, jumps, pitches
-from ctrlgen.diagnosis.selection.subset_search import Suspect, Together
+from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks
+from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums
+from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
+from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.model.effect_terms import channels
@@ -33,19 +33,19 @@ class Screened:
     """Suspects, the most conspicuous first; `cosine` between their projected slopes; `threshold` the |z| that a record
     without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
     `together` sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide
-    each other; `hidden` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
+    each other; `undetectable` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
     whose own effect looks most like theirs, -1 where they do not reach the readings at all."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
     threshold: float
     amplitude_sd: dict[tuple[str, str], float]
-    together: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
-    hidden: dict[Hypothesis, int] = field(default_factory=dict)
+    subsets: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
+    undetectable: dict[Hypothesis, int] = field(default_factory=dict)
 
-    def alike(self, a: Suspect, b: Suspect) -> float:
+    def confusability(self, a: Suspect, b: Suspect) -> float:
         """|cos| between two suspects."""
-        return float(abs(self.cosine[a.column, b.column]))
+        return float(abs(self.cosine[a.index, b.index]))
 
 
 class Screen:
@@ -60,13 +60,13 @@ class Screen:
         beside = (h.beside(fit.structure.causes) for h in self.hypotheses)
         open_ = [h for h in beside if h is not None]
         sums: Sums | None = None
-        columns: list[Column] = []
+        columns: list[CandidateTerm] = []
         U, back = _directions(fit.J)
         first, seen = 0, self._seen(fit)
         for record, start in zip(
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
         ):
-            slopes = Slopes(self.fitter, fit, record, open_, seen)
+            slopes = ScoreGradient(self.fitter, fit, record, open_, seen)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)
@@ -77,17 +77,17 @@ class Screen:
         if not columns or sums is None:
             return Screened((), np.zeros((0, 0)), np.inf, {})
         size = np.linalg.norm(fit.J[:first], axis=0)
-        return self._judge(
+        return self._screened(
             columns, sums, U.T @ fit.residual, np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
         )
 
     def _seen(self, fit: Fit) -> Callable[[Place, int], DataHints]:
         """What the records show at each place, after what `fit` explains."""
         if self.peaks is None:
-            self.peaks = peaks(self.fitter, fit)
+            self.peaks = signal_peaks(self.fitter, fit)
         most, along = self.peaks, self._along_path(fit)
         moments, part = self._moments()
-        common = {"lines": self._lines(fit), "moments": moments}
+        common = {"lines": self._spectral_peaks(fit), "moments": moments}
 
         def at(place: Place, i: int) -> DataHints:
             return DataHints(most.get((place, i), {}) | {"s": part}, common | along.get((place, i), {}))
@@ -102,17 +102,19 @@ class Screen:
         part = (end - begin) / SCREEN.event_times
         return tuple(begin + (k + 0.5) * part for k in range(SCREEN.event_times)), part
 
-    def _lines(self, fit: Fit) -> tuple[float, ...]:
+    def _spectral_peaks(self, fit: Fit) -> tuple[float, ...]:
         """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
         records = self.fitter.fit_records
         if self.fitter.recording.kind == "poses" or not records:
             return ()
         k = int(np.argmax([r.valid.size for r in records]))
         begin = sum(r.valid.size for r in records[:k])
-        left = fit.residual[begin : begin + records[k].valid.size].reshape(records[k].valid.shape)
-        power = np.sum(periodogram(left, np.hanning(len(left)), SCREEN.spectrum_padding), axis=1)
+        residual = fit.residual[begin : begin + records[k].valid.size].reshape(records[k].valid.shape)
+        power = np.sum(periodogram(residual, np.hanning(len(residual)), SCREEN.spectrum_padding), axis=1)
         best = highest_peaks(power, SCREEN.most_lines, distance=4 * SCREEN.spectrum_padding)
-        return tuple(float(f) for f in np.sort(best) / (SCREEN.spectrum_padding * len(left) * records[k].sample_time))
+        return tuple(
+            float(f) for f in np.sort(best) / (SCREEN.spectrum_padding * len(residual) * records[k].sample_time)
+        )
 
     def _along_path(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
         """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does, and the
@@ -121,28 +123,30 @@ class Screen:
         if self.fitter.recording.kind == "poses" or not records:
             return {}
         record = max(records, key=lambda r: r.valid.size)
-        foreseen, behind = (self.fitter.predict(each, record) for each in (fit, _read_truly(fit)))
-        left = record.observed - foreseen
+        foreseen, behind = (self.fitter.predict(each, record) for each in (fit, _without_sensor_causes(fit)))
+        residual = record.observed - foreseen
         names = [c.name for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         return {
             (Place.SENSOR, names.index(name)): {
-                "spatial_periods": both(
-                    pitches(y[good, i], left[good, i]) for y in (record.observed, foreseen, behind)
+                "spatial_periods": merged_periods(
+                    spatial_periods(y[good, i], residual[good, i]) for y in (record.observed, foreseen, behind)
                 ),
-                "jump_positions": jumps(record.observed[good, i], left[good, i]),
+                "jump_positions": jump_positions(record.observed[good, i], residual[good, i]),
             }
             for i, name in read
-            if name in names and np.any(good := record.valid[:, i] & np.isfinite(left[:, i]))
+            if name in names and np.any(good := record.valid[:, i] & np.isfinite(residual[:, i]))
         }
 
-    def _judge(self, columns: list[Column], sums: Sums, gradient: np.ndarray, likeness: np.ndarray) -> Screened:
+    def _screened(
+        self, columns: list[CandidateTerm], sums: Sums, gradient: np.ndarray, likeness: np.ndarray
+    ) -> Screened:
         """`gradient` U'r (k,), zero at an optimum inside all bounds; `likeness` |J's|/|J| (free numbers, columns)."""
         norm = np.diag(sums.SS)
         own = norm - np.sum(sums.US**2, axis=0)
         score = sums.Sr - gradient @ sums.US
-        left = np.where(norm > 0, own / np.where(norm > 0, norm, 1.0), 0.0)
-        seen = np.flatnonzero((left > SCREEN.own_share) & (norm > 0) & np.isfinite(norm))
+        distinct_share = np.where(norm > 0, own / np.where(norm > 0, norm, 1.0), 0.0)
+        seen = np.flatnonzero((distinct_share > SCREEN.own_share) & (norm > 0) & np.isfinite(norm))
         gram = sums.SS - sums.US.T @ sums.US
         d = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         cosine = np.clip(gram / np.outer(d, d), -1, 1)
@@ -155,29 +159,29 @@ class Screen:
         for j in sorted(seen, key=lambda j: -abs(z[j])):
             ranked.setdefault(columns[j].hypothesis, []).append(int(j))
         order = [js[0] for js in ranked.values()]
-        suspect = {j: self._suspect(columns[j], z[j], score[j] / own[j], left[j], j) for j in map(int, seen)}
+        suspect = {j: self._suspect(columns[j], z[j], score[j] / own[j], distinct_share[j], j) for j in map(int, seen)}
         suspects = tuple(
-            replace(suspect[j], others=tuple(suspect[i].start for i in others[: SCREEN.most_other_starts]))
+            replace(suspect[j], other_starts=tuple(suspect[i].start for i in others[: SCREEN.most_other_starts]))
             for j, *others in ranked.values()
         )
         sds = {
             (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
             for j in order
         }
-        together = Together(columns, seen, score, own, left, cosine, self._suspect)
+        together = SubsetSearch(columns, seen, score, own, distinct_share, cosine, self._suspect)
         resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
-        hidden = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
-        hidden = {h: k for h, k in hidden.items() if h not in ranked}
+        undetectable = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
+        undetectable = {h: k for h, k in undetectable.items() if h not in ranked}
         threshold = self._threshold(cosine[np.ix_(seen, seen)])
-        return Screened(suspects, cosine, threshold, sds, together.search(), hidden)
+        return Screened(suspects, cosine, threshold, sds, together.search(), undetectable)
 
-    def _suspect(self, column: Column, z: float, amplitude: float, left: float, j: int) -> Suspect:
+    def _suspect(self, column: CandidateTerm, z: float, amplitude: float, distinct_share: float, j: int) -> Suspect:
         h = column.hypothesis
         if h.effect == PARAMETER:
             start = {"value": column.shape["value"] + amplitude * column.size}
         else:
             start = {**column.shape, h.law.amplitude().name: amplitude * column.size}
-        return Suspect(h, start, float(z), float(left), j)
+        return Suspect(h, start, float(z), float(distinct_share), j)
 
     def _threshold(self, cosine: np.ndarray) -> float:
         """The 99th percentile of the largest |z| when nothing was left out."""
@@ -189,7 +193,7 @@ class Screen:
         return float(np.quantile(np.abs(draws @ root.T).max(axis=1), SCREEN.false_alarm_quantile))
 
 
-def _read_truly(fit: Fit) -> Fit:
+def _without_sensor_causes(fit: Fit) -> Fit:
     """The fit with every cause at a sensor off: fringes count what is there, not what they have made of it."""
     theta = fit.theta.copy()
     for k, u in enumerate(fit.structure.free_parameters):

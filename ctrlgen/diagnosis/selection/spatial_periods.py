@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.settings import SPATIAL_PERIODS
 from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
 
 
-def pitches(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
+def spatial_periods(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     """The ways [path's unit] after which `left` (n,) repeats along `path` (n,), the most conspicuous first.
 
     From |sum left exp(-2 pi i path/way)|^2 over the mean square and n, which is exponential where nothing repeats.
@@ -33,7 +33,7 @@ def pitches(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     return tuple(float(padding * span / (first + k)) for k in best)
 
 
-def both(found: Iterable[tuple[float, ...]]) -> tuple[float, ...]:
+def merged_periods(found: Iterable[tuple[float, ...]]) -> tuple[float, ...]:
     """The ways along several paths, such as the one read and the one foreseen, each once."""
     kept: list[float] = []
     for way in (way for ways in found for way in ways):
@@ -42,7 +42,7 @@ def both(found: Iterable[tuple[float, ...]]) -> tuple[float, ...]:
     return tuple(kept)
 
 
-def jumps(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
+def jump_positions(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     """The places [path's unit] at which the mean of `left` (n,) on both sides differs most, apart from its usual slope."""
     span = float(np.ptp(path))
     if span == 0:

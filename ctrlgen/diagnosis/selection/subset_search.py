@@ -18,23 +18,23 @@ class Suspect:
     hypothesis: Hypothesis
     start: dict[str, float]
     z: float
-    left: float
-    column: int
-    others: tuple[dict[str, float], ...] = ()
+    distinct_share: float
+    index: int
+    other_starts: tuple[dict[str, float], ...] = ()
 
 
-class Together:
+class SubsetSearch:
     """Sets of hypotheses by the chi^2 that they explain jointly, from scores and cosines alone.
 
     Adding hypothesis j to a set K raises it by (z_j - c_jK C_KK^-1 z_K)^2/(1 - c_jK C_KK^-1 c_Kj).
     """
 
-    def __init__(self, columns, seen, score, own, left, cosine, suspect) -> None:
+    def __init__(self, columns, seen, score, own, distinct_share, cosine, suspect) -> None:
         self.columns = [columns[j] for j in seen]
         self.index = seen
         self.root = np.sqrt(own[seen])
         self.z = score[seen] / self.root
-        self.left, self.C, self.suspect = left[seen], cosine[np.ix_(seen, seen)], suspect
+        self.distinct_share, self.C, self.suspect = distinct_share[seen], cosine[np.ix_(seen, seen)], suspect
         self.group = (
             np.unique([hash(c.hypothesis) for c in self.columns], return_inverse=True)[1]
             if len(seen)
@@ -96,6 +96,6 @@ class Together:
 
     def _suspects(self, members: tuple[int, ...], b: np.ndarray) -> tuple[Suspect, ...]:
         return tuple(
-            self.suspect(self.columns[k], self.z[k], value, self.left[k], int(self.index[k]))
+            self.suspect(self.columns[k], self.z[k], value, self.distinct_share[k], int(self.index[k]))
             for k, value in zip(members, b, strict=True)
         )

@@ -1,4 +1,4 @@
-"""What a diagnosis says, and the verdict from what the search found."""
+"""The answer of a diagnosis: verdict, findings with intervals, held-out errors, and how they were found."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from ctrlgen.core.units import difference, from_si, to_si
 from ctrlgen.devices import Device
@@ -18,11 +17,10 @@ from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, written
-from ctrlgen.diagnosis.selection.candidate_model import Search
-from ctrlgen.diagnosis.settings import MODEL_SELECTION, STATISTICS, VERDICT
+from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.verdict import unconfirmed
+from ctrlgen.diagnosis.settings import STATISTICS
 from ctrlgen.recordings.recording import Recording
-
-CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 
 
 @dataclass(frozen=True)
@@ -70,14 +68,14 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     held_out: dict[str, ChannelError]
     residual_tests: ResidualTests
-    where: dict[str, Any]
-    detectable: dict[str, Any]
+    residual_location: dict[str, Any]
+    detectability: dict[str, Any]
     next_experiment: dict[str, Any] | None
-    history: tuple[dict[str, Any], ...]
+    search_history: tuple[dict[str, Any], ...]
     notes: tuple[str, ...]
     device: Device
     recording: Recording
-    search: Search
+    search: SearchResult
     fitter: Fitter
     profiles: tuple[Profile, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict)
@@ -88,7 +86,7 @@ class Diagnosis:
 
         A device written in Python has no file: this is what to put into its code.
         """
-        return values(self.search.chosen.fit, self.profiles)
+        return estimated_values(self.search.chosen.fit, self.profiles)
 
     @property
     def unconfirmed(self) -> tuple[Hypothesis, ...]:
@@ -114,86 +112,7 @@ class Diagnosis:
         return device.model_copy(update={"effect": (*device.effect, *read)})
 
 
-def verdict(fitter: Fitter, search: Search, after: ResidualTests, seen: bool = False) -> str:
-    """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
-
-    Partly: causes are found, but they leave a little more than noise, or no held-out record shows one of them, or nothing
-    tells the noise, so that nobody can say whether all is explained, or the numbers are too loose. Unexplained, too, where
-    it takes numbers that the device file excludes: a wrong unit, sign or gain of a column looks like that.
-    """
-    found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
-    if excluded(search.chosen.fit):
-        return UNEXPLAINED
-    if known and not after.passed and not (found and remaining(fitter, search) <= tolerated(search)):
-        return UNEXPLAINED
-    if not found:
-        return CONSISTENT
-    if any(search.rivals):
-        return AMBIGUOUS
-    sure = known and after.passed and not unconfirmed(search) and not loose(fitter, search)
-    return EXPLAINED if sure else PARTLY
-
-
-def excluded(fit: Fit) -> dict[str, float]:
-    """The device's uncertain numbers, by path, that stand more than `VERDICT.named_deviation` stated deviations off, in deviations; empty
-    where all of them together are as far off as chance puts them."""
-    off = {
-        u.path: float((value - u.nominal) / u.sd)
-        for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)
-        if u.sd
-    }
-    if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > VERDICT.impossible_p:
-        return {}
-    least = min(VERDICT.named_deviation, max(map(abs, off.values())))
-    return {path: z for path, z in off.items() if abs(z) >= least}
-
-
-def unconfirmed(search: Search) -> tuple[Hypothesis, ...]:
-    """The causes that no held-out record shows, and that nothing the device states of itself demands."""
-    chosen = search.chosen
-    return tuple(
-        cause
-        for cause, bare in zip(chosen.fit.structure.causes, search.bare, strict=True)
-        if bare.held - chosen.held < MODEL_SELECTION.least_confirmed
-        and bare.fit.penalty - chosen.fit.penalty < 0.5 * (bare.fit.objective - chosen.fit.objective)
-    )
-
-
-def loose(fitter: Fitter, search: Search) -> bool:
-    """Whether the held-out records are foreseen worse than before, beyond chance, though the causes may be right: by the
-    numbers as fitted, not as far as those are known."""
-    worse = fitter.held_out_squares(search.chosen.fit) - fitter.held_out_squares(search.nominal.fit)
-    return worse > STATISTICS.chance_excess * np.sqrt(2 * _n_held(fitter))
-
-
-def tolerated(search: Search) -> float:
-    """The share of the mismatch that the chosen causes may leave: the largest model-form error of their laws."""
-    causes = search.chosen.fit.structure.causes
-    return max([VERDICT.model_form_error, *(c.prior.model_form_error for c in causes)])
-
-
-def remaining(fitter: Fitter, search: Search) -> float:
-    """What the chosen causes leave beyond the noise, as a share of what the device as described leaves, both root mean
-    square; the larger one of the records to fit and of those held out. An excess below `STATISTICS.chance_excess`
-    standard deviations of chi-square counts as noise."""
-    n_held = _n_held(fitter)
-    after, before = search.chosen, search.nominal
-    shares = [0.0]
-    for left, all_, n in (
-        (after.fit.objective, before.fit.objective, after.fit.n),
-        (after.held, before.held, n_held),
-    ):
-        if left - n > STATISTICS.chance_excess * np.sqrt(2 * n):
-            shares.append(float(np.sqrt((left - n) / max(all_ - n, left - n))))
-    return max(shares)
-
-
-def _n_held(fitter: Fitter) -> int:
-    """Usable samples of the held-out records."""
-    return sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)
-
-
-def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, ChannelError]:
+def held_out_errors(fitter: Fitter, search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:
     """Held-out root mean square of each channel, nominal and chosen."""
     found = {}
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
@@ -211,7 +130,7 @@ def errors(fitter: Fitter, search: Search, known: np.ndarray) -> dict[str, Chann
     return found
 
 
-def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
+def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
     """Every unknown of a fit, in its reader's unit. An amplitude is known no better than its law's form is right, and no
     number better than its profile says."""
     found, profiled = {}, {p.path: p for p in profiles}
@@ -228,10 +147,10 @@ def values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
     return found
 
 
-def findings(search: Search, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
+def findings(search: SearchResult, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
     """The causes of the chosen structure with intervals and rivals, the most important first."""
     fit, rows = search.chosen.fit, []
-    estimates = values(fit, profiles)
+    estimates = estimated_values(fit, profiles)
     for k, cause in enumerate(fit.structure.causes):
         number = cause.path.rpartition(".")[2]
         parameters = {
@@ -245,6 +164,9 @@ def findings(search: Search, profiles: tuple[Profile, ...] = ()) -> tuple[Findin
                 parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
         rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
         source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source
-        gain = float((search.bare[k].held - search.chosen.held) / search.nominal.held)
+        gain = float(
+            (search.without_cause[k].held_out_deviance - search.chosen.held_out_deviance)
+            / search.nominal.held_out_deviance
+        )
         rows.append(Finding(cause.effect, cause.location, parameters, rivals, gain, source, cause))
     return tuple(sorted(rows, key=lambda f: -f.held_out_gain))
