@@ -1,14 +1,14 @@
-"""Scenario -> drives: one nonlinear programme over the whole trajectory, solved by IPOPT.
+"""Trajectory optimisation: scenario -> drives by one nonlinear programme over the whole trajectory, solved by IPOPT.
 
     minimise    1/2 sum_k |s_k|^2
-    subject to  followed(x_k, z_k, u_k-1) = command_k + s_k      pose (or displacement), s_k the shortfall
+    subject to  followed(x_k, z_k, u_k-1) = command_k + s_k      pose (or displacement); s_k is a slack
                 g(x_k, z_k, u_k-1) = 0                           force balance of the stage
                 x_k+1 = step(x_k, z_k, u_k)                      actuator dynamics (static: rates = 0)
                 every limit of the device
 
-in variables divided by their typical size; derivatives are exact and sparse. Closed paths are
-periodic; open ones start in equilibrium at their first sample. With s = 0 the
-trajectory is followed; otherwise the solution is the nearest one and `solve` says so.
+in variables divided by their typical sizes; derivatives are exact and sparse. Closed paths are periodic; open ones
+start in equilibrium at their first sample. With s = 0 the trajectory is followed; otherwise the solution is the nearest
+admissible one, and `solve` raises Unreachable.
 Reference: A. Waechter, L. T. Biegler, Math. Program. 106 (2006) 25 (IPOPT).
 """
 
@@ -25,12 +25,18 @@ from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
 from ctrlgen.trajectory.scenario import Scenario
 
-WEIGHT = 1e8  # of the shortfall against the barrier, which otherwise pushes it off an active bound by sqrt(mu)
+SLACK_WEIGHT = 1e8  # against IPOPT's barrier, which otherwise keeps the solution sqrt(mu) off an active bound
+TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error
+MOST_ITERATIONS = 120
+DRIVE_GUESS = 0.2  # of its typical size, where IPOPT begins
 
 
 @dataclass(frozen=True)
 class OptimisationResult:
-    """IPOPT's answer in SI, one row a sample; `unreachable_by` in typical sizes of the followed signal."""
+    """IPOPT's solution in SI, one row a sample: states `x`, displacements `z`, drives `u`, and their `trace`.
+
+    `unreachable_by`: the slack, by which the followed signal is off the command, in its typical sizes.
+    """
 
     x: np.ndarray
     z: np.ndarray
@@ -41,15 +47,15 @@ class OptimisationResult:
 
 
 class TrajectoryProgramme:
-    """The nonlinear programme of one scenario; `run` solves it with a choice of composite limits."""
+    """The nonlinear programme of one scenario; `run` solves it with the composite limits that are chosen."""
 
     def __init__(self, model: Model, scenario: Scenario, command: np.ndarray) -> None:
         self.model, self.scenario = model, scenario
         self.signal = model.signals[scenario.file.follow]
         if model.clocks and scenario.closed:
-            what = "a closed path is not repeated by a device that changes with time; make the path open, or drop the effect"
+            what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
             raise InputError(scenario.name, [Fault("path", what)])
-        self.wanted = len(command)  # an open path is held for one more sample, so that its last drive is determined
+        self.n_command = len(command)  # an open path is held for one more sample, so that its last drive is determined
         held = scenario.sample_time is not None and not scenario.closed
         self.command = np.vstack([command, command[-1:]]) if held else command
         self.n = len(self.command)
@@ -64,7 +70,7 @@ class TrajectoryProgramme:
                 "xzvusX", [*self.sizes[:2], self.sizes[2], *self.sizes[2:], self.sizes[0]], strict=True
             )
         )
-        wanted = ca.SX.sym("c", self.sizes[3])
+        commanded = ca.SX.sym("c", self.sizes[3])
         physical = (x * m.x_scale + m.rest, z * m.z_scale)
 
         def at(expression: ca.SX, drive: ca.SX) -> ca.SX:
@@ -72,19 +78,19 @@ class TrajectoryProgramme:
             return ca.substitute(expression, ca.vertcat(m.x, m.z, m.u, m.p), values)
 
         motion = at(m.settling, u) / m.x_scale if h is None else x_1 - (at(m.step(h), u) - m.rest) / m.x_scale
-        equal = [at(self.signal.expr, v) / self.signal.scale - wanted - s, at(m.balance, v) / m.force_scale, motion]
+        equal = [at(self.signal.expr, v) / self.signal.scale - commanded - s, at(m.balance, v) / m.force_scale, motion]
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
         for limit in limits:
             unit = limit.upper or m.force_scale
             rows.append(at(limit.expr, v) / unit)
             low.append(np.full(limit.expr.numel(), -np.inf if limit.lower is None else limit.lower / unit))
             high.append(np.full(limit.expr.numel(), np.inf if limit.upper is None else limit.upper / unit))
-        function = ca.Function("sample", [x, z, v, u, s, x_1, wanted], [ca.vertcat(*rows)], {"cse": True})
+        function = ca.Function("sample", [x, z, v, u, s, x_1, commanded], [ca.vertcat(*rows)], {"cse": True})
         return function, np.concatenate(low), np.concatenate(high)
 
     @property
     def _settled(self) -> ca.Function:
-        """(x, z, u, p) -> what is zero where a path starts: settled, memories by samples after one from zero, clocks at zero."""
+        """(x, z, u, p) -> zero where an open path starts: settled, sampled memories one sample after zero, clocks at zero."""
         m = self.model
         rows, stepped = m.settling[:], list(m.stepped)
         for i, value in m.stepped.items():
@@ -92,7 +98,7 @@ class TrajectoryProgramme:
         return ca.Function("settled", [m.x, m.z, m.u, m.p], [rows])
 
     def run(self, limits: Sequence[Limit]) -> OptimisationResult:
-        """IPOPT's solution with the rows of `limits` added. Raises SolverError, KeyboardInterrupt."""
+        """IPOPT's solution with the composite `limits` as rows. Raises SolverError, and KeyboardInterrupt on a signal."""
         m, n, static, closed = self.model, self.n, self.scenario.sample_time is None, self.scenario.closed
         rows, row_low, row_high = self._rows(limits)
         variables = ca.MX.sym("w", sum(self.sizes), n)
@@ -117,22 +123,27 @@ class TrajectoryProgramme:
         w, g = ca.vertcat(ca.vec(variables), *extra), ca.vertcat(ca.vec(G), *extra_rows)
         low, high = zip(*(self._bounds(s) for s in "xzus"), strict=True)
         guess = np.concatenate(
-            [np.ones(self.sizes[0]), np.ones(self.sizes[1]), np.full(self.sizes[2], 0.2), np.zeros(self.sizes[3])]
+            [
+                np.ones(self.sizes[0]),
+                np.ones(self.sizes[1]),
+                np.full(self.sizes[2], DRIVE_GUESS),
+                np.zeros(self.sizes[3]),
+            ]
         )
-        start = [np.tile(guess, n)] + [np.full(e.numel(), 0.2) for e in extra]
+        start = [np.tile(guess, n)] + [np.full(e.numel(), DRIVE_GUESS) for e in extra]
         zeros = np.zeros(sum(e.numel() for e in extra_rows))
         options = {
             "print_time": False,
             "ipopt": {
                 "print_level": 0,
                 "sb": "yes",
-                "tol": 1e-10,
+                "tol": TOLERANCE,
                 "mu_strategy": "adaptive",
-                "max_iter": 120,
+                "max_iter": MOST_ITERATIONS,
                 "nlp_scaling_method": "none",
             },
         }
-        solver = ca.nlpsol("trajectory", "ipopt", {"x": w, "f": 0.5 * WEIGHT * ca.sumsqr(S), "g": g}, options)
+        solver = ca.nlpsol("trajectory", "ipopt", {"x": w, "f": 0.5 * SLACK_WEIGHT * ca.sumsqr(S), "g": g}, options)
         answer = solver(
             x0=np.concatenate(start),
             lbx=np.concatenate([np.tile(np.concatenate(low), n), *extra_low]),
@@ -146,7 +157,7 @@ class TrajectoryProgramme:
         if not stats["success"]:
             raise SolverError(
                 f"IPOPT stopped with {stats['return_status']} after {stats['iter_count']} iterations; "
-                "the physics may have no solution near the command: check the device's limits and the sample rate"
+                "the model may have no solution near the command: check the device's limits and the sample rate"
             )
         values = answer["x"].full().ravel()
         table = values[: n * sum(self.sizes)].reshape(n, -1)
@@ -159,7 +170,7 @@ class TrajectoryProgramme:
                 [u[-1:] if closed else values[None, table.size : table.size + self.sizes[2]] * m.u_scale, u[:-1]]
             )
         )
-        keep = slice(0, self.wanted)
+        keep = slice(0, self.n_command)
         x, z, u, s, before = x[keep], z[keep], u[keep], s[keep], before[keep]
         result = trace(m, np.arange(len(x)) * (self.scenario.sample_time or 0.0), x, z, u)
         if not static:
@@ -168,7 +179,7 @@ class TrajectoryProgramme:
         return OptimisationResult(x, z, u, s, result, stats["iter_count"])
 
     def _bounds(self, symbol: str) -> tuple[np.ndarray, np.ndarray]:
-        """Scaled bounds of x, z, u or the shortfall s of one sample."""
+        """Scaled bounds of x, z, u or the slack s of one sample."""
         m = self.model
         if symbol == "s":
             return np.full(self.sizes[3], -np.inf), np.full(self.sizes[3], np.inf)
