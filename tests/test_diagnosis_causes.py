@@ -333,7 +333,7 @@ def test_noise_so_slow_that_the_stage_may_move_is_said(poles, said):
         return y + 3 * NOISE * lfilter([1.0], np.poly(poles), rng.standard_normal(len(y)))
 
     (sentence,) = fitter_of(after=wandering).noise.notes
-    assert ("may be the device" in sentence) == said
+    assert ("may be motion of the device" in sentence) == said
 
 
 def test_play_is_seen_by_what_it_does_at_finite_gaps():

@@ -209,7 +209,7 @@ ON_HEXAPOD = {
     "lever_ratio": (carried, Planted("stage:2X", {"gain": 0.02})),
     "lost_motion": (losing, Planted("stage:all", {"compliance": 5e-6})),
     "heater_resistance": (
-        lambda u: Hexapod(faults=Faults(restoring_force=5e-5), voltage=True).settled(np.sqrt(u * Hexapod().n.actuator.heater_resistance)),
+        lambda u: Hexapod(faults=Faults(resistance=5e-5), voltage=True).settled(np.sqrt(u * Hexapod().n.actuator.heater_resistance)),
         Planted("actuator:all", {"slope": 5e-5}),
     ),
 }  # fmt: skip

@@ -21,7 +21,7 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting import plots, report
 from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import Build
-from ctrlgen.trajectory.metrics import Expected, expectations
+from ctrlgen.trajectory.metrics import ExpectationResult, expectations
 from ctrlgen.trajectory.paths import Frame
 from ctrlgen.trajectory.scenario import Scenario, load_scenario
 from ctrlgen.trajectory.solution import Solution, solve
@@ -46,7 +46,7 @@ class Outcome:
     solution: Solution
     c: CFolder | None
     comparison: Comparison | None
-    expected: tuple[Expected, ...]
+    expected: tuple[ExpectationResult, ...]
 
     @property
     def passed(self) -> bool:

@@ -14,7 +14,7 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.model.feedforward import Controller, ControllerStatus
 from ctrlgen.reporting.report import passed, summary
-from ctrlgen.trajectory.metrics import Expected
+from ctrlgen.trajectory.metrics import ExpectationResult
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.check import Check
 from ctrlgen.verification.comparison import Comparison
@@ -41,7 +41,7 @@ class Build:
 
     solution: Solution
     c: CFolder
-    expected: tuple[Expected, ...]
+    expected: tuple[ExpectationResult, ...]
     comparison: Comparison
     in_loop: InLoop
     checks: tuple[Check, ...]

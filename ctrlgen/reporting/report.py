@@ -16,7 +16,7 @@ from ctrlgen.core.files import write_text
 from ctrlgen.core.units import from_si
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.reporting.html import render
-from ctrlgen.trajectory.metrics import Expected, in_unit
+from ctrlgen.trajectory.metrics import ExpectationResult, in_unit
 from ctrlgen.trajectory.solution import Margin, Solution
 from ctrlgen.verification.comparison import Comparison
 
@@ -50,7 +50,7 @@ def write_trajectory(solution: Solution, path: Path) -> None:
 
 
 def summary(
-    solution: Solution, comparison: Comparison | None, expected: tuple[Expected, ...], c: CFolder | None
+    solution: Solution, comparison: Comparison | None, expected: tuple[ExpectationResult, ...], c: CFolder | None
 ) -> dict[str, Any]:
     """What summary.json holds: plain numbers in the stated units; nothing that changes from run to run."""
     scenario = solution.scenario
@@ -91,7 +91,7 @@ def summary(
     }  # fmt: skip
 
 
-def passed(comparison: Comparison | None, expected: tuple[Expected, ...]) -> bool:
+def passed(comparison: Comparison | None, expected: tuple[ExpectationResult, ...]) -> bool:
     """Whether everything that was checked is in tolerance."""
     return (comparison is None or comparison.passed) and all(e.passed for e in expected)
 
@@ -126,7 +126,7 @@ def write_report(
     out: Path,
     solution: Solution,
     comparison: Comparison | None,
-    expected: tuple[Expected, ...],
+    expected: tuple[ExpectationResult, ...],
     c: CFolder | None,
     figures: dict[str, str],
 ) -> None:

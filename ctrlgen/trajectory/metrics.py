@@ -1,4 +1,4 @@
-"""Named numbers of a solution, as scenarios expect them: 'force.1X.max', 'displacement.2Y[3]', 'margin.stroke'."""
+"""Metrics of a solution by name, as scenarios state expectations: 'force.1X.max', 'displacement.2Y[3]', 'margin.stroke'."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _NAME = re.compile(r"^(\w+)\.(\w+)(?:\.(min|max|rms|abs)|\[(\d+)\])?$")
 
 
 @dataclass(frozen=True)
-class Expected:
-    """One expectation and what came out: `measured` SI, `low` and `high` SI, `unit` the reader's."""
+class ExpectationResult:
+    """One expectation of a scenario and the solution's value: `measured`, `low` and `high` in SI, `unit` the reader's."""
 
     value: str
     measured: float
@@ -37,7 +37,7 @@ class Expected:
 
 
 def force_parts(solution: Solution) -> dict[str, np.ndarray]:
-    """The parts of the stage force over the samples, name -> (n, axes) [N]."""
+    """The parts of the restoring force over the samples by name, (n, axes) [N]; empty where the device states none."""
     m = solution.model
     if not m.force_parts:
         return {}
@@ -48,21 +48,21 @@ def force_parts(solution: Solution) -> dict[str, np.ndarray]:
 
 
 def metric(solution: Solution, name: str) -> tuple[float, str]:
-    """The value of `name` in SI and the reader's unit. Raises InputError for a name that does not exist.
+    """The value of `name` in SI and the reader's unit. Raises ValueError for a name that does not exist.
 
-    SIGNAL.CHANNEL.min|max|rms|abs (abs: the largest size) or SIGNAL.CHANNEL[sample]: signals of the model, `force_linear` and
-    `force_nonlinear`, and `error` (followed minus commanded). margin.LIMIT: the smallest distance to a limit.
+    SIGNAL.CHANNEL.min|max|rms|abs (abs: the largest absolute value) or SIGNAL.CHANNEL[sample], where SIGNAL is one of the
+    model's, `force_linear`, `force_nonlinear` or `error` (followed minus commanded); margin.LIMIT: the smallest distance to
+    that limit.
     """
     m, match = solution.model, _NAME.match(name)
     if not match:
         raise ValueError(f"{name!r}: write SIGNAL.CHANNEL.max, SIGNAL.CHANNEL[sample] or margin.LIMIT")
     group, channel, how, index = match.groups()
     if group == "margin":
-        found = [margin for margin in solution.margins if margin.limit.name == channel]
-        if not found:
-            raise ValueError(f"{name!r}: limits are {', '.join(limit.name for limit in m.limits)}")
-        unit = found[0].limit.unit
-        return found[0].distance, "delta_degC" if unit == "degC" else unit
+        margin = next((margin for margin in solution.margins if margin.limit.name == channel), None)
+        if margin is None:
+            raise ValueError(f"{name!r}: limits are {', '.join(limit.name for limit in m.limits)}; write one of them")
+        return margin.distance, "delta_degC" if margin.limit.unit == "degC" else margin.limit.unit
     followed = solution.scenario.file.follow
     tables = {
         (signal.name if role == "state" else role): (signal, solution.trace.signals[role])
@@ -71,7 +71,7 @@ def metric(solution: Solution, name: str) -> tuple[float, str]:
     tables |= {f"force_{part}": (m.signals["force"], table) for part, table in force_parts(solution).items()}
     tables["error"] = (m.signals[followed], solution.trace.signals[followed] - solution.command)
     if group not in tables:
-        raise ValueError(f"{name!r}: signals are {', '.join(tables)}")
+        raise ValueError(f"{name!r}: signals are {', '.join(tables)}; write one of them")
     signal, table = tables[group]
     if channel not in signal.channels or (how is None and index is None):
         raise ValueError(f"{name!r}: write {group}.CHANNEL.max with a channel of {', '.join(signal.channels)}")
@@ -79,14 +79,14 @@ def metric(solution: Solution, name: str) -> tuple[float, str]:
     unit = signal.units[signal.channels.index(channel)]
     if index is not None:
         if int(index) >= len(column):
-            raise ValueError(f"{name!r}: there are {len(column)} samples")
+            raise ValueError(f"{name!r}: samples are 0 to {len(column) - 1}; write one of them")
         return float(column[int(index)]), unit
     value = _STATISTICS[how or "abs"](column)
     return float(value), unit
 
 
-def expectations(solution: Solution) -> tuple[Expected, ...]:
-    """Every expectation of the scenario against the solution. Raises InputError listing malformed ones."""
+def expectations(solution: Solution) -> tuple[ExpectationResult, ...]:
+    """Every expectation of the scenario with the solution's value. Raises InputError listing malformed ones."""
     results, faults = [], []
     for k, expect in enumerate(solution.scenario.file.expect):
         try:
@@ -97,12 +97,14 @@ def expectations(solution: Solution) -> tuple[Expected, ...]:
         except ValueError as error:
             faults.append(Fault(f"expect[{k}]", str(error)))
             continue
-        results.append(Expected(expect.value, measured, low, high, unit.replace("delta_degC", "K"), expect.source))
+        results.append(
+            ExpectationResult(expect.value, measured, low, high, unit.replace("delta_degC", "K"), expect.source)
+        )
     if faults:
         raise InputError(solution.scenario.path, faults)
     return tuple(results)
 
 
 def in_unit(si: float, unit: str) -> float:
-    """A measured SI value in its unit."""
+    """An SI value in the reader's `unit`."""
     return float(from_si(si, unit))

@@ -1,7 +1,7 @@
-"""Paths: what the platform (or the stages) should do, as commanded samples.
+"""Paths: commanded samples of the platform's pose or of the stages' displacements.
 
-Each kind turns its parameters into an array of samples; `closed` says that the last sample is
-followed by the first. Motion between rest points follows the minimum-jerk law
+Each kind of path turns its parameters into an array of samples; in a `closed` one the first sample follows the last.
+Motion between rest points follows the minimum-jerk law
 s(t) = 10 t^3 - 15 t^4 + 6 t^5 (T. Flash, N. Hogan, J. Neurosci. 5 (1985) 1688).
 """
 
@@ -61,17 +61,17 @@ class Frame:
             raise InputError(option, [Fault(f.where.removeprefix("."), f.what) for f in error.faults]) from None
 
     def directions(self, names: Sequence[str], where: str) -> np.ndarray:
-        """Unit vectors of the named channels, (n, channels). Raises InputError for unknown or mixed units."""
+        """Unit vectors of the named channels, (n, channels). Raises InputError for unknown channels and for rotations."""
         for name in names:
             if name not in self.channels:
                 raise InputError(
                     "path", [Fault(where, f"{name!r} is not a channel; known: {', '.join(self.channels)}")]
                 )
         if len(set(names)) != len(names):
-            raise InputError("path", [Fault(where, "names the same channel twice")])
+            raise InputError("path", [Fault(where, "names the same channel twice; name two different ones")])
         rows = np.eye(len(self.channels))[[self.channels.index(name) for name in names]]
         if any(self.units[self.channels.index(name)] != "um" for name in names):
-            raise InputError("path", [Fault(where, "needs channels that are lengths")])
+            raise InputError("path", [Fault(where, "names a rotation; name two translations")])
         return rows
 
 
@@ -81,7 +81,7 @@ def minimum_jerk(s: np.ndarray) -> np.ndarray:
 
 
 class Path_(Section):
-    """Base of the paths. `samples(frame, n)` gives (n, channels) in SI."""
+    """Base of the paths; `samples(frame, n)` gives n samples, (n, channels) in SI, and raises InputError."""
 
     closed: ClassVar[bool] = False
 
@@ -189,7 +189,7 @@ class Lissajous(Path_):
 
 
 class Poses(Path_):
-    """Samples listed in the scenario (`points`) or in a CSV file (`file`), one row a sample.
+    """Samples listed in the scenario (`points`) or in a CSV file (`file`), one row per sample.
 
     The CSV has one header row of channels with units, such as `delta_z [um]`; channels not named are zero.
     """
@@ -201,7 +201,15 @@ class Poses(Path_):
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         if bool(self.points) == bool(self.file):
-            raise InputError("path", [Fault("points", "give either points or file")])
+            raise InputError(
+                "path",
+                [
+                    Fault(
+                        "points",
+                        "give either points or file, not both" if self.points else "is missing; give points or file",
+                    )
+                ],
+            )
         if self.points:
             return np.array([frame.point(point, f"points[{i}]") for i, point in enumerate(self.points)])
         return read_poses(self.folder / self.file, frame)
@@ -211,7 +219,7 @@ PathKind = Annotated[Circle | Line | Raster | Spiral | Lissajous | Poses, Field(
 
 
 def _through(corners: np.ndarray, times: np.ndarray, n: int) -> np.ndarray:
-    """(n, channels): through `corners` at `times`, at rest in each, minimum jerk between."""
+    """(n, channels): from corner to corner, at `times`, with minimum jerk and at rest in each of the `corners`."""
     t = np.linspace(times[0], times[-1], n)
     leg = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
     s = minimum_jerk((t - times[leg]) / (times[leg + 1] - times[leg]))
@@ -228,7 +236,7 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
         ) from None
     rows = [(line, row) for line, row in enumerate(lines, start=1) if any(cell.strip() for cell in row)]
     if len(rows) < 2:
-        raise InputError(path, [Fault("file", "has no samples; write a header row and one row a sample")])
+        raise InputError(path, [Fault("file", "has no samples; write a header row and one row per sample")])
     columns: list[tuple[int, str, str]] = []
     faults = []
     for text in rows[0][1]:
@@ -241,7 +249,7 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
             continue
         index = frame.channels.index(name)
         if index in [known for known, _, _ in columns]:
-            faults.append(Fault("line 1", f"column {name!r} stands twice; keep one"))
+            faults.append(Fault("line 1", f"column {name!r} occurs twice; keep one"))
         try:
             parse(f"0 {unit}", frame.units[index])
         except ValueError:
@@ -254,7 +262,11 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
     values = np.zeros((len(rows) - 1, len(frame.channels)))
     for k, (line, row) in enumerate(rows[1:]):
         if len(row) != len(columns):
-            faults.append(Fault(f"line {line}", f"has {len(row)} cells, the header has {len(columns)}"))
+            faults.append(
+                Fault(
+                    f"line {line}", f"has {len(row)} cells, the header has {len(columns)}; give one number per column"
+                )
+            )
             continue
         for (index, unit, name), cell in zip(columns, row, strict=True):
             try:

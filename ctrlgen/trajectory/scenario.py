@@ -1,4 +1,4 @@
-"""A scenario: a device, what it should follow, how fast, and what must come out."""
+"""A scenario: a device, the path it is to follow, at what rate, and the values that are expected."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ from ctrlgen.model.model import Model
 from ctrlgen.trajectory.paths import Frame, PathKind, Poses
 
 FILE = "scenario.toml"
+MOST_SAMPLES = 1_000_000  # of one path: what memory holds
 
 
 class Expectation(Section):
-    """One value that must come out: `value` names it (see `ctrlgen.trajectory.metrics.metric`), `range` in its unit."""
+    """One expected value of the solution: `value` names it (see `ctrlgen.trajectory.metrics.metric`), `range` in its unit."""
 
     value: str
     range: tuple[str, str]
@@ -31,14 +32,18 @@ class Expectation(Section):
 
 
 class ScenarioFile(Section):
-    """scenario.toml as written."""
+    """The schema of scenario.toml.
+
+    `follow`: the signal that the path commands. With `sample_rate` the path is followed in time, for `duration`; without it
+    the scenario is static: `points` separate equilibria. `outcome`: whether the path can be followed.
+    """
 
     title: str
     device: str
     follow: Literal["pose", "displacement"] = "pose"
     sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
     duration: Annotated[Quantity, In("s", positive=True)] | None = None
-    points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
+    points: Annotated[int, Field(ge=2, le=MOST_SAMPLES)] | None = None
     path: PathKind
     outcome: Literal["solved", "unreachable"] = "solved"
     expect: tuple[Expectation, ...] = ()
@@ -48,7 +53,7 @@ class ScenarioFile(Section):
         if self.sample_rate is None:
             if self.duration is not None:
                 raise ValueError(
-                    "duration without sample_rate; add sample_rate, or leave both out for a static scenario"
+                    "duration is given without sample_rate; add sample_rate, or leave both out for a static scenario"
                 )
             if self.points is None and not isinstance(self.path, Poses):
                 raise ValueError(
@@ -56,7 +61,7 @@ class ScenarioFile(Section):
                 )
         elif isinstance(self.path, Poses):
             if self.duration is not None or self.points is not None:
-                raise ValueError("a list of poses fixes the number of samples; leave out duration and points")
+                raise ValueError("a list of poses already fixes the number of samples; leave out duration and points")
         elif self.duration is None or self.points is not None:
             raise ValueError('with sample_rate give duration = "1 s" (and no points)')
         return self
@@ -64,20 +69,20 @@ class ScenarioFile(Section):
 
 @dataclass(frozen=True)
 class Input:
-    """One text that a scenario was made from: `path` where it was read, absolute or beside the scenario."""
+    """One file that a scenario was read from, with its `text`; `path` as it was given, or beside the scenario."""
 
     path: Path
     text: str
 
     @property
     def sha256(self) -> str:
-        """Of the text as UTF-8."""
+        """SHA-256 of the text as UTF-8."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scenario ready to solve. `file` is what was written; `name` the folder's name as a C identifier.
+    """A scenario ready to be solved. `file` is what scenario.toml says; `name` the folder's name as a C identifier.
 
     `inputs`: the "scenario" itself, its "device" and, where a path is read from a file, its "poses".
     """
@@ -90,7 +95,7 @@ class Scenario:
 
     @property
     def digest(self) -> dict[str, str]:
-        """The sha256 of each input."""
+        """The SHA-256 of each input."""
         return {name: read.sha256 for name, read in self.inputs.items()}
 
     @property
@@ -100,7 +105,7 @@ class Scenario:
 
     @property
     def closed(self) -> bool:
-        """Whether the first sample follows the last one."""
+        """Whether the path is periodic: its first sample follows the last one."""
         return self.sample_time is not None and type(self.file.path).closed
 
     def command(self, model: Model) -> np.ndarray:
@@ -113,8 +118,16 @@ class Scenario:
         n = self.file.points or 0
         if self.file.sample_rate and self.file.duration:
             n = round(self.file.sample_rate.si * self.file.duration.si)
-            if not 2 <= n <= 1_000_000:
-                raise InputError(self.path, [Fault("duration", f"gives {n} samples; 2 to 1000000 are possible")])
+            if not 2 <= n <= MOST_SAMPLES:
+                raise InputError(
+                    self.path,
+                    [
+                        Fault(
+                            "duration",
+                            f"gives {n} samples; between 2 and {MOST_SAMPLES} are possible: change duration or sample_rate",
+                        )
+                    ],
+                )
         try:
             samples = path.samples(frame, n)
         except InputError as error:
@@ -123,7 +136,13 @@ class Scenario:
             raise InputError(self.path, [Fault(f"path.{f.where}", f.what) for f in error.faults]) from None
         if self.sample_time and len(samples) < 2:
             raise InputError(
-                self.path, [Fault("path", "motion in time needs 2 samples or more; for one pose leave out sample_rate")]
+                self.path,
+                [
+                    Fault(
+                        "path",
+                        "has one sample, but motion in time needs two or more; for one pose leave out sample_rate",
+                    )
+                ],
             )
         return samples
 
@@ -146,7 +165,9 @@ def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:
         device_path = file_path.parent / file.device
         device, described = load_device(device_path), Input(device_path, read_text(device_path))
     elif file.device != device.name:
-        raise InputError(file_path, [Fault("device", f"{file.device!r} is not {device.name!r}, the device given")])
+        raise InputError(
+            file_path, [Fault("device", f"{file.device!r} is not {device.name!r}, the device given; write its name")]
+        )
     else:
         numbers = "\n".join(f"{path} = {number.text}" for path, number in device.quantities())
         described = Input(file_path.parent / f"{_identifier(device.name)}.txt", numbers)

@@ -1,4 +1,4 @@
-"""A solved scenario: drives over time, and the margin to every limit."""
+"""A solved scenario: the drives over time and the margin to every limit."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, infeasibilit
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.scenario import Scenario
 
-KEPT = 1e-7  # of a limit: what IPOPT's relaxed bounds (1e-8) may leave
+BROKEN = 1e-7  # of a limit: an excess below is what IPOPT's relaxed bounds (1e-8) may leave
 
 
 @dataclass(frozen=True)
 class Margin:
-    """Distance of a limited quantity to its nearer bound: `value` where it is closest, all SI.
+    """Distance of a limited quantity to its nearer bound: its `value` at the sample where it is closest, all SI.
 
     `share` is the distance over the admissible range (over the bound itself where only one is given; None
     for a one-sided bound at zero).
@@ -49,15 +49,15 @@ class Solution:
 
     @property
     def tightest(self) -> Margin:
-        """The limit that leaves least of its range."""
+        """The margin with the smallest share of its range left."""
         return min((m for m in self.margins if m.share is not None), key=lambda m: m.share or 0.0)
 
 
 def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
-    """The drives of `scenario`. Raises Unreachable when it cannot be followed, SolverError when IPOPT fails.
+    """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where IPOPT fails.
 
-    Composite limits (stress, rotation) are first left out; those that the solution breaks are added and
-    the problem is solved again. A relaxed optimum that keeps all limits is the optimum.
+    Composite limits (stress, rotation) are left out at first; those that the solution breaks are added and the problem is
+    solved again. An optimum without them that keeps all of them is the optimum with them. `progress` is called before each.
     """
     command = scenario.command(model)
     programme = TrajectoryProgramme(model, scenario, command)
@@ -75,7 +75,7 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
             raise infeasibility_error(scenario, model, command, relaxed or result, result, rows)
         margins = _margins(model, result)
         broken = [
-            m.limit for m in margins if m.distance < -KEPT * max(abs(m.bound), abs(m.value)) and m.limit not in rows
+            m.limit for m in margins if m.distance < -BROKEN * max(abs(m.bound), abs(m.value)) and m.limit not in rows
         ]
         if not broken:
             added = tuple(limit.name for limit in rows)
@@ -85,7 +85,7 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
 
 
 def _margins(model: Model, result: OptimisationResult) -> list[Margin]:
-    """The smallest distance to each side of each limit, one Margin per limit."""
+    """One Margin per limit: the smallest distance to its nearer side."""
     n = len(result.u)
     values = model.evaluate_limits.map(n)(result.x.T, result.z.T, result.u.T, np.tile(model.p_nominal[:, None], (1, n)))
     margins = []

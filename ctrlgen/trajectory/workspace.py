@@ -1,4 +1,4 @@
-"""The set of poses a device can hold under all its limits: ranges, slices, the largest ball inside.
+"""The workspace, the poses a device can hold under all its limits: ranges, slices, the largest ball inside.
 
 Every limit is convex in the displacement and the pose is linear in it, so the set is convex:
 a ray from an inner point leaves it once, and tangent planes at its boundary enclose it.
@@ -18,12 +18,15 @@ from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 
-REACH = 60  # bisections: beyond double precision of the first step
-TIGHT = 1e-6  # of a ball's radius: how far its worst point may stick out
-SHARP = 1e-4  # of the way to an end of the workspace: how far it may be off
+BISECTIONS = 60  # beyond double precision of the first step
+BALL_TOLERANCE = 1e-6  # of a ball's radius: how far its worst point may stick out
+END_TOLERANCE = 1e-4  # of the distance to an end of the workspace: how far it may be off
 HEIGHTS = (10e-6, 20e-6, 30e-6)  # m
 SETTLED = 1e6  # s; longer than any actuator remembers
-CUTS = 400  # rounds of tangent planes before giving up
+MOST_ROUNDS = 400  # of tangent planes before giving up
+RANDOM_DIRECTIONS = 400  # beside the axes, for the first tangent planes
+WORST_DIRECTIONS = 40  # in which a ball sticks out most, turned along the gradient
+TURNS = 8  # times
 
 
 @dataclass(frozen=True)
@@ -115,12 +118,12 @@ class Workspace:
             raise InputError(self.model.name, [Fault("base pose", "cannot be held; choose one inside the workspace")])
         size = np.linalg.norm(directions / np.array(self.model.signals["pose"].scale), axis=1)
         low, high = np.zeros(len(directions)), 1.0 / size
-        for _ in range(REACH):  # first out, doubling, then in
+        for _ in range(BISECTIONS):  # first out, doubling, then in
             inside = self.excess(base + high[:, None] * directions) <= 0
             if not inside.any():
                 break
             low, high = np.where(inside, high, low), np.where(inside, 2 * high, high)
-        for _ in range(REACH):
+        for _ in range(BISECTIONS):
             middle = (low + high) / 2
             inside = self.excess(base + middle[:, None] * directions) <= 0
             low, high = np.where(inside, middle, low), np.where(inside, high, middle)
@@ -143,7 +146,7 @@ class Workspace:
     def extent(self, inside: np.ndarray) -> np.ndarray:
         """(channels, 2): how far each pose component goes below and above anywhere in the workspace, SI.
 
-        Linear programmes over tangent planes, to SHARP of the way from the pose `inside`, which must be held.
+        Linear programmes over tangent planes, to END_TOLERANCE of the way from the pose `inside`, which must be held.
         """
         from scipy.optimize import linprog  # a quarter of a second to import, which no other command should wait for
 
@@ -153,9 +156,9 @@ class Workspace:
         ends = np.zeros((n, 2))
         for i in range(n):
             for side, sign in enumerate((-1.0, 1.0)):
-                for _ in range(CUTS):
+                for _ in range(MOST_ROUNDS):
                     found = linprog(-sign * np.eye(n)[i], *planes.rows(), bounds=(None, None))
-                    if planes.cut(found.x[None])[0] >= 1 - SHARP:
+                    if planes.cut(found.x[None])[0] >= 1 - END_TOLERANCE:
                         break
                 else:
                     raise self._gave_up("the ends were not found")
@@ -175,21 +178,23 @@ class Workspace:
 
         def protruding(centre: np.ndarray, radius: float) -> np.ndarray:
             """All directions, and the forty in which the ball sticks out most, turned along the gradient."""
-            turned = planes.directions[np.argsort(-self.excess(planes.poses(centre + radius * planes.directions)))[:40]]
-            for _ in range(8):
+            turned = planes.directions[
+                np.argsort(-self.excess(planes.poses(centre + radius * planes.directions)))[:WORST_DIRECTIONS]
+            ]
+            for _ in range(TURNS):
                 slope, size, good = planes.slope(centre + radius * turned)
                 turned = np.where(good[:, None], slope / np.where(good, size, 1.0)[:, None], turned)
             return np.vstack([planes.directions, turned])
 
         planes.cut(planes.heart + planes.directions)
-        for _ in range(CUTS):
+        for _ in range(MOST_ROUNDS):
             normals, offsets = planes.rows()
             bounds = [(None, None)] * len(channels) + [(0, None)]
             with_radius = np.column_stack([normals, np.ones(len(normals))])
             best = linprog([0.0] * len(channels) + [-1.0], with_radius, offsets, bounds=bounds)
             centre, radius = best.x[:-1], best.x[-1]
             surface = centre + radius * protruding(centre, radius)
-            out = self.excess(planes.poses(centre + (surface - centre) * (1 - TIGHT))) > 0
+            out = self.excess(planes.poses(centre + (surface - centre) * (1 - BALL_TOLERANCE))) > 0
             if not out.any():
                 return Ball(planes.poses(centre[None])[0], float(radius), tuple(channels))
             planes.cut(surface[out])
@@ -197,7 +202,7 @@ class Workspace:
 
     def _gave_up(self, what: str) -> InputError:
         return InputError(
-            self.model.name, [Fault("workspace", f"{what} in {CUTS} rounds; choose another pose to start")]
+            self.model.name, [Fault("workspace", f"{what} in {MOST_ROUNDS} rounds; choose another pose to start")]
         )
 
 
@@ -209,7 +214,7 @@ class _Planes:
         self.scale = np.array(workspace.model.signals["pose"].scale)[self._chosen]
         self.heart = inside[self._chosen] / self.scale
         n = len(self._chosen)
-        directions = np.vstack([np.eye(n), -np.eye(n), np.random.default_rng(0).normal(size=(400, n))])
+        directions = np.vstack([np.eye(n), -np.eye(n), np.random.default_rng(0).normal(size=(RANDOM_DIRECTIONS, n))])
         self.directions = directions / np.linalg.norm(directions, axis=1)[:, None]
         self._normals: list[np.ndarray] = []
         self._offsets: list[float] = []
