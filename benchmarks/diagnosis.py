@@ -45,7 +45,7 @@ def _screen(repeat: int) -> list[Line | Note]:
         h for h in hypotheses(device, physics, channels, H, False) if h.effect != PARAMETER or h.path in movable(device)
     ]
     creep = next(h for h in open_ if (h.effect, h.at) == ("creep", "1X"))
-    plant = Structure(device).with_cause(creep, {"gain": 0.05, "tau": 5.0, "slow": 0.0}).described
+    plant = Structure(device).with_cause(creep, {"gain": 0.05, "tau": 5.0, "slow": 0.0}).device_with_causes
     t = H * np.arange(LONG)[:, None]
     slow, fast = 0.3 + 0.07 * np.arange(6), 7.0 + 1.3 * np.arange(6)
     u = model.u_scale * (0.4 + 0.15 * np.sin(2 * np.pi * slow * t) + 0.06 * np.sin(2 * np.pi * fast * t))

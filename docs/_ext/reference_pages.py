@@ -18,7 +18,16 @@ PASSED_OVER = ("effect", "sensor")  # tables that every device file may have: on
 def setup(app: Any) -> dict[str, Any]:
     """Sphinx calls this once; the pages are written before it looks for them."""
     app.connect("config-inited", lambda *_: (write_all(), draw_conventions(OUT.parents[1] / "_static")))
+    app.connect("autodoc-process-docstring", literal_docstring)
     return {"parallel_read_safe": True}
+
+
+def literal_docstring(app: Any, what: str, name: str, member: Any, options: Any, lines: list[str]) -> None:
+    """Docstrings are plain text with `names`: a name becomes a literal, a bar stays a bar."""
+    text = re.sub(r"(?<!`)`([^`]+)`(?!`)", r"``\1``", "\n".join(lines))
+    parts = re.split(r"(``.+?``)", text, flags=re.DOTALL)
+    parts[::2] = [re.sub(r"([|*_])", r"\\\1", part) for part in parts[::2]]
+    lines[:] = "".join(parts).split("\n")
 
 
 def write_all() -> None:
