@@ -1,1 +1,1 @@
-"""Results as pictures and pages for people."""
+"""Results for people: figures, self-contained HTML pages, and the JSON beside them."""

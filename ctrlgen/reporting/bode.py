@@ -1,4 +1,4 @@
-"""The frequency response drive -> pose as a picture."""
+"""Bode plot: the frequency response from every drive to the pose."""
 
 from __future__ import annotations
 
@@ -17,23 +17,31 @@ from ctrlgen.model.linearisation import linearise
 from ctrlgen.model.model import Model
 from ctrlgen.reporting.plots import COLOURS, STYLE
 
-LINES = ("-", "--")  # X and Y drives of a stage often coincide
+LINES = ("-", "--")  # the curves of the X and Y drives of a stage often coincide
+POINTS = 200  # frequencies
+DECADES = 2  # to either side of the slowest pole
 
 
 def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
-    """Gain of every pose component to every drive, one panel a component, and the phase of each drive's strongest one.
+    """Draws the gain from every drive to every pose component, one panel per component, and the phase of the strongest.
 
-    Raises InputError when `pose` (6,) is not an admissible equilibrium.
+    `pose` (channels,) [rad, m] is where the model is linearised. Raises InputError where it is not an admissible
+    equilibrium, or where the device has no dynamics.
     """
     system = linearise(model, pose)
     if not len(system.poles()):
         raise InputError(
             model.name,
-            [Fault("dynamics", "there are none: drive and pose follow each other at once at all frequencies")],
+            [
+                Fault(
+                    "dynamics",
+                    "has none: the pose follows the drive at once at all frequencies, so there is nothing to draw",
+                )
+            ],
         )
     signal, drive = model.signals["pose"], model.signals["drive"]
     slowest = -np.max(system.poles().real)
-    omega = np.logspace(np.log10(slowest) - 2, np.log10(slowest) + 2, 200)
+    omega = slowest * np.logspace(-DECADES, DECADES, POINTS)
     response = control.frequency_response(system, omega)
     with plt.rc_context(STYLE):
         layout: Any = [*[list("abc"), list("def")][: -(-len(signal.channels) // 3)], ["phase"] * 3]

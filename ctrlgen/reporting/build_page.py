@@ -1,4 +1,4 @@
-"""build.html and build.json of `ctrlgen verify`: one self-contained page, the verdict first."""
+"""Writes build.html and build.json of `ctrlgen verify`: one self-contained page, the verdict first."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MARKS = {"passed": "ok", "failed": "bad", "not run": "idle"}
 
 
 def write_build(out: Path, build: Build) -> None:
-    """build.html and build.json into `out`."""
+    """Writes build.html and build.json into the folder `out`."""
     found = record(build)
     write_text(out / "build.json", json.dumps(found, indent=1) + "\n")
     device = build.solution.model.device

@@ -1,4 +1,4 @@
-"""Pictures of a build: the tracking error of its C through the model, and what a sample costs on each target."""
+"""Figures of a build: tracking errors of its C driving the model, and the instructions per sample on each target."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ctrlgen.verification.in_loop import TargetRun
 
 SHOWN = {"um": ("nm", comparison.LENGTH, compression.LENGTH), "rad": ("nrad", comparison.ANGLE, compression.ANGLE)}
 SCALES = {"nm": 1e9, "nrad": 1e9}
-DECADES = 18  # below the tolerance that a logarithmic axis still shows: double's roundings
-KINDS = {"scenario": "along the scenario", "worst": "at worst", "player": "player"}
+DECADES = 18  # that the logarithmic axis shows at most: down to the roundings of a double
+KINDS = {"scenario": "along the scenario", "worst": "worst case", "player": "player"}
 
 
 def draw_all(build: Build) -> dict[str, str]:
-    """Name -> SVG text; no picture of what did not run."""
+    """Name -> SVG text; there is no figure of what did not run."""
     with plt.rc_context(STYLE):
         figures = {f"error_{unit}": svg(draw_errors(build, unit)) for unit in SHOWN if _channels(build, unit)}
         if build.in_loop.runs:
@@ -29,7 +29,7 @@ def draw_all(build: Build) -> dict[str, str]:
 
 
 def draw_errors(build: Build, unit: str) -> Figure:
-    """|error| of every channel of `unit`'s kind along the trajectory, one panel a piece of C and arithmetic, one axis for all."""
+    """|error| of every channel of the dimension of `unit` along the trajectory, one panel per piece of C and arithmetic."""
     shown, online, player = SHOWN[unit]
     channels, signal = _channels(build, unit), build.solution.model.signals[build.solution.scenario.file.follow]
     panels = [(what, real) for what, by_real in build.errors.items() for real in by_real]
@@ -60,14 +60,14 @@ def draw_errors(build: Build, unit: str) -> Figure:
 
 
 def _share_decades(axes: Axes, errors: list[np.ndarray]) -> None:
-    """Limits of the logarithmic axis: from the smallest median to above every tolerance and error."""
+    """Sets the limits of the logarithmic axis: from the smallest median to above every tolerance and error."""
     medians = [float(np.median(np.abs(e)[np.abs(e) > 0])) for e in errors if np.any(e)]
     top = max(axes.get_ylim()[1], *(float(np.abs(e).max()) * 3 for e in errors))
     axes.set_ylim(max(min(medians, default=top) / 30, top / 10**DECADES), top * 2)
 
 
 def draw_instructions(build: Build) -> Figure:
-    """Bars: instructions of a sample on each target, beside the budgets where they are stated for such a device."""
+    """Bars of the instructions per sample on each target, beside the budgets where these are stated for such a device."""
     rows = [
         (run, kind, count)
         for run in build.in_loop.runs

@@ -1,4 +1,4 @@
-"""Everything that is known of one build: what was generated, compared, run, checked, and what was not. build.json."""
+"""Everything that is known of one build, for build.json: what was generated, compared, run, checked, and what was not."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ctrlgen.verification.check import Check
 from ctrlgen.verification.comparison import Comparison
 from ctrlgen.verification.in_loop import InLoop, Stopped, TargetRun
 
-BUDGET_CORE, BUDGET_DRIVES = "Cortex-M4F", 6  # what the budgets are stated for
+BUDGET_CORE, BUDGET_DRIVES = "Cortex-M4F", 6  # the core and the number of drives that the budgets are stated for
 BUDGETS = {"scenario": 700, "worst": 6000, "player": BUDGET}  # instructions of one sample; goals, not conditions
 STATUS_WORDS = {
     ControllerStatus.DISPLACEMENT: "displacement beyond its range: the nearest target inside was taken",
@@ -33,10 +33,10 @@ STATUS_WORDS = {
 
 @dataclass(frozen=True)
 class Build:
-    """One generated package and all that was found out about it.
+    """One generated package with the results of every check.
 
-    `errors` along the trajectory, as `ctrlgen.verification.tracking.tracking_errors` gives: 'online C', 'player C' ->
-    arithmetic -> (samples, channels), SI.
+    `errors` along the trajectory are those of `ctrlgen.verification.tracking.tracking_errors`: 'online C', 'player C' ->
+    arithmetic -> (samples, channels) in SI.
     """
 
     solution: Solution
@@ -49,7 +49,7 @@ class Build:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What failed, one line each; empty where everything that ran passed."""
+        """A line for each failure; empty where everything that ran passed."""
         rows = [f"expected {e.value} is out of range" for e in self.expected if not e.passed]
         rows += [
             f"{row.build}: {row.what}, {row.signal}, is out of tolerance"
@@ -63,19 +63,19 @@ class Build:
 
     @property
     def not_run(self) -> tuple[tuple[str, str], ...]:
-        """(what, why or the remedy) of everything that did not run."""
+        """(what, why or how to make it run) of everything that did not run."""
         compilers = [(name, f"missing; apt-get install {name}") for name in self.comparison.missing]
         checks = [(c.tool, c.note) for c in self.checks if c.state == "not run"]
         return (*compilers, *self.in_loop.not_run, *checks)
 
     @property
     def passed(self) -> bool:
-        """Whether everything that ran passed; what did not run fails nothing, and passes nothing."""
+        """Whether everything that ran passed; what did not run counts as neither."""
         return passed(self.comparison, self.expected) and not self.failures
 
     @property
     def budgeted(self) -> bool:
-        """Whether the budgets are stated for such a device: so many drives, a sample after the other."""
+        """Whether the budgets apply: the device has as many drives and is driven sample by sample."""
         return len(self.solution.model.axes) == BUDGET_DRIVES and self.solution.scenario.sample_time is not None
 
 
@@ -85,16 +85,16 @@ def run_name(run: TargetRun | Stopped) -> str:
 
 
 def run_fault(run: TargetRun) -> str:
-    """What is wrong with a run, or nothing."""
-    said = []
+    """What is wrong with a run; empty where nothing is."""
+    faults = []
     if run.differing:
-        said.append(
+        faults.append(
             f"{run.differing} of {run.numbers} numbers differ from this computer's by up to {run.ulp} units in the last "
             f"place, first in {run.where}"
         )
     if run.writable:
-        said.append(f"{run.writable} bytes of writable memory of its own")
-    return "; ".join(said)
+        faults.append(f"{run.writable} bytes of static writable memory, where none is promised")
+    return "; ".join(faults)
 
 
 def _first_finding(check: Check) -> str:
@@ -122,7 +122,7 @@ def record(build: Build) -> dict[str, Any]:
 
 
 def interface(build: Build) -> dict[str, Any]:
-    """What the C takes and gives, SI, and what its status can say."""
+    """The arguments and results of the C, in SI, and the values that its status can have."""
     model, scenario = build.solution.model, build.solution.scenario
     controller = Controller(model, scenario.file.follow, scenario.sample_time)
     m = controller.nominal

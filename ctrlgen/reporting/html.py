@@ -1,4 +1,4 @@
-"""Pages for people: the templates of this package, filled in."""
+"""HTML pages from the templates of this package."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 
 def render(template: str, **values: Any) -> str:
-    """`template` of this package's `templates/`; a value that it asks for and does not get is an error."""
+    """The page of a `template` in this package's `templates/`. Raises jinja2.UndefinedError for a value that is missing."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, undefined=jinja2.StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,

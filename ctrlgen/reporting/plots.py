@@ -1,4 +1,4 @@
-"""Pictures of a solution, as SVG: path, forces, temperatures, drives, margins, stage force law, Bode."""
+"""Figures of a solution as SVG: path, forces, temperatures, drives, margins, stage force law, workspace."""
 
 from __future__ import annotations
 
@@ -22,7 +22,14 @@ from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.workspace import Ball, Workspace
 
-COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")  # colour-blind safe, a pair per stage
+COLOURS = (
+    "#0072b2",
+    "#56b4e9",
+    "#d55e00",
+    "#e69f00",
+    "#009e73",
+    "#7fc97f",
+)  # safe for the colour-blind, a pair per stage
 STYLE: dict[Any, Any] = {
     "font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.color": "#e6e6e6", "axes.edgecolor": "#666666", "axes.axisbelow": True, "legend.frameon": False,
@@ -32,7 +39,7 @@ STYLE: dict[Any, Any] = {
 
 
 def svg(figure: Figure) -> str:
-    """The figure as SVG text without a date, the same for the same input."""
+    """The figure as SVG text without a date: the same for the same figure, which is closed."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "ctrlgen"})
     plt.close(figure)
@@ -41,7 +48,7 @@ def svg(figure: Figure) -> str:
 
 
 def draw_all(solution: Solution) -> dict[str, str]:
-    """Every figure that this solution has something to show in: name -> SVG text."""
+    """Every figure that applies to this solution: name -> SVG text."""
     drawings: dict[str, Callable[[Solution], Figure]] = {"margins": draw_margins}
     state = solution.model.signals.get("state")
     signals = {"forces": "force", f"{state.name if state else 'state'}s": "state", "drives": "drive"}
@@ -61,7 +68,7 @@ def draw_all(solution: Solution) -> dict[str, str]:
 
 
 def draw_path(solution: Solution) -> Figure:
-    """The two channels that move most: commanded path, modelled samples, and the error against time."""
+    """The two translations that move most: commanded path, modelled samples, and the error over time."""
     signal = solution.model.signals["pose"]
     reached, command = solution.trace.signals["pose"], solution.command
     lengths = [i for i, unit in enumerate(signal.units) if unit == "um"]
@@ -129,7 +136,7 @@ def draw_signal(solution: Solution, role: str) -> Figure:
 
 
 def draw_margins(solution: Solution) -> Figure:
-    """How much of each limit's range is left at the closest approach."""
+    """The share of each limit's range that is left where the solution comes closest to it."""
     shown = [m for m in solution.margins if m.share is not None]
     figure, axes = plt.subplots(figsize=(8.2, 0.5 + 0.42 * len(shown)))
     for row, margin in enumerate(shown):
@@ -148,7 +155,7 @@ def draw_margins(solution: Solution) -> Figure:
     axes.invert_yaxis()
     axes.set_xlim(0, 150)
     axes.set_xticks(range(0, 101, 20))
-    axes.set_xlabel("range left at the closest approach [%]")
+    axes.set_xlabel("range left where the limit is approached most [%]")
     return figure
 
 
@@ -176,14 +183,13 @@ def draw_stage_force(solution: Solution) -> Figure:
 
 
 def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) -> Figure:
-    """Slices of the workspace in two channels, one outline a base pose, the side view through the ball, and the ball itself."""
+    """Slices of the workspace, one outline per base pose, with the side view through the ball and the ball itself."""
     signal = workspace.model.signals["pose"]
     x, y, *third = workspace.drawn
     figure, panels = plt.subplots(1, 1 + len(third), figsize=(8.6, 4.2) if third else (4.8, 4.2), squeeze=False)
     for base, colour in zip(bases, COLOURS[::2], strict=False):
-        named = third or [x]
-        value = from_si(base[named[0]], signal.units[named[0]])
-        label = f"{signal.channels[named[0]]} = {value:.4g} {signal.units[named[0]]}"
+        k = third[0] if third else x  # the channel that tells the slices apart
+        label = f"{signal.channels[k]} = {from_si(base[k], signal.units[k]):.4g} {signal.units[k]}"
         _fill(panels[0][0], workspace, base, x, y, colour, label)
     for up in third:
         _fill(panels[0][1], workspace, ball.centre, x, up, COLOURS[0], "through the ball's centre")

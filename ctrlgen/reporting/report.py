@@ -1,4 +1,4 @@
-"""Solution and comparison -> summary.json, trajectory.csv, figures and one self-contained report.html."""
+"""The report of a solution and its comparison: summary.json, trajectory.csv, figures, one self-contained report.html."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ CSV_SIGNALS = ("pose", "displacement", "force", "state", "power")
 
 
 def write_trajectory(solution: Solution, path: Path) -> None:
-    """trajectory.csv: time, pose, displacement, force, temperature, power, each column with its unit.
+    """Writes trajectory.csv: time, pose, displacement, force, temperature, power, each column with its unit.
 
-    Row k holds the state at time k and the power that acts from there to the next row. A device driven
-    in volts has its voltage columns last.
+    Row k holds the state at sample k and the power that acts from there to sample k + 1. The drive's columns come last
+    where the drive is not the power.
     """
     signals = solution.model.signals
     roles = [role for role in CSV_SIGNALS if role in signals]
@@ -92,7 +92,7 @@ def summary(
 
 
 def passed(comparison: Comparison | None, expected: tuple[ExpectationResult, ...]) -> bool:
-    """Whether everything that was checked is in tolerance."""
+    """Whether every expectation and every comparison that was made is within tolerance."""
     return (comparison is None or comparison.passed) and all(e.passed for e in expected)
 
 
@@ -108,7 +108,7 @@ def _margin(m: Margin, solution: Solution) -> dict[str, Any]:
 
 
 def worst_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """One row per comparison and signal: its worst build, for tables short enough to read."""
+    """The worst build of each arithmetic, comparison and signal: a table short enough to read."""
     groups: dict[tuple[str, str, str, str], list[Any]] = defaultdict(list)
     for row in comparison.rows:
         groups[(row.build.split()[1], row.what, row.signal, row.unit)].append(row)
@@ -130,7 +130,7 @@ def write_report(
     c: CFolder | None,
     figures: dict[str, str],
 ) -> None:
-    """Everything a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html.
+    """Writes what a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html.
 
     `figures`: name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives.
     """

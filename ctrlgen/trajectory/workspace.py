@@ -21,17 +21,17 @@ from ctrlgen.model.simulation import simulate
 BISECTIONS = 60  # beyond double precision of the first step
 BALL_TOLERANCE = 1e-6  # of a ball's radius: how far its worst point may stick out
 END_TOLERANCE = 1e-4  # of the distance to an end of the workspace: how far it may be off
-HEIGHTS = (10e-6, 20e-6, 30e-6)  # m
-SETTLED = 1e6  # s; longer than any actuator remembers
-MOST_ROUNDS = 400  # of tangent planes before giving up
+HEIGHTS = (10e-6, 20e-6, 30e-6)  # m, of the slices of a platform with three translations
+SETTLED = 1e6  # s; longer than any actuator's memory
+MOST_ROUNDS = 400  # of tangent planes before the search is given up
 RANDOM_DIRECTIONS = 400  # beside the axes, for the first tangent planes
-WORST_DIRECTIONS = 40  # in which a ball sticks out most, turned along the gradient
-TURNS = 8  # times
+WORST_DIRECTIONS = 40  # in which a ball sticks out most: these are turned along the gradient
+TURNS = 8  # gradient steps of each
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball inside the workspace, in typical sizes of the pose: `centre` SI, `radius` in those sizes."""
+    """A ball inside the workspace in some `channels` of the pose: `centre` [SI], `radius` in typical sizes of the channels."""
 
     centre: np.ndarray
     radius: float
@@ -40,13 +40,13 @@ class Ball:
 
 @dataclass(frozen=True)
 class Workspace:
-    """Equilibria of one model; poses are rows (n, channels) in SI."""
+    """The poses in which one model can be held in equilibrium; poses are rows (n, channels) in SI."""
 
     model: Model
 
     @cached_property
     def drawn(self) -> tuple[int, ...]:
-        """The channels of a picture: two across, and one upward where there is a third; translations come first."""
+        """The channels that are drawn: two horizontal ones, and a vertical one where there is a third; translations first."""
         units = self.model.signals["pose"].units
         order = sorted(range(len(units)), key=lambda i: not same_dimension(units[i], "m"))
         return tuple(order[:3])
@@ -57,10 +57,10 @@ class Workspace:
         return tuple(i for i, unit in enumerate(self.model.signals["pose"].units) if same_dimension(unit, "m"))
 
     def bases(self) -> list[np.ndarray]:
-        """Poses at which a platform is usually looked at: some heights, or where it settles at the middle of its drives.
+        """Poses through which slices are drawn by default: some heights, or the pose at the middle of all drives.
 
-        Heights 10, 20 and 30 um of the third translation. Without one: the middle pose, and halfway from it to both
-        ends of the third channel. Raises InputError when the drives have no bounds.
+        Heights are 10, 20 and 30 um of the third translation. Without a third one: the pose at the middle of the drives, and
+        those halfway from it to both ends of the third channel. Raises InputError where the drives have no bounds.
         """
         if len(self.translations) >= 3:
             poses = np.zeros((len(HEIGHTS), len(self.model.signals["pose"].channels)))
@@ -68,7 +68,10 @@ class Workspace:
             return list(poses)
         low, high = self.model.u_bounds
         if not np.isfinite(low + high).all():
-            raise InputError(self.model.name, [Fault("--at", "is needed: the drives have no middle")])
+            raise InputError(
+                self.model.name,
+                [Fault("--at", "is needed, for some drive has no bounds and so no middle; give a pose")],
+            )
         middle = simulate(self.model, (low + high)[None] / 2, SETTLED).signals["pose"][-1]
         if len(self.drawn) < 3:
             return [middle]
@@ -79,7 +82,7 @@ class Workspace:
 
     @cached_property
     def _excess(self) -> ca.Function:
-        """pose -> (largest normalised violation, its gradient): negative inside, zero on the boundary."""
+        """pose -> the largest violation of a limit over its range, and its gradient; negative inside, zero on the boundary."""
         m = self.model
         inverse = Controller(m, "pose", None).static
         pose = ca.SX.sym("pose", len(m.signals["pose"].channels))
@@ -101,24 +104,29 @@ class Workspace:
         return ca.Function("excess", [pose], [worst, ca.gradient(worst, pose)])
 
     def excess(self, poses: np.ndarray) -> np.ndarray:
-        """Largest normalised violation of each pose (n, channels): below zero where it can be held."""
+        """The largest violation of a limit in each pose, over the limit's range, (n,): negative where the pose can be held."""
         value = self._excess.map(len(poses))(poses.T)[0].full().ravel()
-        return np.where(np.isnan(value), np.inf, value)  # far outside, the actuator's square root has no value
+        return np.where(
+            np.isnan(value), np.inf, value
+        )  # far outside, the square root of an actuator's law has no value
 
     def holds(self, pose: np.ndarray) -> bool:
         """Whether one pose can be held."""
         return bool(self.excess(pose[None])[0] <= 0)
 
     def reach(self, base: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """How far (n,) the workspace goes from an inner pose `base` along each of `directions` (n, channels).
+        """Multiples (n,) of each of `directions` (n, channels) at which a ray from the inner pose `base` leaves the workspace.
 
-        Raises InputError when `base` itself cannot be held.
+        By doubling, then bisection. Raises InputError where `base` itself cannot be held.
         """
         if not self.holds(base):
-            raise InputError(self.model.name, [Fault("base pose", "cannot be held; choose one inside the workspace")])
+            raise InputError(
+                self.model.name,
+                [Fault("base pose", "cannot be held within the device's limits; choose one inside the workspace")],
+            )
         size = np.linalg.norm(directions / np.array(self.model.signals["pose"].scale), axis=1)
         low, high = np.zeros(len(directions)), 1.0 / size
-        for _ in range(BISECTIONS):  # first out, doubling, then in
+        for _ in range(BISECTIONS):  # doubled until the pose is outside
             inside = self.excess(base + high[:, None] * directions) <= 0
             if not inside.any():
                 break
@@ -130,13 +138,13 @@ class Workspace:
         return low
 
     def ranges(self, base: np.ndarray) -> np.ndarray:
-        """(channels, 2): how far each pose component alone goes below and above `base`, SI, as values of the component."""
+        """Lowest and highest value [SI] of each pose component when it alone leaves `base`, (channels, 2)."""
         axes = np.vstack([-np.eye(len(base)), np.eye(len(base))])
         far = self.reach(base, axes)
         return np.column_stack([base - far[: len(base)], base + far[len(base) :]])
 
     def outline(self, base: np.ndarray, first: int, second: int, points: int = 720) -> np.ndarray:
-        """(points, 2): boundary of the slice through `base` in two channels, in SI, other channels as in `base`."""
+        """Boundary [SI] of the slice through `base` in the channels `first` and `second`, (points, 2); others as in `base`."""
         scale = np.array(self.model.signals["pose"].scale)
         angle = 2 * np.pi * np.arange(points) / points
         directions = np.zeros((points, len(base)))
@@ -144,40 +152,41 @@ class Workspace:
         return (base + self.reach(base, directions)[:, None] * directions)[:, [first, second]]
 
     def extent(self, inside: np.ndarray) -> np.ndarray:
-        """(channels, 2): how far each pose component goes below and above anywhere in the workspace, SI.
+        """Lowest and highest value [SI] of each pose component anywhere in the workspace, (channels, 2).
 
-        Linear programmes over tangent planes, to END_TOLERANCE of the way from the pose `inside`, which must be held.
+        By linear programmes over tangent planes, to END_TOLERANCE of the distance from the pose `inside`, which must be held.
+        Raises InputError where `inside` cannot be held, or after too many rounds.
         """
         from scipy.optimize import linprog  # a quarter of a second to import, which no other command should wait for
 
         n = len(inside)
         planes = _Planes(self, inside, tuple(range(n)))
-        planes.cut(planes.heart + planes.directions)
+        planes.cut(planes.origin + planes.directions)
         ends = np.zeros((n, 2))
         for i in range(n):
             for side, sign in enumerate((-1.0, 1.0)):
                 for _ in range(MOST_ROUNDS):
-                    found = linprog(-sign * np.eye(n)[i], *planes.rows(), bounds=(None, None))
-                    if planes.cut(found.x[None])[0] >= 1 - END_TOLERANCE:
+                    optimum = linprog(-sign * np.eye(n)[i], *planes.rows(), bounds=(None, None))
+                    if planes.cut(optimum.x[None])[0] >= 1 - END_TOLERANCE:
                         break
                 else:
-                    raise self._gave_up("the ends were not found")
-                ends[i, side] = found.x[i] * planes.scale[i]
+                    raise self._not_found("its ends were")
+                ends[i, side] = optimum.x[i] * planes.scale[i]
         return ends
 
     def ball(self, inside: np.ndarray, channels: tuple[int, ...]) -> Ball:
-        """The largest ball, in typical sizes, in the given `channels`; the others stay as in the pose `inside`.
+        """The largest ball in the given `channels`, in their typical sizes; the others stay as in the pose `inside`.
 
-        Tangent planes enclose the convex set; the largest ball inside the planes (a linear programme)
-        is tried, and wherever it sticks out a plane is added. Reference: J. E. Kelley, J. SIAM 8 (1960) 703.
-        Raises InputError when `inside` cannot be held.
+        Tangent planes enclose the convex set; the largest ball inside the planes (a linear programme) is tried, and wherever
+        it sticks out of the set a plane is added. Reference: J. E. Kelley, J. SIAM 8 (1960) 703.
+        Raises InputError where `inside` cannot be held, or after too many rounds.
         """
         from scipy.optimize import linprog
 
         planes = _Planes(self, inside, channels)
 
-        def protruding(centre: np.ndarray, radius: float) -> np.ndarray:
-            """All directions, and the forty in which the ball sticks out most, turned along the gradient."""
+        def checked_directions(centre: np.ndarray, radius: float) -> np.ndarray:
+            """All directions, and those in which the ball sticks out most, turned along the gradient."""
             turned = planes.directions[
                 np.argsort(-self.excess(planes.poses(centre + radius * planes.directions)))[:WORST_DIRECTIONS]
             ]
@@ -186,33 +195,34 @@ class Workspace:
                 turned = np.where(good[:, None], slope / np.where(good, size, 1.0)[:, None], turned)
             return np.vstack([planes.directions, turned])
 
-        planes.cut(planes.heart + planes.directions)
+        planes.cut(planes.origin + planes.directions)
         for _ in range(MOST_ROUNDS):
             normals, offsets = planes.rows()
             bounds = [(None, None)] * len(channels) + [(0, None)]
             with_radius = np.column_stack([normals, np.ones(len(normals))])
             best = linprog([0.0] * len(channels) + [-1.0], with_radius, offsets, bounds=bounds)
             centre, radius = best.x[:-1], best.x[-1]
-            surface = centre + radius * protruding(centre, radius)
+            surface = centre + radius * checked_directions(centre, radius)
             out = self.excess(planes.poses(centre + (surface - centre) * (1 - BALL_TOLERANCE))) > 0
             if not out.any():
                 return Ball(planes.poses(centre[None])[0], float(radius), tuple(channels))
             planes.cut(surface[out])
-        raise self._gave_up("the ball was not found")
+        raise self._not_found("its largest ball was")
 
-    def _gave_up(self, what: str) -> InputError:
-        return InputError(
-            self.model.name, [Fault("workspace", f"{what} in {MOST_ROUNDS} rounds; choose another pose to start")]
+    def _not_found(self, what: str) -> InputError:
+        fault = Fault(
+            "workspace", f"{what} not found in {MOST_ROUNDS} rounds of tangent planes; start from another pose"
         )
+        return InputError(self.model.name, [fault])
 
 
 class _Planes:
-    """Tangent planes that enclose the workspace in some `channels`, seen from a pose `inside`; points in typical sizes."""
+    """Tangent planes that enclose the workspace in some `channels` around a pose `inside`; points in typical sizes."""
 
     def __init__(self, workspace: Workspace, inside: np.ndarray, channels: tuple[int, ...]) -> None:
         self._workspace, self._inside, self._chosen = workspace, inside, list(channels)
         self.scale = np.array(workspace.model.signals["pose"].scale)[self._chosen]
-        self.heart = inside[self._chosen] / self.scale
+        self.origin = inside[self._chosen] / self.scale
         n = len(self._chosen)
         directions = np.vstack([np.eye(n), -np.eye(n), np.random.default_rng(0).normal(size=(RANDOM_DIRECTIONS, n))])
         self.directions = directions / np.linalg.norm(directions, axis=1)[:, None]
@@ -220,27 +230,27 @@ class _Planes:
         self._offsets: list[float] = []
 
     def poses(self, points: np.ndarray) -> np.ndarray:
-        """Whole poses of points, which have the chosen channels only; both as rows."""
+        """Whole poses [SI] of points, which have the chosen channels only; both as rows."""
         poses = np.tile(self._inside, (len(points), 1))
         poses[:, self._chosen] = points * self.scale
         return poses
 
     def slope(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Gradient of the excess at points, its size, and where that can be used."""
+        """Gradient of the violation at points, its length, and where both are usable."""
         gradient = self._workspace._excess.map(len(points))(self.poses(points).T)[1].full().T
         slope = gradient[:, self._chosen] * self.scale
         size = np.linalg.norm(slope, axis=1)
         return slope, size, np.isfinite(size) & (size > 0)
 
     def cut(self, toward: np.ndarray) -> np.ndarray:
-        """A tangent plane where the ray from the heart to each of `toward` leaves the set; which share of the way that is."""
+        """Adds a tangent plane where the ray from the inner pose to each of `toward` leaves the set; gives the multiples (n,)."""
         far = self._workspace.reach(self._inside, self.poses(toward) - self._inside)
-        edge = self.heart + far[:, None] * (toward - self.heart)
+        edge = self.origin + far[:, None] * (toward - self.origin)
         slope, size, good = self.slope(edge)
         self._normals.extend(slope[good] / size[good, None])
         self._offsets.extend(np.sum(slope * edge, axis=1)[good] / size[good])
         return far
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """A, b of the planes A x <= b."""
+        """A and b of the planes A x <= b."""
         return np.array(self._normals), np.array(self._offsets)
