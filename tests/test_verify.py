@@ -140,7 +140,10 @@ def broken(build: Build) -> dict[str, tuple[Build, str]]:
     stopped = Stopped("Cortex-M7", "zig 0.13", Real.DOUBLE, "f did not return within 10 s on the emulated core")
     return {
         "bits": (replace(build, in_loop=InLoop((off,), (), ())), "3 of 500 numbers differ"),
-        "memory": (replace(build, in_loop=InLoop((replace(run, writable=4),), (), ())), "4 bytes of static writable memory"),
+        "memory": (
+            replace(build, in_loop=InLoop((replace(run, writable=4),), (), ())),
+            "4 bytes of static writable memory",
+        ),
         "stopped": (replace(build, in_loop=InLoop((run,), (stopped,), ())), "f did not return within 10 s"),
         "tolerance": (
             replace(build, comparison=replace(build.comparison, rows=(replace(row, worst=2.0, first=3),))),
