@@ -1,4 +1,4 @@
-"""Where a motion turns between two samples: what a law of play or friction remembers, and the samples miss."""
+"""The displacement at which a motion reverses between two samples, which laws with memory need and samples miss."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import casadi as ca
 import numpy as np
 
 
-def turned_at(s: SimpleNamespace, before: ca.SX, velocity_before: ca.SX) -> ca.SX:
-    """The displacement at which the motion turned since the sample before; the present one where it did not turn.
+def reversal_point(s: SimpleNamespace, before: ca.SX, velocity_before: ca.SX) -> ca.SX:
+    """The displacement at which the motion reversed since the last sample; the present displacement where it did not.
 
-    With the velocity straight from v_0 to v_1 over h: d* = d_0 + h v_0^2/(2 (v_0 - v_1)), and the same from the end; the
-    mean of both. Where the velocity or the time between samples is not known, the samples are all there is.
+    For a velocity that changes linearly from v_0 to v_1 within h: d* = d_0 + h v_0^2/(2 (v_0 - v_1)), the mean of this from
+    either end. Without a velocity or a sample time, it is the present displacement.
     """
     if s.velocity is None or not s.sample_time or not np.isfinite(s.sample_time):
         return s.displacement

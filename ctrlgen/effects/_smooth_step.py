@@ -1,4 +1,4 @@
-"""Something that happens at one moment and lasts: the shape that several effects share."""
+"""A smooth step in time: the shape of an event that happens once and lasts."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import casadi as ca
 from ctrlgen.effects import Param, State
 
 WHEN = (
-    Param("moment", "s", (-1e6, 1e6), "middle of its rise"),
-    Param("rise", "s", (1e-4, 1.0), "time it takes"),
+    Param("moment", "s", (-1e6, 1e6), "time of the middle of the step"),
+    Param("rise", "s", (1e-4, 1.0), "duration of the step"),
 )
 CLOCK = (State("t", "s", 1.0, clock=True),)
 
 
 def smooth_step(s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
-    """(1 + tanh(pi (t - t_0)/T))/2 from 0 to 1, t from the common zero of the records' clock.
+    """e(t) = (1 + tanh(pi (t - t_0)/T))/2, from 0 to 1; t counts from the common zero of the records' clock.
 
-    It spreads in time as a straight rise from t_0 - T/2 to t_0 + T/2 does: 4 % are there at its begin, 96 % at its end.
-    Of a rise that is shorter than a sample records tell the middle alone.
+    It has the spread in time of a linear ramp from t_0 - T/2 to t_0 + T/2: 4 % at the ramp's start, 96 % at its end. Of a step
+    shorter than a sample, a recording shows the middle only.
     """
     return (1 + ca.tanh(ca.pi * (s.t - p.moment) / p.rise)) / 2

@@ -6,7 +6,7 @@ from ctrlgen.effects import Effect, Param, Place
 class AbbeArm(Effect):
     """Delta y = a theta: the arm a between sensor and point times the rotation `of`.
 
-    First order: the error is a theta^2/2. Holds for angles below 50 mrad.
+    Holds for angles below 50 mrad: first order, the neglected part is a theta^2/2.
     """
 
     place = Place.SENSOR

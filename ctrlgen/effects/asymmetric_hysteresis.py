@@ -8,17 +8,17 @@ from ctrlgen.effects import Effect, Param, Place, State
 class AsymmetricHysteresis(Effect):
     """F = -k z w', w(d) = d + a (sqrt(d^2 + L^2) - L), w' = 1 + a d/sqrt(d^2 + L^2), dz = dw (1 - sgn(dw) z/r).
 
-    Dahl's law in the warped displacement w, L the typical travel. As F dd = -k z dw it dissipates as Dahl's does.
+    Dahl's law in the warped displacement w; L is the typical travel. F dd = -k z dw, so it dissipates as Dahl's law does.
     Holds for reversals farther apart than a sample.
     """
 
     place = Place.FORCE
     requires = frozenset({"force"})
-    source = "P. R. Dahl, AIAA Journal 14 (1976) 1675; the warp is ours"
+    source = "P. R. Dahl, AIAA Journal 14 (1976) 1675; the warped displacement is our extension"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal at home", off=0.0),
-        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles"),
-        Param("skew", "1", (-0.95, 0.95), "a: how much stronger far on the positive side"),
+        Param("reach", "travel", (1e-3, 5.0), "travel over which the force settles"),
+        Param("skew", "1", (-0.95, 0.95), "a: relative excess of stiffness far on the positive side"),
     )
     states = (State("z", "travel", 0.1, stepped=True), State("w", "travel", 1.0, stepped=True))
 

@@ -8,7 +8,7 @@ from ctrlgen.effects import Effect, Param, Place
 class AsymmetricViscous(Effect):
     """Delta F = -(c |v| + |c| v)/2: damping |c| forward only (c > 0) or backward only (c < 0).
 
-    It always dissipates. Holds beside the damping of the device; the slope in c at 0 leaves out -|c| v/2, which that takes up.
+    It always dissipates. Holds for a device that has damping of its own, which takes up the part -|c| v/2 of the derivative by c.
     """
 
     place = Place.FORCE

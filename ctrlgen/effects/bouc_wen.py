@@ -8,8 +8,8 @@ from ctrlgen.effects import Effect, Param, Place, State
 class BoucWen(Effect):
     """F = -k z, dz = dd (1 - (b sgn(dd z) + 1 - b) |z|/r), n = 1; b = beta/(beta + gamma), r = 1/(beta + gamma).
 
-    Solved exactly over the way from sample to sample, hence independent of rate; z is at most r. It dissipates
-    for every b in its bounds. b = 1/2 unloads straight, b = 1 is Dahl's law. Holds for reversals farther apart than a sample.
+    Solved exactly over each step of the displacement, hence rate-independent; |z| is at most r. It dissipates for every b
+    within its bounds. b = 1/2 unloads linearly, b = 1 is Dahl's law. Holds for reversals farther apart than a sample.
     """
 
     place = Place.FORCE
@@ -17,8 +17,8 @@ class BoucWen(Effect):
     source = "Y. K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249; R. Bouc (1967)"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
-        Param("reach", "travel", (1e-3, 5.0), "travel in which the force settles"),
-        Param("loop", "1", (0.55, 1.0), "share b of the law that depends on direction"),
+        Param("reach", "travel", (1e-3, 5.0), "travel over which the force settles"),
+        Param("loop", "1", (0.55, 1.0), "b: share of the law that depends on the direction"),
     )
     states = (State("z", "travel", 0.1, stepped=True), State("d", "travel", 1.0, stepped=True))
 

@@ -1,4 +1,4 @@
-"""A sensor that is not straight: the first even term of its nonlinearity."""
+"""A sensor with curvature: the first even term of its nonlinearity."""
 
 from ctrlgen.effects import Effect, Param, Place
 
@@ -7,7 +7,7 @@ class Bow(Effect):
     """Delta y = b y^2. Holds while the sensor's nonlinearity is a few per cent of the reading."""
 
     place = Place.SENSOR
-    order = -1  # a scale is off before it is read: fringes count in what it says
+    order = -1  # before `cyclic`: the fringes of a bent scale are counted along the bent scale
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
     params = (Param("curvature", "1/channel", (-0.3, 0.3), "nonlinearity per reading squared", off=0.0),)
 

@@ -4,7 +4,7 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class Coupling(Effect):
-    """Delta d_i = g d_j: a share of the travel of the axis `of`. Holds for nested or parallel stages, first order."""
+    """Delta d_i = g d_j: a share of the travel of the axis `of`. Holds to first order, for nested or parallel stages."""
 
     place = Place.DISPLACEMENT
     pairs = True

@@ -2,13 +2,13 @@
 
 from ctrlgen.effects import Effect, Param, Place, State
 
-RATIO = 4.0  # of the two relaxation times: between them lie two octaves, which a mixture of both spans evenly
+RATIO = 4.0  # slow over fast relaxation time: two octaves, which a mixture of the two covers evenly
 
 
 class Creep(Effect):
-    """dz/dt = (d - z)/tau, dw/dt = (d - w)/(4 tau), Delta d = g ((1 - s) z + s w): a chain of two relaxations.
+    """dz/dt = (d - z)/tau, dw/dt = (d - w)/(4 tau), Delta d = g ((1 - s) z + s w): two relaxations in series with the spring.
 
-    Holds for holds between 0.1 tau and 10 tau; s = 0 is one relaxation alone. Over more decades creep is logarithmic.
+    Holds for dwells of 0.1 tau to 10 tau; s = 0 is a single relaxation. Over more decades use `log_creep`.
     """
 
     place = Place.DISPLACEMENT
@@ -18,7 +18,7 @@ class Creep(Effect):
     params = (
         Param("gain", "1", (0.0, 1.0), "extra travel after infinite time, per travel", off=0.0),
         Param("tau", "s", (1e-3, 1e5), "relaxation time"),
-        Param("slow", "1", (0.0, 0.5), "s: part of it that takes four times as long"),
+        Param("slow", "1", (0.0, 0.5), "s: share that relaxes four times as slowly"),
     )
     states = (State("z", "travel", 1.0), State("w", "travel", 1.0))
 

@@ -8,10 +8,10 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class Cyclic(Effect):
-    """Delta y = A sin(2 pi y/Lambda + phi). One harmonic; use several for a distorted one.
+    """Delta y = A sin(2 pi y/Lambda + phi). One harmonic; a distorted error takes several effects.
 
     Holds for A below Lambda/2 pi, so that the reading still rises with the position, and where a period fits into the
-    travel: part of a longer one is an offset, a gain and a bow. Of positions and angles alone.
+    travel: part of a longer one is an offset, a gain and a bow. For positions and angles only.
     """
 
     place = Place.SENSOR

@@ -6,9 +6,9 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class DeadZone(Effect):
-    """Delta u = -(sqrt((u + w)^2 + e^2) - sqrt((u - w)^2 + e^2))/2, e = r w: nothing well inside +-w, w less outside.
+    """Delta u = -(sqrt((u + w)^2 + e^2) - sqrt((u - w)^2 + e^2))/2, e = r w: zero well inside +-w, reduced by w outside.
 
-    r rounds the corners: 0.03 for contacts that open, one for an electronic crossover. Holds for w well below the largest drive.
+    r rounds the corners: 0.03 for contacts that open, 1 for an electronic crossover. Holds for w well below the largest drive.
     """
 
     place = Place.DRIVE
@@ -16,7 +16,7 @@ class DeadZone(Effect):
     source = "G. Tao, P. V. Kokotovic, IEEE Trans. Autom. Control 39 (1994) 59: plants with unknown dead-zones"
     params = (
         Param("width", "channel", (0.0, 0.5), "half width", off=0.0),
-        Param("rounding", "1", (0.01, 5.0), "of the corners, in widths"),
+        Param("rounding", "1", (0.01, 5.0), "r: rounding of the corners, in widths"),
     )
 
     def term(self, s, p):

@@ -6,9 +6,9 @@ from ctrlgen.effects import Effect, Param, Place, State
 
 
 class Degradation(Effect):
-    """Delta u = -r T (1 - exp(-t/T)) u, t from the common zero of the records' clock: at first r a second, r T in the end.
+    """Delta u = -r T (1 - exp(-t/T)) u, t from the common zero of the records' clock: r per second at first, r T in the end.
 
-    T far beyond the records is a steady loss. Holds while the loss is below 0.3.
+    With T far beyond the recording the loss grows steadily. Holds while the loss is below 0.3.
     """
 
     place = Place.DRIVE
@@ -16,7 +16,7 @@ class Degradation(Effect):
     source = "R. Isermann, Fault-Diagnosis Systems (2006): incipient faults"
     params = (
         Param("rate", "1/s", (-0.1, 0.1), "relative loss per time, at first", off=0.0),
-        Param("levels_off", "s", (0.3, 1e6), "T: when the loss comes to its end"),
+        Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off"),
     )
     states = (State("t", "s", 1.0, clock=True),)
 

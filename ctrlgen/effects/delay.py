@@ -1,4 +1,4 @@
-"""A reading that reports what was some time ago."""
+"""A reading that is late by a fixed time."""
 
 import casadi as ca
 
@@ -9,10 +9,10 @@ EVERY = range(SAMPLES + 1)
 
 
 class Delay(Effect):
-    """Delta y(t) = y(t - tau) - y(t), by the polynomial of fourth degree through value and slope at both samples and the
-    curvature just after the older one (third degree and the neighbours' slope where the motion does not give them).
+    """Delta y(t) = y(t - tau) - y(t), by the quartic polynomial through value and slope at both neighbouring samples
+    and the second derivative just after the older one; where the motion gives no derivatives, by a cubic with slopes from samples.
 
-    Holds up to five samples (longer delays count as five) and below a fifth of the sampling rate.
+    Holds up to five samples (a longer delay counts as five) and for frequencies below a fifth of the sampling rate.
     """
 
     place = Place.SENSOR
@@ -29,7 +29,7 @@ class Delay(Effect):
     def term(self, s, p):
         h, total = s.sample_time, 0.0
         D = ca.fmin(p.delay / h, SAMPLES)
-        for k in EVERY[:-1]:  # from sample k, w = 0, back to sample k + 1, w = 1
+        for k in EVERY[:-1]:  # w from 0 at sample k, counted backwards, to 1 at sample k + 1
             near, old = ([getattr(s, f"{name}{j}") for name in "yrc"] for j in (k, k + 1))
             w, slope = D - k, h * near[1]
             gap, turn = old[0] - near[0] + slope, slope - h * old[1]

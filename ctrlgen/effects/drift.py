@@ -4,10 +4,10 @@ from ctrlgen.effects import Effect, Param, Place, State
 
 
 class Drift(Effect):
-    """Delta y = r t, t from the common zero of the records' clock. Holds over times short against what drifts."""
+    """Delta y = r t, t from the common zero of the records' clock. Holds over times short against the time constant of what drifts."""
 
     place = Place.SENSOR
-    order = -1  # what warms or sags moves along the path: fringes count it
+    order = -1  # before `cyclic`: what drifts moves the target along the fringes
     source = "definition"
     params = (Param("rate", "channel/s", (-1.0, 1.0), "drift per time", off=0.0),)
     states = (State("t", "s", 1.0, clock=True),)

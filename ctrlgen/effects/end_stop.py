@@ -1,4 +1,4 @@
-"""A stage that touches something."""
+"""A stage that runs into a stop."""
 
 import casadi as ca
 
@@ -8,20 +8,20 @@ from ctrlgen.effects import Effect, Param, Place
 class EndStop(Effect):
     """Delta F = -k x^2/(x + e) (1 + x/e)^(n - 1), x = d - gap where positive; on the negative side for gap < 0.
 
-    n = 1 is a spring k, n = 1.5 Hertz's contact of a ball. e, a thousandth of the typical travel, rounds the corner and is
-    where k counts. Exactly nothing before contact. Holds for elastic contact.
+    n = 1 is a spring of stiffness k, n = 1.5 Hertz's contact of a ball. e, a thousandth of the typical travel, rounds the corner;
+    k is the stiffness at that depth. Exactly zero before contact. Holds for elastic contact.
     """
 
     place = Place.FORCE
     requires = frozenset({"force"})
-    source = "K. L. Johnson, Contact Mechanics (1985), eq. (4.23): Hertz; its corner rounded"
+    source = "K. L. Johnson, Contact Mechanics (1985), eq. (4.23): Hertz; the corner is rounded"
     params = (
-        Param("stiffness", "channel/travel", (0.0, 1e3), "stiffness of the stop at first", off=0.0),
+        Param("stiffness", "channel/travel", (0.0, 1e3), "stiffness of the stop at first contact", off=0.0),
         Param(
             "gap",
             "travel",
             (-10.0, 10.0),
-            "where it stands",
+            "displacement at which the stop stands",
         ),
         Param("power", "1", (1.0, 2.0), "n: how the force grows with the depth"),
     )

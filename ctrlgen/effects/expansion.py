@@ -1,10 +1,13 @@
-"""Beams whose expansion, or stiffness, changes with temperature otherwise than the model says."""
+"""Beams whose thermal expansion, or stiffness, depends on temperature differently from the model."""
 
 from ctrlgen.effects import Effect, Param, Place
 
 
 class Expansion(Effect):
-    """Delta F = a (T - T_rest) F: thermal expansion that grows by a per kelvin. Holds for a (T - T_rest) below 0.3."""
+    """Delta F = a (T - T_rest) F: thermal expansion whose coefficient grows by the share a per kelvin.
+
+    Holds for a (T - T_rest) below 0.3.
+    """
 
     place = Place.FORCE
     requires = frozenset({"state"})

@@ -1,12 +1,12 @@
-"""Rotations that are not infinitesimal: links turn as the mechanism moves, its Jacobian is not the one at home."""
+"""Finite rotations of the links: as the mechanism moves, its Jacobian is no longer the one at home."""
 
 from ctrlgen.effects import Effect, Param, Place
 
 
 class FiniteRotation(Effect):
-    """Delta pose = g pose_2(d): the second order of the loop closure of links of constant length, g = 1 for pivots at their ends.
+    """Delta pose = g pose_2(d): second order of the loop closure for links of constant length; g = 1 for ideal pivots at their ends.
 
-    Holds for travel far below the links' length; what is left is (d/l)^2 of the motion.
+    Holds for travel d far below the links' length l; the neglected third order is (d/l)^2 of the motion.
     """
 
     place = Place.POSE

@@ -1,4 +1,4 @@
-"""A heater whose resistance changes as it gets hot, under an amplifier set for the cold one."""
+"""A heater whose resistance changes with temperature, driven by an amplifier that was set for the cold heater."""
 
 from ctrlgen.effects import Effect, Param, Place
 
@@ -6,7 +6,7 @@ from ctrlgen.effects import Effect, Param, Place
 class HeaterResistance(Effect):
     """R = R_0 (1 + a (T - T_rest)) at given voltage: Delta P = P (1/(1 + a (T - T_rest)) - 1).
 
-    Holds for 1 + a (T - T_rest) > 0: metals and doped silicon up to 800 K. At given current a has the other sign, to first order.
+    Holds for 1 + a (T - T_rest) > 0: metals and doped silicon up to 800 K. For a given current the sign of a is reversed, to first order.
     """
 
     place = Place.HEAT

@@ -1,15 +1,15 @@
 """Hysteresis of many small slipping contacts."""
 
 from ctrlgen.effects import Effect, Param, Place, State
-from ctrlgen.effects._play_operators import followed, lagging, names
-from ctrlgen.effects._reversal_points import turned_at
+from ctrlgen.effects._play_operators import play_names, updated_plays, weighted_lag
+from ctrlgen.effects._reversal_points import reversal_point
 
 
 class Hysteresis(Effect):
     """F = -k sum_j w_j e_j, j = 1..8: springs that slip at r_j = r j/8, e_j = d - (play of d with radius r_j).
 
-    w_j ~ j^-q, sum w_j = 1: all alike for q = 0, more of the small ones for q > 0. Prandtl-Ishlinskii with stop
-    operators (Iwan, Maxwell slip): independent of rate, dissipates. Holds for congruent loops.
+    w_j ~ j^-q, sum w_j = 1: equal weights for q = 0, more weight on the small radii for q > 0. Prandtl-Ishlinskii with stop
+    operators (Iwan, Maxwell slip): rate-independent, dissipates. Holds for congruent loops.
     """
 
     place = Place.FORCE
@@ -17,18 +17,18 @@ class Hysteresis(Effect):
     source = "W. D. Iwan, J. Appl. Mech. 33 (1966) 893; K. Kuhnen, Eur. J. Control 9 (2003) 407"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
-        Param("reach", "travel", (1e-3, 5.0), "travel at which all slip"),
-        Param("taper", "1", (-1.0, 2.0), "q: how much more of the small ones"),
+        Param("reach", "travel", (1e-3, 5.0), "r: travel after which all springs slip"),
+        Param("taper", "1", (-1.0, 2.0), "q: weight of the small radii over the large ones"),
     )
     states = (
-        *(State(name, "travel", 1.0, stepped=True) for name in names()),
+        *(State(name, "travel", 1.0, stepped=True) for name in play_names()),
         State("d", "travel", 1.0, stepped=True),
         State("v", "travel/s", 100.0, stepped=True),
     )
 
     def term(self, s, p):
-        return -p.stiffness * lagging(s, s.displacement, p.taper)
+        return -p.stiffness * weighted_lag(s, s.displacement, p.taper)
 
     def update(self, s, p):
         new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
-        return new | followed(s, [turned_at(s, s.d, s.v), s.displacement], p.reach)
+        return new | updated_plays(s, [reversal_point(s, s.d, s.v), s.displacement], p.reach)

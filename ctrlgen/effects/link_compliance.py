@@ -1,10 +1,10 @@
-"""A joint or strut that gives way: the platform tilts when it is moved."""
+"""A compliant joint or strut: the platform tilts when it moves."""
 
 from ctrlgen.effects import Effect, Param, Place
 
 
 class LinkCompliance(Effect):
-    """Delta theta = c delta: the joint's moment, in proportion to the motion `of`, over its stiffness. Holds to first order."""
+    """Delta theta = c delta: the joint's moment, proportional to the motion `of`, over its stiffness. Holds to first order."""
 
     place = Place.POSE
     pairs = True

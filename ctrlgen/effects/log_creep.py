@@ -1,16 +1,16 @@
-"""Creep that is as much in every decade of time."""
+"""Creep by the same amount in every decade of time."""
 
 import casadi as ca
 
 from ctrlgen.effects import Effect, Param, Place, State
 
-TIMES = tuple(10 ** (j / 2) for j in range(9))  # of relaxation, per shortest one
+TIMES = tuple(10 ** (j / 2) for j in range(9))  # relaxation times per shortest one
 
 
 class LogCreep(Effect):
     """dz_j/dt = (d - z_j)/(10^(j/2) tau), Delta d = g/2 sum_j w_j z_j, w_j = min(max(2 D - j, 0), 1), j = 0..8.
 
-    After a step d g (log10(t/tau) + 1/2) from 3 tau to 10^(D - 1.5) tau, within 3 % of a decade's, and D d g in the end.
+    After a step d: g d (log10(t/tau) + 1/2) from 3 tau to 10^(D - 1.5) tau, to 3 % of one decade's creep; D g d in the end.
     Holds from tau to 10^4 tau.
     """
 
@@ -19,7 +19,7 @@ class LogCreep(Effect):
     params = (
         Param("gain", "1", (0.0, 0.1), "extra travel per decade of time, per travel", off=0.0),
         Param("tau", "s", (1e-3, 1e2), "shortest relaxation time"),
-        Param("decades", "1", (1.0, 4.5), "D: after so many it ends"),
+        Param("decades", "1", (1.0, 4.5), "D: decades after which it ends"),
     )
     states = tuple(State(f"z{j}", "travel", 1.0) for j in range(len(TIMES)))
 

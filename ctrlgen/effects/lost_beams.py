@@ -1,4 +1,4 @@
-"""Beams, or a winding, that break at a moment."""
+"""Beams, or a winding, that break at one moment."""
 
 from ctrlgen.effects import Effect, Param, Place
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
@@ -11,7 +11,7 @@ class LostBeams(Effect):
     requires = frozenset({"actuator", "force"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): abrupt faults"
     params = (
-        Param("share", "1", (0.0, 1.0), "part of the force that is lost", off=0.0),
+        Param("share", "1", (0.0, 1.0), "share of the force that is lost", off=0.0),
         *WHEN,
     )
     states = CLOCK

@@ -1,12 +1,12 @@
-"""A lever that gives way under the force it carries."""
+"""A lever that bends under the force it transmits."""
 
 from ctrlgen.effects import Effect, Param, Place
 
 
 class LostMotion(Effect):
-    """Delta d = -c F, F the force that the stage takes at d. The lever bends by c F before the stage moves.
+    """Delta d = -c F, F is the force that the stage takes at d: the lever bends by c F before the stage moves.
 
-    On a stage with constant stiffness the same as a lever ratio; on one that stiffens it grows along the stroke.
+    On a stage of constant stiffness it equals a wrong lever ratio; on one that stiffens it grows along the stroke.
     Holds for elastic levers and c F below a tenth of d.
     """
 

@@ -1,12 +1,12 @@
-"""A sensor, or its filter, that comes late."""
+"""A sensor, or its filter, of limited bandwidth."""
 
 from ctrlgen.effects import Effect, Param, Place, State
 
 
 class LowPass(Effect):
-    """tau dw/dt = v, tau dv/dt = y - w - 2 D v, Delta y = g (w - y): g = 1 a second-order filter, below it a slow part only.
+    """tau dw/dt = v, tau dv/dt = y - w - 2 D v, Delta y = g (w - y): g = 1 is a second-order filter; below, only that share is filtered.
 
-    D below one rings, D = 1/sqrt 2 is Butterworth's, a large D is one pole with time constant 2 D tau. Holds where
+    D < 1 rings, D = 1/sqrt(2) is Butterworth's, a large D is a single pole of time constant 2 D tau. Holds where
     the sampling resolves tau.
     """
 
@@ -14,9 +14,9 @@ class LowPass(Effect):
     order = 2
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
     params = (
-        Param("share", "1", (-0.5, 1.5), "part of the reading that is filtered", off=0.0),
-        Param("tau", "s", (1e-4, 1e2), "one over the corner [rad/s]"),
-        Param("damping", "1", (0.3, 20.0), "D"),
+        Param("share", "1", (-0.5, 1.5), "share of the reading that is filtered", off=0.0),
+        Param("tau", "s", (1e-4, 1e2), "one over the corner frequency in rad/s"),
+        Param("damping", "1", (0.3, 20.0), "D: damping ratio"),
     )
     states = (State("w", "channel", 1.0), State("v", "channel", 1.0))
 

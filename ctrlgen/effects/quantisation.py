@@ -1,4 +1,4 @@
-"""A converter, counter or encoder of coarse steps."""
+"""A converter, counter or encoder of coarse resolution."""
 
 import casadi as ca
 
@@ -16,8 +16,8 @@ class Quantisation(Effect):
     order = 4
     source = "B. Widrow, I. Kollar, Quantization Noise (2008)"
     params = (
-        Param("share", "1", (0.0, 1.5), "1 where every reading is rounded", off=0.0),
-        Param("quantum", "channel", (1e-7, 1.0), "step"),
+        Param("share", "1", (0.0, 1.5), "1: every reading is rounded", off=0.0),
+        Param("quantum", "channel", (1e-7, 1.0), "q: step"),
     )
 
     def term(self, s, p):

@@ -1,4 +1,4 @@
-"""The measured point stands above the one that turns: it sinks and runs round as the platform tilts."""
+"""The measured point stands above the centre of rotation: it moves on a sphere as the platform tilts."""
 
 import casadi as ca
 
@@ -6,16 +6,16 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class RaisedPoint(Effect):
-    """Delta delta = theta x (theta x h)/2, h = (0, 0, h): the second order of a point's way on its sphere.
+    """Delta delta = theta x (theta x h)/2, h = (0, 0, h): second order of the point's motion on its sphere.
 
-    Holds for angles below 0.1 rad. The first order, theta x h, is an Abbe arm.
+    Holds for angles below 0.1 rad. The first order, theta x h, is `abbe_arm`.
     """
 
     place = Place.POSE
     requires = frozenset({"spatial"})
     channel_unit = "m"
     source = "R. M. Murray, Z. Li, S. S. Sastry, Robotic Manipulation (1994), chapter 2: Rodrigues' formula"
-    params = (Param("height", "mm", (-500.0, 500.0), "how far above", off=0.0),)
+    params = (Param("height", "mm", (-500.0, 500.0), "h: height above the centre of rotation", off=0.0),)
 
     def term(self, s, p):
         turn, arm = s.all[:3], ca.vertcat(0, 0, p.height)

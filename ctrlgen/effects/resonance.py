@@ -6,9 +6,9 @@ from ctrlgen.effects import Effect, Param, Place, State
 
 
 class Resonance(Effect):
-    """q'' = w^2 (d - q) + 2 zeta w (d' - q'), Delta F = k (q - d) + 2 zeta k/w (q' - d'), w = 2 pi f: k/w^2 is its mass.
+    """q'' = w^2 (d - q) + 2 zeta w (d' - q'), Delta F = k (q - d) + 2 zeta k/w (q' - d'), w = 2 pi f; its mass is k/w^2.
 
-    Memories q and p = q'/w. Holds for one mode; sampling must resolve f.
+    States q and p = q'/w. Holds for one mode; the sampling must resolve f.
     """
 
     place = Place.FORCE
@@ -16,7 +16,7 @@ class Resonance(Effect):
     source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: two degrees of freedom"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "spring of the second mass", off=0.0),
-        Param("frequency", "Hz", (0.5, 2e3), "with the stage held"),
+        Param("frequency", "Hz", (0.5, 2e3), "resonance with the stage held"),
         Param("damping", "1", (1e-3, 1.0), "damping ratio"),
     )
     states = (State("q", "travel", 1.0), State("p", "travel", 1.0))

@@ -4,13 +4,13 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class Reversed(Effect):
-    """Delta u = -2 g u: the other sign for g = 1. Holds as a whole number: below 1/2 it is a weak drive,
-    which `drive_gain` says better."""
+    """Delta u = -2 g u: the sign is reversed for g = 1. Holds for g = 1 only: for g < 1/2 it is a weak drive,
+    which is `drive_gain`."""
 
     place = Place.DRIVE
     requires = frozenset({"actuator", "bipolar"})
     source = "definition"
-    params = (Param("share", "1", (0.0, 1.2), "1 where the sign is wrong", off=0.0),)
+    params = (Param("share", "1", (0.0, 1.2), "1: the sign is reversed", off=0.0),)
 
     def term(self, s, p):
         return -2 * p.share * s.value

@@ -1,4 +1,4 @@
-"""An amplifier that gives out below its stated limit."""
+"""An amplifier that saturates below its stated limit."""
 
 import casadi as ca
 
@@ -8,19 +8,20 @@ from ctrlgen.effects import Effect, Param, Place
 class Saturation(Effect):
     """Delta u = g (c(u) - u), c(u) = (sqrt((u + L)^2 + e^2) - sqrt((u - L)^2 + e^2))/2, e = L/200: u, but at most L.
 
-    g = 1 clips. The corner is e wide, so that the slope exists; above L the drive can no longer be told from the force.
+    g = 1 clips. The corner is e wide, so that the derivative exists. Above L the
+    drive cannot be recovered from what is delivered. Holds for a limit that is the same in both directions.
     """
 
     place = Place.DRIVE
     requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): actuator faults; smooth form ours"
     params = (
-        Param("share", "1", (0.0, 1.5), "1 where nothing above the level is delivered", off=0.0),
+        Param("share", "1", (0.0, 1.5), "1: nothing above the level is delivered", off=0.0),
         Param(
             "level",
             "channel",
             (0.01, 1.0),
-            "drive that is not exceeded",
+            "L: drive that is not exceeded",
         ),
     )
 

@@ -4,7 +4,7 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class Stiffening(Effect):
-    """E = k_3 d^4/4, hence Delta F = -k_3 d^3 on the bar. Holds for d below the flexure's thickness.
+    """E = k_3 d^4/4, hence Delta F = -k_3 d^3 on the actuator bar. Holds for d below the flexure's thickness.
 
     A negative k_3 is softening.
     """

@@ -4,7 +4,7 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class Stiffness(Effect):
-    """E = k d^2/2, hence Delta F = -k d on the bar. Holds for d below the flexure's thickness."""
+    """E = k d^2/2, hence Delta F = -k d on the actuator bar. Holds for d below the flexure's thickness."""
 
     place = Place.FORCE
     requires = frozenset({"force"})

@@ -1,4 +1,4 @@
-"""A reading that is off beyond a place of its path: a scale of two pieces, a range switched, a quadrant taken for another."""
+"""A reading that is off beyond one position: a scale of two pieces, a switched range, a wrong quadrant."""
 
 import casadi as ca
 
@@ -6,19 +6,18 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class StitchingError(Effect):
-    """Delta y = b (1 + tanh(2 (y - y_0)/w))/2: nothing before y_0, b beyond, changing over the width w.
+    """Delta y = b (1 + tanh(2 (y - y_0)/w))/2: zero before y_0, b beyond, changing over the width w.
 
-    Holds for b below w in size where it is against the motion, so that the reading still rises; of positions and angles
-    alone.
+    Holds for b > -w, so that the reading still rises with the position; for positions and angles only.
     """
 
     place = Place.SENSOR
     channel_unit = ("m", "rad")
     source = "definition"
     params = (
-        Param("offset", "channel", (-0.1, 0.1), "error beyond the place", off=0.0),
-        Param("position", "channel", (-2.0, 2.0), "place where it sets in"),
-        Param("width", "channel", (1e-4, 0.05), "path over which it does"),
+        Param("offset", "channel", (-0.1, 0.1), "b: error beyond the position", off=0.0),
+        Param("position", "channel", (-2.0, 2.0), "y_0: position at which it sets in"),
+        Param("width", "channel", (1e-4, 0.05), "w: width over which it sets in"),
     )
 
     @classmethod

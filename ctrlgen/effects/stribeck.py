@@ -6,9 +6,9 @@ from ctrlgen.effects import Effect, Param, Place, State
 
 
 class Stribeck(Effect):
-    """dz/dt = (v - |v| z/g(v))/r, Delta F = -f z, g = 1 + (b - 1) exp(-(v/v_s)^2): b f breaks it away, f is left at speed.
+    """dz/dt = (v - |v| z/g(v))/r, Delta F = -f z, g = 1 + (b - 1) exp(-(v/v_s)^2): breakaway force b f, f at speed.
 
-    LuGre's law, its bristles without damping. Holds for lubricated guides.
+    The LuGre model without bristle damping. Holds for lubricated guides.
     """
 
     place = Place.FORCE
@@ -17,9 +17,9 @@ class Stribeck(Effect):
     source = "C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, eqs. (1)-(4)"
     params = (
         Param("force", "channel", (0.0, 1.0), "force of sliding at speed", off=0.0),
-        Param("breakaway", "1", (1.0, 5.0), "b: force that breaks it away, per force of sliding"),
-        Param("speed", "travel/s", (1e-3, 1e3), "v_s, where the excess is gone"),
-        Param("reach", "travel", (1e-6, 0.03), "way in which the contact yields"),
+        Param("breakaway", "1", (1.0, 5.0), "b: breakaway force per sliding force at speed"),
+        Param("speed", "travel/s", (1e-3, 1e3), "v_s: Stribeck speed, above which the excess has decayed"),
+        Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
     )
     states = (State("z", "1", 1.0),)
 

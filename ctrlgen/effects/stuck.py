@@ -1,17 +1,17 @@
-"""A dead channel: it reports a number, whatever happens."""
+"""A dead channel: it reports one number, whatever the motion."""
 
 from ctrlgen.effects import Effect, Param, Place
 
 
 class Stuck(Effect):
-    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Holds for one that is dead all the time."""
+    """Delta y = -s (y - y_0), s = 1 for a channel that stands at y_0. Holds for a channel that is dead throughout."""
 
     place = Place.SENSOR
     order = 4
     source = "R. Isermann, Fault-Diagnosis Systems (2006): sensor faults"
     params = (
-        Param("share", "1", (0.0, 1.2), "1 where nothing of the motion is seen", off=0.0),
-        Param("level", "channel", (-1e3, 1e3), "what is reported"),
+        Param("share", "1", (0.0, 1.2), "1: nothing of the motion is read", off=0.0),
+        Param("level", "channel", (-1e3, 1e3), "y_0: what is reported"),
     )
 
     def term(self, s, p):

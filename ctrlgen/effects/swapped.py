@@ -4,7 +4,7 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class Swapped(Effect):
-    """Delta u_i = g (u_j - u_i) and Delta u_j = g (u_i - u_j), exchanged for g = 1. Holds as a whole number: in between it is
+    """Delta u_i = g (u_j - u_i) and Delta u_j = g (u_i - u_j), exchanged for g = 1. Holds for g = 1 only: in between it is
     crosstalk of the leads."""
 
     place = Place.DRIVE
@@ -13,7 +13,7 @@ class Swapped(Effect):
     requires = frozenset({"actuator"})
     partner_unit = "channel"
     source = "definition"
-    params = (Param("share", "1", (0.0, 1.2), "1 where the two are exchanged", off=0.0),)
+    params = (Param("share", "1", (0.0, 1.2), "1: the two are exchanged", off=0.0),)
 
     def term(self, s, p):
         return p.share * (s.all[s.partner] - s.value)

@@ -4,18 +4,18 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class TemperatureSensitivity(Effect):
-    """Delta y = c (T - T_0), T the rise of the surroundings, T_0 the rise at which home was set.
+    """Delta y = c (T - T_0), T the rise of the surroundings' temperature, T_0 its value when home was set.
 
     Holds for changes slow against the instrument's thermal time constant.
     """
 
     place = Place.SENSOR
-    order = -1  # what warms or sags moves along the path: fringes count it
+    order = -1  # before `cyclic`: what drifts moves the target along the fringes
     requires = frozenset({"ambient"})
     source = "definition"
     params = (
-        Param("slope", "channel/K", (-10.0, 10.0), "reading per rise of the surroundings", off=0.0),
-        Param("reference", "K", (-30.0, 30.0), "rise at which the reading is right"),
+        Param("slope", "channel/K", (-10.0, 10.0), "change of the reading per kelvin of the surroundings", off=0.0),
+        Param("reference", "K", (-30.0, 30.0), "rise at which the reading is right, T_0"),
     )
 
     def term(self, s, p):

@@ -1,4 +1,4 @@
-"""One line of vibration in what is read."""
+"""A vibration of one frequency in the reading."""
 
 import casadi as ca
 
@@ -8,15 +8,15 @@ from ctrlgen.effects import Effect, Param, Place, State
 class Vibration(Effect):
     """Delta y = A sin(2 pi f t + phi), t from the common zero of the records' clock.
 
-    Holds for a steady source, such as mains or a pump; one line at a time.
+    Holds for a steady source, such as mains or a pump; one frequency an effect.
     """
 
     place = Place.SENSOR
     source = "definition"
     params = (
-        Param("amplitude", "channel", (-1.0, 1.0), "of the line", off=0.0),
-        Param("frequency", "Hz", (1e-3, 1e5), "of the line"),
-        Param("phase", "deg", (-360.0, 360.0), "at time zero"),
+        Param("amplitude", "channel", (-1.0, 1.0), "amplitude of the vibration", off=0.0),
+        Param("frequency", "Hz", (1e-3, 1e5), "frequency of the vibration"),
+        Param("phase", "deg", (-360.0, 360.0), "phase at time zero"),
     )
     states = (State("t", "s", 1.0, clock=True),)
 
