@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import ctrlgen.effects  # noqa: F401  fills the library
+from ctrlgen.diagnosis.hypotheses.priors import prior_of
 from ctrlgen.effects import Effect
 
 PARAMETERS = [(kind, p) for kind, law in Effect.library.items() for p in law.params]
@@ -26,14 +27,16 @@ def test_an_amplitude_goes_as_far_either_way_or_one_way_alone(law):
 @every_parameter
 def test_what_is_tried_lies_inside_the_bounds_and_rises_or_falls(kind, p):
     low, high = p.bounds
-    assert low < high and all(low <= value <= high for value in p.grid)
-    steps = np.sign(np.diff(p.grid))
+    tried = prior_of(Effect.library[kind]).of(p).start_values
+    assert low < high and all(low <= value <= high for value in tried)
+    steps = np.sign(np.diff(tried))
     assert len(set(steps)) <= 1
 
 
 @every_parameter
-def test_what_is_expected_or_usual_lies_inside_the_bounds_around_its_middle(kind, p):
-    for ends in (p.expected, p.usual):
+def test_a_fixed_or_plausible_range_lies_inside_the_bounds_around_one(kind, p):
+    prior = prior_of(Effect.library[kind]).of(p)
+    for ends in (prior.fixed_range, prior.plausible_range):
         if ends:
             assert p.bounds[0] <= ends[0] < ends[1] <= p.bounds[1]
             assert sum(ends) / 2 == pytest.approx(1.0)  # of a whole: it is so, or it is not

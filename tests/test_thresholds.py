@@ -43,8 +43,8 @@ def weighing(n_fit: int = N, n_held: int = N, known: bool = True, trial=None) ->
 class Numbers(SimpleNamespace):
     """Numbers of a device, then those of its causes."""
 
-    def usual(self, unknown) -> tuple[float, float] | None:
-        return self.usually
+    def plausible_range(self, unknown) -> tuple[float, float] | None:
+        return self.plausible
 
 
 def number(cause: int | None = None, low=0.0, high=1.0) -> FreeParameter:
@@ -52,11 +52,11 @@ def number(cause: int | None = None, low=0.0, high=1.0) -> FreeParameter:
 
 
 def trial(
-    gone=0.0, held=0.0, numbers=1, penalty=0.0, price=0.0, causes=(), rarity=0.0, theta=None, sd=0.01, n=N, usual=None
+    gone=0.0, held=0.0, numbers=1, penalty=0.0, price=0.0, causes=(), odds=0.0, theta=None, sd=0.01, n=N, plausible=None
 ):
     """A fit that leaves `gone` squares beyond the noise, `held` beyond it held out."""
     unknowns = tuple(number(None if i == 0 else 0) for i in range(numbers))
-    structure = Numbers(unknowns=unknowns, causes=causes, rarity=rarity, usually=usual, device=None)
+    structure = Numbers(unknowns=unknowns, causes=causes, log_prior_odds=odds, plausible=plausible, device=None)
     objective = n + gone
     fit = SimpleNamespace(
         structure=structure, objective=objective, chi2=objective - penalty, penalty=penalty, n=n,
@@ -161,10 +161,10 @@ def test_what_a_cause_must_show_is_its_size_or_where_the_device_hides_it_its_pri
     assert weighing(10_000).required_z2(trial(penalty=30.0), screened) == 16.0
 
 
-def test_the_price_of_a_structure_is_half_of_bics_logarithm_twice_and_its_rarity():
+def test_the_price_of_a_structure_is_half_of_bics_logarithm_twice_less_twice_its_prior_odds():
     w = weighing()
     w.fitter.held_out = lambda fit: 1234.0
-    found = w.scored(trial(50.0, numbers=3, rarity=2.3).fit, None)
+    found = w.scored(trial(50.0, numbers=3, odds=-2.3).fit, None)
     assert found.held_out_deviance == 1234.0 and found.complexity_penalty == pytest.approx(2 * np.log(N) + 2 * 2.3)
     few = weighing(1)
     few.fitter.held_out = lambda fit: 0.0
@@ -191,14 +191,14 @@ def test_where_either_explains_all_that_was_fitted_a_quarter_of_what_is_held_out
 
 def test_among_equals_the_plainer_is_named():
     w = weighing()
-    best, rare, plain = trial(0.0, N), trial(0.0, N, rarity=2.0), trial(0.0, N + 200, rarity=-1.0)
+    best, rare, plain = trial(0.0, N), trial(0.0, N, odds=-2.0), trial(0.0, N + 200, odds=1.0)
     assert w.most_parsimonious([rare, best]) is best and w.most_parsimonious([best, rare]) is best
     assert w.most_parsimonious([best, plain]) is plain  # 200/2 squares are within a quarter of 1000/2, or not:
     assert (
         w.advantage(best, trial(0.0, N + 300)) > 0
-        and w.most_parsimonious([best, trial(0.0, N + 300, rarity=-1.0)]) is best
+        and w.most_parsimonious([best, trial(0.0, N + 300, odds=1.0)]) is best
     )
-    assert w.most_parsimonious([best, trial(0.0, N + 200, rarity=-1.0, numbers=2)]) is best  # with more numbers
+    assert w.most_parsimonious([best, trial(0.0, N + 200, odds=1.0, numbers=2)]) is best  # with more numbers
 
 
 @pytest.mark.parametrize("value, means", [(0.5, True), (1 - 2e-6, True), (1 - 5e-7, False), (5e-7, True), (1.0, False)])
@@ -217,8 +217,8 @@ def test_an_amplitude_at_a_bound_that_is_not_off_means_nothing_either():
 
 
 @pytest.mark.parametrize("value, means", [(0.79, False), (0.81, True), (1.19, True), (1.21, False)])
-def test_an_amplitude_that_is_not_usual_is_something_else(value, means):
-    t = trial(numbers=2, causes=(GAIN,), theta=[0.5, value], usual=(0.8, 1.2))
+def test_an_amplitude_that_is_not_plausible_is_something_else(value, means):
+    t = trial(numbers=2, causes=(GAIN,), theta=[0.5, value], plausible=(0.8, 1.2))
     t.fit.structure.unknowns = (number(), number(0, high=2.0))
     assert weighing().physically_meaningful(t) == means
 
