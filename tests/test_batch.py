@@ -108,7 +108,7 @@ def test_a_list_says_all_its_faults(tmp_path):
         "none.toml does not exist",
         "nothing matches 'c*'",
         "nothing matches 'nowhere'",
-        "table--run would be",
+        "would have the result folder table--run",
     ):
         assert part in str(caught.value), part
 

@@ -1,1 +1,1 @@
-"""What a user starts: the command line, the whole job of a scenario, batches."""
+"""What a user starts: the command line, the pipeline of a scenario, batches of diagnoses, examples."""

@@ -1,13 +1,13 @@
-"""Many recordings, one diagnosis each: a list in, a folder with one result folder a recording and a table out.
+"""Batch diagnosis: from a list of recordings, one result folder per diagnosis and a table of all.
 
     seed = 0                              # optional
     [[job]]
     device = "devices/stage.toml"         # paths as seen from this file
-    recordings = ["runs/*", ["a", "b"]]   # every match is a diagnosis of its own; a list in the list is joined to one
-    name = "stage"                        # optional: begin of the result folders' names, the device file's by default
+    recordings = ["runs/*", ["a", "b"]]   # a diagnosis for each match; the recordings of an inner list are joined
+    name = "stage"                        # optional: what the result folders' names begin with, else the device file's name
 
-A result folder appears whole when its diagnosis is done. What is there already, made from the same files by the same
-version, is not made again: a batch that was stopped goes on where it was.
+A result folder appears whole when its diagnosis is done. A result made before from the same files by the same version is
+kept: a batch that was stopped continues where it was.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from ctrlgen.core.parallel import Failure, run_all
 from ctrlgen.devices.section import Section
 from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests
 
-MADE_FROM = "made_from.json"  # in each result folder
+MADE_FROM = "made_from.json"  # in each result folder: what the result depends on
 TABLE = "results.csv"
 
 Progress = Callable[[int, int], None]
 
 
 class JobTable(Section):
-    """One [[job]] as written."""
+    """One [[job]] of the list."""
 
     device: str
     recordings: Annotated[tuple[str | tuple[str, ...], ...], Field(min_length=1)]
@@ -46,7 +46,7 @@ class JobTable(Section):
 
 
 class BatchFile(Section):
-    """The list as written."""
+    """The schema of the list."""
 
     seed: int = 0
     job: Annotated[tuple[JobTable, ...], Field(min_length=1)]
@@ -54,7 +54,7 @@ class BatchFile(Section):
 
 @dataclass(frozen=True)
 class Task:
-    """One diagnosis: `name` of its result folder, its files, and what decides its result."""
+    """One diagnosis: the `name` of its result folder, its files, and the other inputs of its result."""
 
     name: str
     device: str
@@ -63,12 +63,12 @@ class Task:
     replicates: int = 0
 
     def made_from(self) -> dict[str, Any]:
-        """What the result depends on. Raises InputError where a file cannot be read."""
-        found = digests(Path(self.device), [Path(r) for r in self.recordings])
-        return {"version": __version__, "seed": self.seed, "replicates": self.replicates, "files": found}
+        """Everything the result depends on, files as their SHA-256. Raises InputError where a file cannot be read."""
+        hashes = digests(Path(self.device), [Path(r) for r in self.recordings])
+        return {"version": __version__, "seed": self.seed, "replicates": self.replicates, "files": hashes}
 
     def __call__(self) -> dict[str, bytes]:
-        """The files of the result folder by their names; nothing is written but in a temporary folder."""
+        """The content of the result folder by file name; it is made in a temporary folder."""
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "result"
             replicates = Replicates(self.replicates, jobs=0) if self.replicates else None
@@ -79,7 +79,10 @@ class Task:
 
 @dataclass(frozen=True)
 class BatchRow:
-    """One line of the table. `state`: "done", "done before" or "failed" (then `error` says why)."""
+    """One line of the table: `state` is "done", "done before" or "failed", and then `error` says why.
+
+    `before`, `after`, `noise`: held-out error [`unit`] of the `channel` whose error is largest beside its noise.
+    """
 
     name: str
     state: str
@@ -94,7 +97,7 @@ class BatchRow:
 
 
 def load_batch(path: Path | str, seed: int | None = None, replicates: int = 0) -> tuple[Task, ...]:
-    """The diagnoses that a list asks for. Raises InputError with every fault."""
+    """The diagnoses that the list at `path` asks for. Raises InputError with every fault of the list."""
     path = Path(path)
     written = validate(BatchFile, read_toml(path), path)
     tasks, faults = [], []
@@ -112,7 +115,10 @@ def load_batch(path: Path | str, seed: int | None = None, replicates: int = 0) -
     names = [task.name for task in tasks]
     for name in sorted({n for n in names if names.count(n) > 1}):
         faults.append(
-            Fault("job", f"{name} would be the result folder of {names.count(name)} diagnoses; give each job a name")
+            Fault(
+                "job",
+                f"{names.count(name)} diagnoses would have the result folder {name}; give each job a name of its own",
+            )
         )
     if faults:
         raise InputError(path, faults)
@@ -120,12 +126,12 @@ def load_batch(path: Path | str, seed: int | None = None, replicates: int = 0) -
 
 
 def _groups(job: JobTable, folder: Path) -> Iterator[list[Path] | Fault]:
-    """The recordings that belong to one diagnosis each; a fault for what is not there."""
+    """The recordings of each diagnosis; a fault for each text that matches nothing."""
     for given in job.recordings:
         matches = [_matches(folder, text) for text in ((given,) if isinstance(given, str) else given)]
         for text, found in zip((given,) if isinstance(given, str) else given, matches, strict=True):
             if not found:
-                yield Fault("", f"nothing matches {text!r}")
+                yield Fault("", f"nothing matches {text!r}; name a folder with a recording.toml, or the file itself")
         if isinstance(given, str):
             yield from ([path] for path in matches[0])
         elif all(matches):
@@ -133,7 +139,7 @@ def _groups(job: JobTable, folder: Path) -> Iterator[list[Path] | Fault]:
 
 
 def _matches(folder: Path, text: str) -> list[Path]:
-    """Folders and .toml files; a pattern takes of folders only those with a recording."""
+    """The folders and .toml files that `text` names; of the folders that match a pattern, those with a recording."""
     if not re.search(r"[*?\[]", text):
         return [folder / text] if (folder / text).exists() else []
     found = sorted(Path("/").glob(text[1:]) if text.startswith("/") else folder.glob(text))
@@ -151,9 +157,9 @@ def run_batch(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[BatchRow, ...]:
-    """Every diagnosis into its folder in `out`, and the table results.csv, which is kept up with every one.
+    """Runs every diagnosis into its folder in `out`; results.csv is rewritten after each.
 
-    Where it runs is `ctrlgen.core.parallel`'s business; only this process writes. A diagnosis that fails is a row that says
+    `ctrlgen.core.parallel` decides where they run; only this process writes. A diagnosis that fails gives a row that says
     why. Raises InputError where `out` cannot be written or the scheduler does not answer.
     """
     out, rows = Path(out), {}
@@ -189,7 +195,7 @@ def _work(task: Task) -> dict[str, bytes]:
 
 
 def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Failure, out: Path) -> BatchRow:
-    """The result written whole into its folder, as a row."""
+    """Writes the result as a whole folder; its row."""
     if isinstance(result, Failure):
         return BatchRow(task.name, "failed", error=_one_line(result.what))
     try:
@@ -198,7 +204,7 @@ def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Fail
                 (draft / name).parent.mkdir(parents=True, exist_ok=True)
                 (draft / name).write_bytes(content)
             (draft / MADE_FROM).write_text(json.dumps(made_from, indent=1) + "\n", encoding="utf-8")
-    except InputError as error:  # somebody else's files stand there
+    except InputError as error:  # the folder holds files that are not ours
         return BatchRow(task.name, "failed", error=_one_line(str(error)))
     return _row(task.name, "done", result["diagnosis.json"])
 
@@ -211,7 +217,7 @@ def _is_there(folder: Path, made_from: dict[str, Any]) -> bool:
 
 
 def _row(name: str, state: str, content: bytes) -> BatchRow:
-    """A line of the table from a diagnosis.json: the channel whose error is largest beside its noise."""
+    """The row of a diagnosis.json, with the channel whose error is largest beside its noise."""
     found = json.loads(content)
     causes = "; ".join(f"{f['effect']} at {f['location']}" for f in found["findings"])
 
@@ -230,7 +236,7 @@ def _one_line(text: str) -> str:
 
 
 def _write_table(tasks: Sequence[Task], rows: dict[str, BatchRow], out: Path) -> None:
-    """results.csv: a line for every diagnosis that is done, was done before or failed."""
+    """Writes results.csv: a line for every diagnosis that is done, was done before or failed."""
     text = io.StringIO()
     table = csv.DictWriter(
         text, [f for f in BatchRow.__dataclass_fields__ if f != "state"], lineterminator="\n", extrasaction="ignore"

@@ -1,4 +1,4 @@
-"""Command line: every command, and one clear message for everything that can go wrong."""
+"""The command line: it registers every command and turns every error into one message and an exit status."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ for command in app.registered_commands:  # typer keeps a docstring's line breaks
 
 
 def execute(check: Callable[[], None] = lambda: None) -> int:
-    """Parses and runs the command line; the exit status, with one clear message for everything that can go wrong.
+    """Parses and runs the command line; the exit status. Every error is reported in one message on standard error.
 
-    `check` is called before each stage of long work and raises KeyboardInterrupt when that should end.
+    `check` is called before each step of long work and raises KeyboardInterrupt where the work is to end.
     """
     try:
         CHECK.set(check)

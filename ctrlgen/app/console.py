@@ -1,4 +1,4 @@
-"""What the command line shows: tables, progress, and one clear message for what went wrong."""
+"""Console output of the commands: tables, progress bars, one message per error."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def show_table(table: Table) -> None:
 
 
 def print_recording(recording: Recording) -> None:
-    """What the gate lets through, record by record, and its notes."""
+    """The validated records, with the number of samples marked not valid, and the notes."""
     out.print(f"{recording.title}: {', '.join(recording.channels)}", markup=False, soft_wrap=True)
     table = table_of(("record", "left"), ("role", "left"), ("samples", "right"), ("marked", "right"))
     for record in recording.records:
@@ -162,7 +162,7 @@ def print_recording(recording: Recording) -> None:
 
 
 def print_diagnosis(found: Diagnosis) -> None:
-    """The verdict, what was found, and the held-out errors."""
+    """The verdict, the findings and the held-out errors of a diagnosis."""
     from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, number, sentence
 
     out.print(f"[bold]{escape(sentence(found))}[/bold]", soft_wrap=True)
@@ -189,7 +189,7 @@ def print_diagnosis(found: Diagnosis) -> None:
 
 
 def print_reproduced(rows: Sequence[PrintedNumber]) -> None:
-    """Printed, ours, status and why, number by number."""
+    """The printed numbers of the papers beside ours: status and reason."""
     from ctrlgen.reproduce.row import ReproductionStatus
 
     colours = {
@@ -213,7 +213,7 @@ def print_reproduced(rows: Sequence[PrintedNumber]) -> None:
 
 
 def print_bootstrap(found: Bootstrap) -> None:
-    """Percentile intervals, and how often a finding vanished."""
+    """The percentile interval of each number, and how often a finding vanished."""
     from ctrlgen.diagnosis.report.narrative import interval
 
     out.print(f"bootstrap: {found.replicates} replicates; {found.note}", markup=False, soft_wrap=True)
@@ -228,7 +228,7 @@ def print_bootstrap(found: Bootstrap) -> None:
 
 
 def print_batch(rows: Sequence[BatchRow]) -> None:
-    """One line a diagnosis, then what failed and why."""
+    """One line per diagnosis, then the failures with their reasons."""
     from ctrlgen.diagnosis.report.narrative import number
 
     errors: tuple[Column, ...] = (("before", "right"), ("after", "right"), ("noise", "right"))
@@ -249,7 +249,7 @@ def print_batch(rows: Sequence[BatchRow]) -> None:
 
 @contextmanager
 def counted(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error for work whose pieces are counted."""
+    """A progress bar on standard error for work whose pieces are counted; each call says how many of how many are done."""
     check = CHECK.get()
     columns = (
         SpinnerColumn(),
@@ -270,7 +270,7 @@ def counted(what: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def progress(stages: int | None = None) -> Iterator[Any]:
-    """A progress bar on standard error, none where nobody knows how many stages come; each call names the next one."""
+    """A progress bar on standard error, or a spinner where the number of steps is not known; each call names the next."""
     check = CHECK.get()
     bar_column = () if stages is None else (BarColumn(),)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), *bar_column, TimeElapsedColumn())
@@ -285,18 +285,18 @@ def progress(stages: int | None = None) -> Iterator[Any]:
 
 
 def complain(error: CtrlgenError) -> None:
-    """One clear message on standard error."""
+    """The message of an error on standard error."""
     err.print("[bold red]error[/bold red]: ", end="")
     err.print(str(error), markup=False, soft_wrap=True)
 
 
 def show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """One line without the place in our code, which tells a user nothing."""
+    """A warning in one line, without its place in our code, which tells a user nothing."""
     err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
 
 
 def print_workspace(found: pipeline.WorkspaceSummary) -> None:
-    """Ranges of every channel at some poses and anywhere, the largest balls, and the sizes that scale these."""
+    """The range of every channel at some poses and anywhere, the largest balls, and the typical sizes they are given in."""
     signal_ = found.workspace.model.signals["pose"]
     named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
 

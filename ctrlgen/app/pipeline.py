@@ -1,4 +1,4 @@
-"""The whole job: solve a scenario, generate its C, compare, report; nothing appears unless all of it is there."""
+"""The pipeline of a scenario: solve, generate its C, compare, report. A result folder appears whole or not at all."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from ctrlgen.verification.rules import check_rules
 from ctrlgen.verification.tracking import tracking_errors
 
 Progress = Callable[[str], None]
-STAGES = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
-VERIFY_STAGES = 27  # in `verify`, every tool there: `run`'s, the reference, errors, six emulated, three boards, four analyzers, two hostile
+STEPS = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
+VERIFY_STEPS = 27  # in `verify` with every tool installed: also reference, errors, six cores, three boards, four analysers, two fuzzers
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run produced; `c` and `comparison` are None where they were not asked for."""
+    """The results of a run; `c` and `comparison` are None where they were not asked for."""
 
     solution: Solution
     c: CFolder | None
@@ -50,16 +50,16 @@ class Outcome:
 
     @property
     def passed(self) -> bool:
-        """Whether everything that was checked is within tolerance."""
+        """Whether every expectation and every comparison that was made is within tolerance."""
         return report.passed(self.comparison, self.expected)
 
 
 def quiet(_: str) -> None:
-    """No progress."""
+    """Reports no progress."""
 
 
 def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) -> Solution:
-    """Loads and solves. Raises InputError, Unreachable, SolverError."""
+    """Loads and solves a scenario. Raises InputError, Unreachable, SolverError."""
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     progress("symbolic model")
     solution = solve(scenario, build_model(scenario.device), progress)
@@ -71,9 +71,9 @@ def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) 
 
 
 def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
-    """Solve, generate, compare, report into the folder `out`, which is replaced whole or left alone.
+    """Solves, generates, compares and reports into the folder `out`, which is replaced whole or not at all.
 
-    Raises InputError, Unreachable, SolverError, ToolError; out of tolerance is not an error but `passed` False.
+    Raises InputError, Unreachable, SolverError, ToolError. A value out of tolerance is no error: `passed` is then False.
     """
     find_compilers()
     with whole_folder(Path(out)) as draft:
@@ -89,7 +89,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
 
 
 def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet, quick: bool = False) -> Build:
-    """Solve, generate, compare, run on emulated targets, analyse, call with hostile inputs; one page into the folder `out`.
+    """Solves, generates, compares, runs on emulated targets, analyses, fuzzes; writes one page into the folder `out`.
 
     Left there: build.html, build.json, c/. `quick` leaves out cppcheck and the fuzzer, which take most of the time; they
     are then listed as not run. Raises InputError, Unreachable, SolverError, ToolError (no C compiler, or one that refuses the
@@ -121,7 +121,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
 
 
 def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
-    """Solve and report into `out`, without C."""
+    """Solves and reports into the folder `out`, without C. Raises InputError, Unreachable, SolverError."""
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
@@ -130,7 +130,7 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
 
 
 def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> CFolder:
-    """Solve and write only the C folder, which needs no compiler."""
+    """Solves and writes only the folder of C, which needs no compiler. Raises InputError, Unreachable, SolverError."""
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         c = generate(solution.scenario, solution.model, draft, solution, plots.draw_all(solution))
@@ -138,7 +138,7 @@ def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Pr
 
 
 def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) -> Outcome:
-    """Solve, generate into a scratch folder, compare; nothing is kept."""
+    """Solves, generates into a temporary folder and compares; nothing is kept. Raises as `run`."""
     find_compilers()
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         solution = solve_scenario(scenario, progress)
@@ -150,7 +150,10 @@ def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) ->
 
 @dataclass(frozen=True)
 class WorkspaceSummary:
-    """What `map_workspace` found; `ranges` per base pose and `extent` anywhere (channels, 2), SI."""
+    """The workspace of a device: `ranges` at each of the `bases` and the `extent` anywhere, (channels, 2) in SI.
+
+    `translations` and `everything`: the largest balls in the translations and in all channels.
+    """
 
     workspace: Workspace
     bases: list[np.ndarray]
@@ -161,16 +164,22 @@ class WorkspaceSummary:
 
 
 def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSummary:
-    """Ranges of each degree of freedom alone at some poses and anywhere, slices, the largest balls; workspace.json and a figure.
+    """Maps the workspace of a device into the folder `out`: workspace.json and workspace.svg.
 
-    `poses` such as "delta_x=5um,delta_z=20um", channels left out zero; without any those of `Workspace.bases`. The one in the middle of the
-    list is where the balls and the ends are looked for.
+    `poses` such as "delta_x=5um,delta_z=20um", channels left out being zero; without any, those of `Workspace.bases`. The
+    balls and the extent are searched from the middle one of the list. Raises InputError.
     """
     model = build_model(device)
     workspace, signal = Workspace(model), model.signals["pose"]
     if len(signal.channels) < 2 or not workspace.translations:
         raise InputError(
-            device.name, [Fault("workspace", "is mapped for platforms with a translation and another channel")]
+            device.name,
+            [
+                Fault(
+                    "workspace",
+                    "cannot be mapped: the device needs a pose of two channels or more, one of them a translation",
+                )
+            ],
         )
     frame = Frame(signal.channels, signal.units)
     bases = [frame.pose(pose, "--at") for pose in poses] or workspace.bases()
@@ -186,7 +195,7 @@ def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSumma
 
 
 def _workspace_numbers(found: WorkspaceSummary) -> dict[str, Any]:
-    """Plain numbers in the reader's units."""
+    """The numbers of workspace.json, in the reader's units."""
     signal = found.workspace.model.signals["pose"]
     named = list(zip(signal.channels, signal.units, strict=True))
 

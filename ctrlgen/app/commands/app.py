@@ -10,7 +10,7 @@ import typer
 app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
     help="Describe a flexure nanopositioner once; solve its trajectories, generate its C and prove that the C is right, and "
-    "say which physics a recording shows that the description leaves out.\n\n"
+    "find the physics that a recording shows and the description leaves out.\n\n"
     "Start with:  [bold]ctrlgen example circle20 --to scenarios[/bold]\n\n"
     "then:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
 )  # fmt: skip
@@ -22,7 +22,9 @@ DevicePath = Annotated[Path, typer.Argument(help="A device file (device.toml).",
 OutFolder = Annotated[
     Path,
     typer.Option(
-        "--out", help="Result folder; replaced whole when the work is done, never half written.", show_default=False
+        "--out",
+        help="Result folder; replaced as a whole when the work is done, never half written.",
+        show_default=False,
     ),
 ]
 
@@ -31,8 +33,8 @@ BootstrapCount = Annotated[
     typer.Option(
         min=0,
         metavar="B",
-        help="Replicates for intervals that do not trust the noise's model; 200 is usual, which takes as "
-        "long as so many fits.",
+        help="Bootstrap replicates, for intervals that do not rely on the noise model; 200 is usual and takes as "
+        "long as 200 fits.",
     ),
 ]
 SchedulerAddress = Annotated[
@@ -40,5 +42,5 @@ SchedulerAddress = Annotated[
     typer.Option(help="A dask.distributed scheduler, tcp://HOST:8786; by default this computer.", show_default=False),
 ]
 JobCount = Annotated[
-    int | None, typer.Option(min=0, help="Processes of this computer; 0: none but this one.", show_default="one a core")
+    int | None, typer.Option(min=0, help="Processes on this computer; 0: only this one.", show_default="one per core")
 ]

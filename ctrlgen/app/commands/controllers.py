@@ -22,7 +22,7 @@ def run(scenario: ScenarioPath, out_folder: OutFolder) -> None:
 
     Example:  ctrlgen run scenarios/circle20 --out out/circle20
     """
-    with progress(pipeline.STAGES) as advance:
+    with progress(pipeline.STEPS) as advance:
         outcome = pipeline.run(scenario, out_folder, advance)
     print_solution(outcome)
     print_comparison(outcome)
@@ -64,7 +64,7 @@ def compare(scenario: ScenarioPath) -> None:
 
     Example:  ctrlgen compare scenarios/circle20
     """
-    with progress(pipeline.STAGES - 1) as advance:
+    with progress(pipeline.STEPS - 1) as advance:
         outcome = pipeline.compare_only(scenario, advance)
     print_comparison(outcome)
     _exit(outcome)
@@ -77,20 +77,21 @@ def verify(
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="Leave out cppcheck and the fuzzer, over half of the time; both are then listed as not run."
+            "--quick",
+            help="Leave out cppcheck and the fuzzer, which take over half of the time; both are then listed as not run.",
         ),
     ] = False,
 ) -> None:
-    """All that is known of a scenario's C on one page: limits, cost on each target, equivalence, rules, provenance.
+    """Check a scenario's C in every way and report on one page: limits, cost on each target, equivalence, rules, origin.
 
     Solves, generates, compares with every compiler, runs the C on emulated Cortex-M4F and M7 and boards, analyses it and calls
     it with hostile inputs. Leaves in --out: build.html (open this first), build.json (every number), and c/. The exit status
-    is 1 when anything failed. A tool that is missing fails nothing and passes nothing: what it would have checked is listed as
-    not run, with the command that installs it.
+    is 1 when any check failed. A missing tool is no failure: what it would have checked is listed as not run, with the command
+    that installs it.
 
     Example:  ctrlgen verify scenarios/circle20 --out out/verify
     """
-    with progress(pipeline.VERIFY_STAGES) as advance:
+    with progress(pipeline.VERIFY_STEPS) as advance:
         build = pipeline.verify(scenario, out_folder, advance, quick)
     print_build(build)
     out.print(f"[bold]page[/bold]  {escape(str(out_folder / 'build.html'))}", soft_wrap=True)
@@ -106,10 +107,10 @@ def fmu(
 ) -> None:
     """Write controller and plant as FMI co-simulation units, for Simulink, Dymola, OpenModelica, FMPy and others.
 
-    The controller takes targets and gives drives; the plant takes drives and gives every signal of the model. Both
-    wrap the C that runs elsewhere, step by whole samples, and hold their sources; binaries are for this computer and
-    need a C compiler. In a loop step the controller first, hand its drives on, then step the plant: a target is what
-    stands at the end of the step. With start_settled = true both start in the equilibrium at their first inputs.
+    The controller takes targets and gives drives; the plant takes drives and gives every signal of the model. Both wrap
+    the same C as the firmware, step by whole samples, and contain their sources; binaries are for this computer and need a
+    C compiler. In a loop, step the controller first, pass its drives to the plant, then step the plant: a target is the
+    value at the end of the step. With start_settled = true both start in equilibrium at their first inputs.
 
     Example:  ctrlgen fmu scenarios/circle20 --out out/fmu
     """

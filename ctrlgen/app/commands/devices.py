@@ -37,7 +37,7 @@ def check(
         Path | None, typer.Option("--device", help="The device that a recording was made on.", show_default=False)
     ] = None,
 ) -> None:
-    """Read a device, scenario or recording and list every fault, or say what it describes. Nothing is computed.
+    """Read a device, scenario or recording and list every fault, or summarise what it describes. Nothing is solved.
 
     Of a generated folder it says which files were changed.
 
@@ -126,15 +126,15 @@ def reproduce(
     ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the rows as a JSON list instead of a table.")] = False,
     page: Annotated[
-        Path | None, typer.Option("--out", help="Also write a page with the figures (.html).", show_default=False)
+        Path | None, typer.Option("--out", help="Also write a page (.html) with the figures.", show_default=False)
     ] = None,
     differing: Annotated[bool, typer.Option("--differing", help="Show only rows that are not reproduced.")] = False,
 ) -> None:
-    """Compare every number the papers print with the program's own: printed, ours, difference, status and why.
+    """Compare every number that the papers print with the program's own: printed, ours, difference, status, reason.
 
     Example:  ctrlgen reproduce S3 --differing
     """
-    from ctrlgen.reproduce import all as everything  # scientific work of seconds; other commands need none of it
+    from ctrlgen.reproduce import all as everything  # takes seconds to import; no other command needs it
     from ctrlgen.reproduce.row import ReproductionStatus
     from ctrlgen.reproduce.s3_hinges import NEEDS_FEM
 

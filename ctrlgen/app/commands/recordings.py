@@ -30,13 +30,13 @@ def diagnose(
         typer.Argument(help="A recording.toml, or the folder that holds one; several are joined.", show_default=False),
     ],
     out_folder: OutFolder,
-    seed: Annotated[int, typer.Option(help="Of everything drawn at random; the same seed gives the same answer.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of all random numbers; the same seed gives the same answer.")] = 0,
     bootstrap: BootstrapCount = 0,
     scheduler: SchedulerAddress = None,
     jobs: JobCount = None,
 ) -> None:
-    """Find what a device file leaves out: where, which physics by name, with
-    numbers, proved on held-out records.
+    """Find the physics that a device file leaves out: what it is, where it
+    acts, its numbers with intervals, validated on held-out records.
 
     A recording.toml names files (CSV, MATLAB, HDF5, TDMS, MDF4, JSON), their
     columns, units and roles (fit, hold_out, rest);
@@ -44,13 +44,14 @@ def diagnose(
     --device DEVICE says what is wrong with yours.
 
     Leaves in --out: report.html (open this first), diagnosis.json,
-    device.next.toml, the device file with what was found, and next_experiment/
-    where another recording would settle a doubt.
+    device.next.toml (the device file with the findings added), and
+    next_experiment/ where another recording would decide between causes.
 
-    It answers: consistent, explained, partly (a little remains, or nothing
-    proves it), ambiguous (two causes explain alike), or unexplained. The exit
-    status is 0 whatever it answers, and 2 for input that cannot be used. What
-    is interrupted goes on from its fits when it is asked again.
+    The verdict is one of: consistent, explained, partly (a little remains
+    unexplained, or held-out data do not confirm it), ambiguous (two causes
+    explain the data equally well), unexplained. The exit status is 0 for every
+    verdict, and 2 for input that cannot be used. The same command continues an
+    interrupted diagnosis from the fits already made.
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
@@ -58,7 +59,7 @@ def diagnose(
 
     if (scheduler is not None or jobs is not None) and not bootstrap:
         raise typer.BadParameter(
-            "only the replicates of --bootstrap run elsewhere; add --bootstrap 200, or leave it out"
+            "--scheduler and --jobs only distribute the replicates of --bootstrap; add --bootstrap 200, or leave them out"
         )
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
@@ -67,7 +68,9 @@ def diagnose(
     except KeyboardInterrupt:
         kept = unfinished(out_folder)
         if kept.exists():
-            err.print(f"the fits so far are in {escape(str(kept))}; the same command goes on from them", soft_wrap=True)
+            err.print(
+                f"the fits made so far are in {escape(str(kept))}; the same command continues from them", soft_wrap=True
+            )
         raise
     except InputError as error:
         complain(error)
@@ -81,20 +84,21 @@ def diagnose(
 @app.command()
 def batch(
     list_: Annotated[
-        Path, typer.Argument(metavar="JOBS.toml", help="What to diagnose, see above.", show_default=False)
+        Path, typer.Argument(metavar="JOBS.toml", help="The list of diagnoses, see above.", show_default=False)
     ],
     out_folder: Annotated[
-        Path, typer.Option("--out", help="Gets one result folder a diagnosis, and results.csv.", show_default=False)
+        Path,
+        typer.Option("--out", help="Folder for one result folder per diagnosis, and results.csv.", show_default=False),
     ],
     seed: Annotated[
-        int | None, typer.Option(help="Of everything drawn at random, instead of the list's.", show_default=False)
+        int | None, typer.Option(help="Seed of all random numbers, instead of the list's.", show_default=False)
     ] = None,
     bootstrap: BootstrapCount = 0,
     scheduler: SchedulerAddress = None,
     jobs: JobCount = None,
 ) -> None:
-    """Diagnose many recordings, on all cores or on a cluster; results that are
-    there already are kept.
+    """Diagnose many recordings, on all cores or on a cluster; results made
+    before from the same files are kept.
 
     JOBS.toml, paths as seen from it:
 
@@ -103,9 +107,9 @@ def batch(
       device = "devices/stage.toml"
       recordings = ["runs/*", ["a", "b"]]   # a diagnosis each; a and b joined
 
-    Stop it whenever you like: every finished diagnosis stays, and the same
-    command goes on with the rest. The exit status is 1 when a diagnosis failed,
-    and 2 for a list that cannot be used.
+    It can be stopped at any time: every finished diagnosis stays, and the same
+    command continues with the rest. The exit status is 1 when a diagnosis
+    failed, and 2 for a list that cannot be used.
 
     Example:  ctrlgen batch jobs.toml --out out/jobs --scheduler tcp://cluster:8786
     """
