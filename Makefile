@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long bench battery loop mutants docs lint clean
+.PHONY: run test test-long bench battery loop mutants docs schemas lint clean
 
 run: $(VENV)/installed
 	$(BIN)/ctrlgen run scenarios/circle20 --out out/circle20
@@ -43,6 +43,10 @@ SAMPLE ?= 100
 mutants: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test,mutants]'
 	$(BIN)/python -m mutants --sample $(SAMPLE) --seed $(SEED) --out out/mutants
+
+# make schemas    writes the JSON Schemas of diagnosis.json, summary.json and build.json from their models
+schemas: $(VENV)/installed
+	$(BIN)/python -m ctrlgen.app.result_schemas
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

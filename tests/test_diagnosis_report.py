@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import SCENARIOS
+from result_files import faults
 
 import ctrlgen
 from ctrlgen.app.cli import execute
@@ -22,8 +23,8 @@ from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, Profile
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.pipeline import diagnose_into, unfinished
-from ctrlgen.diagnosis.report.diagnosis_json import as_dict
-from ctrlgen.diagnosis.report.html_report import Provenance, page
+from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
 from ctrlgen.diagnosis.report.plots import POINTS, _density, thinned
 from ctrlgen.diagnosis.report.writeback import next_text
@@ -99,6 +100,7 @@ def poses_recording(folder: Path, device) -> Path:
     return folder
 
 
+MADE_FROM = Provenance({"flexure_axis.toml": "0" * 64}, 3)
 PARTS = {"fit": [0, 25], "hold_out": [25, 40]}
 
 
@@ -134,16 +136,11 @@ def same_prediction(diagnosis, text: str, folder: Path) -> None:
 
 
 def test_the_json_is_the_contract(found):
-    result = json.loads(json.dumps(as_dict(found), allow_nan=False))
-    assert list(result) == [
-        "verdict",
-        "findings",
-        "residual_location",
-        "held_out",
-        "detectability",
-        "next_experiment",
-        "search_history",
-    ]
+    result = json.loads(json.dumps(diagnosis_record(found, MADE_FROM), allow_nan=False))
+    assert (
+        faults(result, "diagnosis") == [] and result["inputs"] == MADE_FROM.inputs and result["seed"] == MADE_FROM.seed
+    )
+    assert result["notes"] == list(found.notes)
     assert result["verdict"] == EXPLAINED
     (finding,) = result["findings"]
     assert set(finding) == {"effect", "location", "parameters", "alternatives", "held_out_gain", "source"}
@@ -159,7 +156,7 @@ def test_the_json_is_the_contract(found):
 
 def test_the_json_lists_alternatives_by_name(found):
     rival = replace(found.findings[0], alternatives=(("thermal_lag", "actuator:axis"),))
-    result = as_dict(replace(found, findings=(rival,)))
+    result = diagnosis_record(replace(found, findings=(rival,)), MADE_FROM)
     assert result["findings"][0]["alternatives"] == [{"effect": "thermal_lag", "location": "actuator:axis"}]
 
 
@@ -377,6 +374,9 @@ def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path
     assert command("diagnose", AXIS, creeping, "--out", out, "--seed", 3) == 0
     assert {p.name for p in out.iterdir()} == {"report.html", "diagnosis.json", "device.next.toml", ".ctrlgen"}
     printed = capsys.readouterr().out
+    told = json.loads((out / "diagnosis.json").read_text())
+    assert faults(told, "diagnosis") == [] and told["seed"] == 3
+    assert set(told["inputs"]) >= {AXIS.name} and len(told["inputs"]) == 4  # device, recording.toml, two tables
     assert "Explained: a flexure" in printed and "stage:axis" in printed and str(out / "report.html") in printed
     page_text = (out / "report.html").read_text()
     assert "seed 3" in page_text and "/fit.csv" in page_text and "/recording.toml" in page_text
@@ -438,10 +438,12 @@ def test_an_interruption_keeps_the_earlier_result(creeping, tmp_path, at):
 def test_objects_and_paths_give_the_same_answer_and_the_same_page(creeping, found):
     device = ctrlgen.load_device(AXIS)
     again = ctrlgen.diagnose(device, ctrlgen.load_recordings([creeping], ctrlgen.build_model(device)))
-    assert isinstance(again, ctrlgen.Diagnosis) and as_dict(again) == as_dict(found)
+    assert isinstance(again, ctrlgen.Diagnosis) and diagnosis_record(again, MADE_FROM) == diagnosis_record(
+        found, MADE_FROM
+    )
     assert page(again, Provenance({}, 0)) == page(found, Provenance({}, 0))
     several = ctrlgen.diagnose(str(AXIS), [str(creeping / "recording.toml")])
-    assert as_dict(several) == as_dict(found)
+    assert diagnosis_record(several, MADE_FROM) == diagnosis_record(found, MADE_FROM)
 
 
 def test_check_says_what_the_gate_lets_through(creeping, capsys):

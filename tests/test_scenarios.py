@@ -8,6 +8,7 @@ import json
 import numpy as np
 import pytest
 from conftest import SCENARIOS
+from result_files import faults
 
 from ctrlgen import InputError, Unreachable, load_scenario, run
 from ctrlgen.trajectory.metrics import expectations, metric
@@ -35,6 +36,7 @@ def test_scenario_gives_what_it_expects(name, tmp_path, compiler):
     bad = [e for e in outcome.expected if not e.passed] + [r for r in outcome.comparison.rows if not r.passed]
     assert outcome.passed and not bad, bad
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert faults(summary, "summary") == []
     assert summary["passed"] is True and summary["samples"] == len(outcome.solution.command)
     for expected in ("report.html", "trajectory.csv", "figures/forces.svg", "figures/margins.svg", "c/CMakeLists.txt"):
         assert (tmp_path / "out" / expected).stat().st_size > 100, expected

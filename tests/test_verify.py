@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from conftest import SCENARIOS
 from markupsafe import escape
+from result_files import faults
 from typer.testing import CliRunner
 
 from ctrlgen import ToolError, generate
@@ -30,8 +31,8 @@ from ctrlgen.verification.comparison import Comparison, ComparisonRow
 from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun
 
 KEYS = {
-    "scenario", "sha256", "passed", "failures", "not_run", "interface", "budgets", "errors_along_the_trajectory", "targets",
-    "stopped", "checks", "comparison", "compilers", "margins", "expected", "c", "ctrlgen",
+    "scenario", "inputs", "passed", "failures", "not_run", "interface", "budgets", "errors_along_the_trajectory", "targets",
+    "stopped", "checks", "comparison", "compilers", "margins", "expected", "c", "program",
 }  # fmt: skip
 TOOLS = {
     "cppcheck --addon=misra",
@@ -61,7 +62,7 @@ def test_a_scenario_is_verified_end_to_end(verified):
     assert {path.name for path in out.iterdir()} == {"build.html", "build.json", "c", ".ctrlgen"}
     assert verify_package(out / "c") == ()
     found = json.loads((out / "build.json").read_text())
-    assert set(found) >= KEYS
+    assert set(found) >= KEYS and faults(found, "build") == []
     assert found["passed"] and not found["failures"] and all(row["passed"] for row in found["comparison"])
     assert found["budgets"] is None  # they are stated for six drives; this stage has three
     assert {row["c"] for row in found["errors_along_the_trajectory"]} == {"online C", "player C"}
@@ -95,7 +96,7 @@ def test_the_page_holds_every_check_target_and_comparison(verified):
         assert str(run["instructions"]["worst"]) in page and f"{run['stack']} B" in page
     for row in found["comparison"]:
         assert str(escape(row["what"])) in page
-    for digest in found["sha256"].values():
+    for digest in found["inputs"].values():
         assert digest in page
     assert page.count("<svg") == 2 + bool(found["targets"])
     assert not re.search(r'(src|href)="(?!#)', page)  # self-contained

@@ -17,8 +17,8 @@ from ctrlgen.devices import Device, load_device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
 from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
-from ctrlgen.diagnosis.report.diagnosis_json import as_dict
-from ctrlgen.diagnosis.report.html_report import Provenance, page
+from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.writeback import write_next
 from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.model.assembly import build_model
@@ -98,8 +98,10 @@ def diagnose_into(
         settles = (found.next_experiment or {}).get("settles")
         for name, content in found.extra["files"].items() if settles else ():
             write_text(draft / "next_experiment" / name, content)
-        write_text(draft / "diagnosis.json", json.dumps(as_dict(found), indent=1, allow_nan=False) + "\n")
-        write_text(draft / "report.html", page(found, Provenance(digests(Path(device), recordings), seed)))
+        provenance = Provenance(digests(Path(device), recordings), seed)
+        record = diagnosis_record(found, provenance)
+        write_text(draft / "diagnosis.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
+        write_text(draft / "report.html", page(found, provenance))
     checkpoint.done()  # not before: what is stopped among its replicates need not fit anew
     return found
 

@@ -18,6 +18,7 @@ from ctrlgen.trajectory.metrics import ExpectationResult
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.check import Check
 from ctrlgen.verification.comparison import Comparison
+from ctrlgen.verification.hostile import SEED
 from ctrlgen.verification.in_loop import InLoop, Stopped, TargetRun
 
 BUDGET_CORE, BUDGET_DRIVES = "Cortex-M4F", 6  # the core and the number of drives that the budgets are stated for
@@ -107,6 +108,7 @@ def record(build: Build) -> dict[str, Any]:
     solution, c = build.solution, build.c
     return {
         **summary(solution, build.comparison, build.expected, c),
+        "seed": SEED,
         "passed": build.passed,
         "failures": list(build.failures),
         "not_run": [{"what": what, "remedy": remedy} for what, remedy in build.not_run],

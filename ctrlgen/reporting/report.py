@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen._version import __version__
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import from_si
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.result_schemas import origin
 from ctrlgen.trajectory.metrics import ExpectationResult, in_unit
 from ctrlgen.trajectory.solution import Margin, Solution
 from ctrlgen.verification.comparison import Comparison
@@ -57,11 +57,10 @@ def summary(
     error = solution.trace.signals[scenario.file.follow] - solution.command
     signal = solution.model.signals[scenario.file.follow]
     return {
+        **origin(scenario.digest),
         "scenario": scenario.name,
         "title": scenario.file.title,
         "device": solution.model.name,
-        "ctrlgen": __version__,
-        "sha256": scenario.digest,
         "passed": passed(comparison, expected),
         "samples": len(solution.command),
         "sample_rate_Hz": 1 / scenario.sample_time if scenario.sample_time else None,

@@ -7,11 +7,21 @@ from typing import Any
 
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
+from ctrlgen.reporting.result_schemas import origin
 
 
-def as_dict(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What diagnosis.json holds; numbers that are not finite as None, nothing that changes from run to run."""
+@dataclasses.dataclass(frozen=True)
+class Provenance:
+    """What a diagnosis was made from: SHA-256 of its input files by name, and the seed."""
+
+    inputs: dict[str, str]
+    seed: int
+
+
+def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> dict[str, Any]:
+    """What diagnosis.json holds, see `diagnosis_schema`; numbers that are not finite as None, nothing that changes from run to run."""
     return plain({
+        **origin(provenance.inputs, provenance.seed, diagnosis.notes),
         "verdict": diagnosis.verdict,
         "findings": [_finding(found) for found in diagnosis.findings],
         "residual_location": diagnosis.residual_location,

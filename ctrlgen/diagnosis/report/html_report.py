@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ctrlgen._version import __version__
 from ctrlgen.core.units import show
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers, written
-from ctrlgen.diagnosis.report.diagnosis_json import as_dict
+from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.narrative import (
     gathered,
     hard,
@@ -45,19 +43,11 @@ TINY = 1e-4  # p below which its size says nothing more
 NEGLIGIBLE = 1e-3  # of its standard deviation: numbers that moved less are left out of the table
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """What a result was made from: file names with their SHA-256, and the seed."""
-
-    sha256: dict[str, str]
-    seed: int
-
-
 def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
     """The page as HTML text."""
     return render(
         "diagnosis.html.j2",
-        d=as_dict(diagnosis),
+        d=diagnosis_record(diagnosis, provenance),
         title=diagnosis.recording.title,
         device_title=diagnosis.device.title,
         counts=counts(diagnosis),
@@ -71,9 +61,6 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         changed=_changed(diagnosis),
         unknown=unknown_lines(diagnosis),
         source=diagnosis.device.source,
-        sha256=provenance.sha256,
-        seed=provenance.seed,
-        version=__version__,
         number=number,
         hard=hard,
     )

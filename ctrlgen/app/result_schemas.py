@@ -1,0 +1,28 @@
+"""Writes the JSON Schemas of diagnosis.json, summary.json and build.json: `python -m ctrlgen.app.result_schemas`, `make schemas`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from ctrlgen.core.files import write_text
+from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
+from ctrlgen.reporting.result_schemas import SCHEMAS, BuildRecord, Summary, schema_text
+
+RESULTS: dict[str, type[BaseModel]] = {"build": BuildRecord, "diagnosis": DiagnosisRecord, "summary": Summary}
+
+
+def schemas() -> dict[str, str]:
+    """The text of every schema by its file name."""
+    return {f"{name}.schema.json": schema_text(model, f"{name}.json") for name, model in RESULTS.items()}
+
+
+def write_schemas(folder: Path = SCHEMAS) -> None:
+    """Every schema into `folder`."""
+    for name, text in schemas().items():
+        write_text(folder / name, text)
+
+
+if __name__ == "__main__":
+    write_schemas()

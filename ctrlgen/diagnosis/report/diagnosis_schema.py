@@ -1,0 +1,249 @@
+"""What diagnosis.json holds, key by key; `ctrlgen/reporting/schemas/diagnosis.schema.json` is written from it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from ctrlgen.reporting.result_schemas import Keys, Number, Origin
+
+Interval = tuple[Number, Number]  # 95 %
+Verdict = Literal["consistent", "explained", "partly", "ambiguous", "unexplained"]
+
+
+class EstimateEntry(Keys):
+    """A number with its 95 % interval."""
+
+    value: Number = Field(description="Estimate.")
+    ci95: Interval = Field(
+        description="95 % interval; both ends equal the value where it was not estimated but read from the data."
+    )
+    unit: str = Field(description="Unit of value and interval; 1 without one.")
+
+
+class EffectAt(Keys):
+    """An effect at a location."""
+
+    effect: str = Field(description="Name of the effect, or 'parameter'.")
+    location: str = Field(description="Place and channel, such as actuator:2X.")
+
+
+class FindingEntry(EffectAt):
+    """One cause that the device file leaves out."""
+
+    parameters: dict[str, EstimateEntry] = Field(description="Parameters of the effect, by name.")
+    alternatives: list[EffectAt] = Field(
+        description="Other causes that explain the recording equally well in its place."
+    )
+    held_out_gain: Number = Field(
+        description="Rise of the held-out deviance without the cause, over that of the device as described."
+    )
+    source: str = Field(description="Publication of the effect's law.")
+
+
+class ChannelErrorEntry(Keys):
+    """Root mean square error of one channel on the held-out records."""
+
+    rms_before: Number = Field(description="Of the device as described, refitted within its stated uncertainty.")
+    rms_after: Number = Field(description="With the findings.")
+    noise_floor: Number = Field(description="Standard deviation of the noise; null where it is not known.")
+    unit: str = Field(description="Unit of all four numbers.")
+    uncertainty: Number = Field(
+        description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
+    )
+
+
+class ResidualPartEntry(Keys):
+    """The residual in one part of the recording."""
+
+    label: str = Field(description="The part.")
+    excess: Number = Field(description="Mean square of the whitened residual, less 1: 0 is noise alone.")
+    ci95: Interval = Field(description="95 % interval of excess.")
+    share: Number = Field(description="Share of the whole excess.")
+    mean: Number = Field(description="Mean of the residual [unit].")
+    mean_ci95: Interval = Field(description="95 % interval of mean.")
+    unit: str = Field(description="Unit of mean.")
+    n: int = Field(description="Samples.")
+
+
+class FrequencyBandEntry(Keys):
+    """The residual in one frequency band."""
+
+    low: float = Field(description="Lower edge [Hz].")
+    high: float = Field(description="Upper edge [Hz].")
+    excess: Number = Field(description="Whitened power spectral density, less 1.")
+    ci95: Interval = Field(description="95 % interval of excess.")
+    coherence: Number = Field(description="Largest coherence of any reading's residual with any drive.")
+    coherence_floor: Number = Field(description="Coherence that noise alone exceeds with 5 %.")
+
+
+class CoordinatesEntry(Keys):
+    """Whether the excess is sparser in the readings or in the actuators."""
+
+    participation_ratio: dict[str, Number] = Field(
+        description="Effective number of coordinates with excess, by 'reading' and 'actuator'."
+    )
+    explained_by_one: dict[str, dict[str, Number]] = Field(
+        description="Share of the excess that each coordinate alone could explain."
+    )
+    located_in: str = Field(description="'reading', 'actuator', or why neither can be told.")
+
+
+class SpectralLinesEntry(Keys):
+    """Response of one reading to a periodic drive, by kind of spectral line, root mean square in unit."""
+
+    record: str
+    channel: str
+    unit: str
+    periods: int = Field(description="Periods averaged.")
+    excited: Number = Field(description="At the lines of the drive.")
+    odd: Number = Field(description="At odd harmonics that are not driven; null without any.")
+    even: Number = Field(description="At even harmonics that are not driven; null without any.")
+    noise: Number = Field(description="Noise in as many lines.")
+    p_odd: Number = Field(description="p-value of the odd lines under noise alone.")
+    p_even: Number = Field(description="p-value of the even lines under noise alone.")
+    statement: str = Field(description="What follows.")
+
+
+class EmpiricalTermEntry(Keys):
+    """A sparse sum of features that describes the residual; no cause."""
+
+    label: Literal["empirical"]
+    axis: str = Field(description="Axis on which it acts.")
+    terms: dict[str, float] = Field(
+        description="Coefficient [unit] by feature; d, v, u: position, speed, drives over their largest."
+    )
+    unit: str
+    travel: float = Field(description="Largest displacement of the axis, SI.")
+    speed: float = Field(description="Largest speed of the axis, SI.")
+    drives: list[float] = Field(description="Largest value of every drive, SI.")
+    held_out_gain: float = Field(description="Share of the held-out excess that it explains.")
+
+
+class UnmodelledForceEntry(Keys):
+    """The unknown input (force or displacement) that would explain the residual after the correction."""
+
+    statements: list[str] = Field(description="What it depends on.")
+    empirical_term: EmpiricalTermEntry | None = Field(description="Null where no term helps on the held-out records.")
+
+
+class ResidualLocationEntry(Keys):
+    """Where the residual of one model is large."""
+
+    excess: Number = Field(description="Mean square of the whitened residual over all readings, less 1.")
+    by_reading: list[ResidualPartEntry]
+    by_actuator: list[ResidualPartEntry] = Field(description="The residual as an equivalent input at each axis.")
+    coordinates: CoordinatesEntry
+    by_frequency: list[FrequencyBandEntry]
+    by_travel: dict[str, list[ResidualPartEntry]] = Field(description="Fifths of the travel, by axis.")
+    by_direction: dict[str, list[ResidualPartEntry]] = Field(description="Forward and backward motion, by axis.")
+    by_time: list[ResidualPartEntry]
+    by_temperature: list[ResidualPartEntry]
+    spectral_lines: list[SpectralLinesEntry]
+    statements: list[str] = Field(description="What follows, in sentences.")
+    unmodelled_force: UnmodelledForceEntry | None = Field(
+        default=None, description="In `after`, where the findings do not explain all."
+    )
+
+
+class ResidualLocations(Keys):
+    """The residual on all records."""
+
+    before: ResidualLocationEntry = Field(
+        description="Of the device as described, refitted within its stated uncertainty."
+    )
+    after: ResidualLocationEntry = Field(description="With the findings.")
+
+
+class SmallestDetectableEntry(EffectAt):
+    """The smallest amplitude of one effect that this recording would have shown, at the location where it shows most."""
+
+    amplitude: str = Field(description="Name of the amplitude parameter.")
+    detectable_from: Number = Field(description="Smallest amplitude that exceeds the screen's threshold [unit].")
+    identifiable_from: Number = Field(description="Smallest amplitude that would also have been named [unit].")
+    unit: str
+    confusable_with: list[tuple[str, str]] = Field(description="[effect, location] of what it would be taken for.")
+    by_location: dict[str, Number] = Field(description="detectable_from at every location [unit].")
+
+
+class UndetectableEntry(EffectAt):
+    """A cause that this recording cannot show."""
+
+    masked_by: str = Field(description="The free parameter, or the reason, that hides it.")
+
+
+class DetectabilityEntry(Keys):
+    """What this recording could have shown besides the findings."""
+
+    smallest: dict[str, SmallestDetectableEntry] = Field(description="By effect.")
+    undetectable: list[UndetectableEntry]
+
+
+class CandidateExperimentEntry(Keys):
+    """One drive that was considered."""
+
+    kind: str
+    description: str
+    strength: float = Field(description="Amplitude as a share of the drive's range.")
+    separation: float = Field(description="Separation of the rivals with it [standard deviations].")
+
+
+class NextExperimentEntry(Keys):
+    """The drive that discriminates best between models that this recording cannot tell apart."""
+
+    discriminates_between: tuple[str, str] = Field(description="The two models, by their causes.")
+    reason: str = Field(description="Why these two.")
+    description: str = Field(description="The drive in words.")
+    kind: str
+    strength: float = Field(description="Amplitude as a share of the drive's range.")
+    samples: int
+    sample_time: Number = Field(description="[s]; null for settled poses.")
+    separation_now: Number = Field(description="Separation by this recording [standard deviations].")
+    separation_after: Number = Field(description="Separation by both recordings [standard deviations].")
+    settles: bool = Field(description="Whether separation_after decides between them.")
+    candidates: list[CandidateExperimentEntry] = Field(description="All drives considered, the best first.")
+
+
+class TriedCause(EffectAt):
+    """A cause that a candidate model adds."""
+
+    z: Number = Field(description="Score of the screen [standard deviations]; null where it was not screened.")
+    accepted: bool = Field(description="Whether it is in the model after the round.")
+
+
+class CandidateModelEntry(Keys):
+    """One model that was fitted in a round."""
+
+    causes: list[TriedCause] = Field(description="Causes that it adds to the model before the round.")
+    criterion: Number = Field(description="Selection criterion T: smaller is better.")
+    objective: Number = Field(
+        description="Whitened squares on the records to fit, with the penalties of stated parameters."
+    )
+    held_out_deviance: Number = Field(description="-2 ln likelihood on the held-out records.")
+
+
+class RoundEntry(Keys):
+    """One round of the search."""
+
+    round: int
+    threshold: Number = Field(description="|z| that a recording without mismatch exceeds anywhere with 1 % chance.")
+    suspects: int = Field(description="Hypotheses screened.")
+    criterion_before: Number = Field(description="Selection criterion T of the model before the round.")
+    candidates: list[CandidateModelEntry] = Field(description="Models fitted, the best first.")
+    causes_after: list[tuple[str, str]] = Field(description="[effect, location] of the causes after the round.")
+    decision: str
+
+
+class DiagnosisRecord(Origin):
+    """Result of `ctrlgen diagnose`: what a recording shows that the device file leaves out."""
+
+    verdict: Verdict = Field(description="The answer in one word.")
+    findings: list[FindingEntry] = Field(
+        description="Causes that the device file leaves out, the most important first."
+    )
+    residual_location: ResidualLocations
+    held_out: dict[str, ChannelErrorEntry] = Field(description="Errors on the held-out records, by channel.")
+    detectability: DetectabilityEntry
+    next_experiment: NextExperimentEntry | None = Field(description="Null where no drive would decide anything.")
+    search_history: list[RoundEntry]

@@ -1,0 +1,279 @@
+"""What summary.json and build.json hold, key by key, and what every result file states of its origin.
+
+The JSON Schemas in `ctrlgen/reporting/schemas/` are written from these models (`make schemas`).
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ctrlgen._version import __version__, commit
+
+SCHEMAS = Path(__file__).parent / "schemas"
+SCHEMA_VERSION = 1  # raised when a key changes its name or meaning; one version for all three files
+
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Number = float | None  # None where it is not finite
+
+
+class Keys(BaseModel):
+    """An object of a result file: it has these keys and no others."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Program(Keys):
+    """The program that wrote the file."""
+
+    name: Literal["ctrlgen"] = Field(description="Always ctrlgen.")
+    version: str = Field(description="Version of the program.")
+    commit: str | None = Field(
+        description="Commit of its source, with -dirty where files differ from it; null if unknown."
+    )
+
+
+class Origin(Keys):
+    """What every result file states of its origin."""
+
+    schema_version: Literal[1] = Field(description="Version of this schema.")
+    program: Program
+    inputs: dict[str, Sha256] = Field(description="SHA-256 of every file that was read, by name.")
+    seed: int | None = Field(description="Seed of everything drawn at random; null where nothing is.")
+    notes: list[str] = Field(description="What a reader should know of the inputs or of how the result was made.")
+
+
+def origin(inputs: dict[str, str], seed: int | None = None, notes: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The keys of `Origin` for files with these SHA-256 `inputs`."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "program": {"name": "ctrlgen", "version": __version__, "commit": commit() or None},
+        "inputs": dict(inputs),
+        "seed": seed,
+        "notes": list(notes),
+    }
+
+
+class MarginRow(Keys):
+    """How near one limit of the device was approached."""
+
+    limit: str = Field(description="Name of the limit.")
+    label: str = Field(description="The limited quantity in words.")
+    unit: str = Field(description="Unit of value and bound.")
+    channel: str = Field(description="Channel that came nearest.")
+    sample: int = Field(description="Sample at which it did.")
+    time_s: Number = Field(description="Time of that sample [s]; null for settled poses.")
+    value: float = Field(description="The quantity there.")
+    bound: float = Field(description="The bound that it approached.")
+    margin: float = Field(description="Distance between both, in margin_unit.")
+    margin_unit: str = Field(description="Unit of margin; K for a temperature.")
+    share_left: Number = Field(description="Margin as a share of the limit's range; null for a limit without a range.")
+
+
+class ExpectedRow(Keys):
+    """One expectation of the scenario file."""
+
+    value: str = Field(description="Name of the metric.")
+    unit: str = Field(description="Unit of measured, low and high.")
+    measured: float = Field(description="What the solution gives.")
+    low: Number = Field(description="Smallest value that passes; null without one.")
+    high: Number = Field(description="Largest value that passes; null without one.")
+    passed: bool = Field(description="Whether it is between both.")
+    source: str = Field(description="Where the expected value comes from.")
+
+
+class PlayerCandidate(Keys):
+    """One way in which the player's drives could be stored."""
+
+    kind: str = Field(description="Form: table, spline or Fourier series.")
+    size: str = Field(description="Its size in words.")
+    bytes: int | None = Field(description="Bytes of constant data.")
+    operations: int | None = Field(description="Operations of one call.")
+    instructions: int | None = Field(description="Instructions of one call, estimated.")
+    length: Number = Field(description="Largest position error that it causes [m].")
+    angle: Number = Field(description="Largest rotation error that it causes [rad].")
+    drive: Number = Field(description="Largest drive error, as a share of the drive's range.")
+    chosen: bool = Field(description="Whether it was generated.")
+    remark: str = Field(description="Why not, where it was not.")
+
+
+class GeneratedC(Keys):
+    """Size of the generated C."""
+
+    operations_per_sample: int = Field(description="Operations of one sample where no limit is active.")
+    operations_worst: int = Field(description="Most operations that one sample can take.")
+    player: dict[str, list[PlayerCandidate]] = Field(description="Candidates for the player, by arithmetic.")
+
+
+class ComparisonEntry(Keys):
+    """Generated C against the model, one build and one signal."""
+
+    build: str = Field(description="Compiler, arithmetic and flags.")
+    what: str = Field(description="What was compared.")
+    signal: str = Field(description="The compared signal.")
+    unit: str = Field(description="Unit of worst, rms and limit.")
+    worst: Number = Field(description="Largest deviation.")
+    rms: Number = Field(description="Root mean square deviation.")
+    limit: float = Field(description="Largest deviation that passes.")
+    samples: int = Field(description="Samples compared.")
+    first: int | None = Field(description="First sample out of tolerance; null where there is none.")
+    passed: bool = Field(description="Whether the largest deviation is within the limit.")
+
+
+class Summary(Origin):
+    """Result of `ctrlgen run` and `ctrlgen solve`: the solved trajectory, its margins, and the generated C against the model."""
+
+    scenario: str = Field(description="Name of the scenario.")
+    title: str = Field(description="Title of the scenario file.")
+    device: str = Field(description="Name of the device.")
+    passed: bool = Field(description="Whether everything that was checked is within tolerance.")
+    samples: int = Field(description="Samples of the trajectory.")
+    sample_rate_Hz: Number = Field(description="Samples a second [Hz]; null for settled poses.")
+    closed: bool = Field(description="Whether the trajectory ends where it begins.")
+    ipopt_iterations: int = Field(description="Iterations of IPOPT.")
+    limits_added: list[str] = Field(description="Composite limits that were added because a first solution broke them.")
+    tracking_error: dict[str, float] = Field(description="Largest distance from the command, by 'channel [unit]'.")
+    margins: list[MarginRow] = Field(description="One row a limit.")
+    tightest: str = Field(description="Name of the limit with the smallest share left.")
+    expected: list[ExpectedRow] = Field(description="One row an expectation of the scenario.")
+    c: GeneratedC | None = Field(description="The generated C; null where none was asked for.")
+    compilers: dict[str, str] = Field(description="Version of every compiler that ran, by name.")
+    compilers_not_run: list[str] = Field(description="Compilers that are not installed.")
+    comparison: list[ComparisonEntry] = Field(description="Generated C against the model.")
+
+
+class NotRun(Keys):
+    """A check that did not run."""
+
+    what: str = Field(description="The check.")
+    remedy: str = Field(description="How to make it run.")
+
+
+class SignalChannels(Keys):
+    """A signal of the C interface."""
+
+    label: str = Field(description="The signal in words.")
+    channels: list[str] = Field(description="'name [SI unit]', in the order of the C arrays.")
+
+
+class StatusEntry(Keys):
+    """One value of the controller's status."""
+
+    value: int
+    name: str
+    meaning: str
+
+
+class LimitEntry(Keys):
+    """A limit that the controller keeps."""
+
+    label: str
+    lower: str | None = Field(description="Bound with its unit; null without one.")
+    upper: str | None = Field(description="Bound with its unit; null without one.")
+
+
+class Interface(Keys):
+    """What the generated C takes and gives, in SI units."""
+
+    functions: dict[str, list[str]] = Field(description="Signatures, by arithmetic.")
+    target: SignalChannels
+    drive: SignalChannels
+    actuator_state: SignalChannels | None
+    memory: list[str] = Field(description="'name [unit]' of what the controller keeps between samples.")
+    status: list[StatusEntry]
+    limits: list[LimitEntry]
+
+
+class Budgets(Keys):
+    """Instructions of one sample that are aimed at."""
+
+    core: str = Field(description="Processor for which they are stated.")
+    scenario: int = Field(description="Along the scenario.")
+    worst: int = Field(description="Over random and hostile targets.")
+    player: int = Field(description="One call of the player.")
+
+
+class CallCost(Keys):
+    """Instructions of one kind of call on an emulated processor."""
+
+    what: str = Field(description="The kind of call.")
+    calls: int = Field(description="Calls counted.")
+    mean: float = Field(description="Mean number of instructions.")
+    worst: int = Field(description="Largest number of instructions.")
+    worst_within: int | None = Field(description="The same where no limit is active.")
+
+
+class Target(Keys):
+    """The C on one emulated processor, compared with this computer bit by bit."""
+
+    core: str
+    compiler: str
+    real: str = Field(description="Arithmetic: float or double.")
+    costs: list[CallCost]
+    stack: int = Field(description="Bytes of stack.")
+    code: int = Field(description="Bytes of code.")
+    tables: int = Field(description="Bytes of constant data.")
+    writable: int = Field(description="Bytes of static writable memory; 0 is required.")
+    numbers: int = Field(description="Numbers compared.")
+    differing: int = Field(description="Numbers that differ.")
+    ulp: int = Field(description="Largest difference in units in the last place.")
+    where: str = Field(description="First call whose numbers differ; empty without one.")
+    passed: bool
+    instructions: dict[str, int | None] = Field(description="Largest number of instructions of one call, by kind.")
+
+
+class StoppedTarget(Keys):
+    """An emulated run that stopped early."""
+
+    core: str
+    compiler: str
+    real: str = Field(description="Arithmetic: float or double.")
+    words: str = Field(description="Why it stopped.")
+
+
+class ToolFinding(Keys):
+    """One finding of an analyser."""
+
+    file: str
+    line: int
+    rule: str
+    severity: str
+    text: str
+    permitted: bool = Field(description="Whether DEVIATIONS.md permits it.")
+
+
+class ToolCheck(Keys):
+    """One tool that read or ran the generated C."""
+
+    tool: str
+    version: str
+    state: Literal["passed", "failed", "not run"]
+    note: str = Field(description="Remark, or the remedy where it did not run.")
+    files: list[str] = Field(description="Files that it was given.")
+    permitted: int = Field(description="Findings that DEVIATIONS.md permits.")
+    findings: list[ToolFinding] = Field(description="Findings that it does not permit.")
+
+
+class BuildRecord(Summary):
+    """Result of `ctrlgen verify`: everything of summary.json, and every check of the generated C."""
+
+    failures: list[str] = Field(description="What failed, one line each.")
+    not_run: list[NotRun]
+    interface: Interface
+    budgets: Budgets | None = Field(description="Null for devices for which no budget is stated.")
+    errors_along_the_trajectory: list[dict[str, str | float]] = Field(
+        description="Largest error of the model driven by the C, by 'channel [unit]', with the keys c (online C or player C) and real."
+    )
+    targets: list[Target]
+    stopped: list[StoppedTarget]
+    checks: list[ToolCheck]
+
+
+def schema_text(model: type[BaseModel], name: str) -> str:
+    """The JSON Schema (draft 2020-12) of a result file as text."""
+    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
+    found["title"] = name
+    return json.dumps(found, indent=1) + "\n"
