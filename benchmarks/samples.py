@@ -21,7 +21,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.scenario import Scenario, load_scenario
 from ctrlgen.trajectory.solution import Solution, solve
-from ctrlgen.verification.comparison import EXCESS
+from ctrlgen.verification.comparison import EXCESS_LIMIT
 
 SCENARIO = Path(__file__).resolve().parent.parent / "scenarios" / "circle20"
 NEAR = 1e-11  # m: 0.01 nm, what two answers may differ by
@@ -165,7 +165,7 @@ class Samples:
             size = max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(v).max()
             over = -np.inf if limit.upper is None else v.max() - limit.upper
             under = -np.inf if limit.lower is None else limit.lower - v.min()
-            if not max(over, under) <= EXCESS[Real.FLOAT] * size:
+            if not max(over, under) <= EXCESS_LIMIT[Real.FLOAT] * size:
                 raise Disagreement(f"{name}: {limit.label} goes {max(over, under) / size:.2g} of its bound beyond it")
 
     def check_circle(self, name: str, answers: Answers, near: float = NEAR) -> None:

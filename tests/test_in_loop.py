@@ -19,7 +19,7 @@ from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import Machine, available
 from ctrlgen.verification.in_loop import InLoop, run_in_loop
 from ctrlgen.verification.qemu import check_on_boards
-from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.reference import ReferenceAnswers
 
 M4F, M7 = CORES
 
@@ -115,8 +115,8 @@ def test_c_that_is_no_c_is_refused_with_the_compilers_words(cross, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def reference(circle) -> Reference:
-    return Reference(circle)
+def reference(circle) -> ReferenceAnswers:
+    return ReferenceAnswers(circle)
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +204,7 @@ def small(tmp_path_factory):
     """A stage of three axes, its reference and its C."""
     scenario = load_scenario(SCENARIOS / "rrr_circle")
     solution = solve(scenario, build_model(scenario.device))
-    return Reference(solution), generate(scenario, solution.model, tmp_path_factory.mktemp("rrr"), solution)
+    return ReferenceAnswers(solution), generate(scenario, solution.model, tmp_path_factory.mktemp("rrr"), solution)
 
 
 def spoiled(c: CFolder, into, old: str, new: str, real: Real = Real.FLOAT) -> CFolder:

@@ -91,7 +91,7 @@ def test_the_readme_states_units_limits_statuses_costs_and_provenance(packages, 
     text = (c.path / "README.md").read_text()
     for words in ("3: delta_x [m]", "0: 1X [W]", "temperature_3Y [K]", "wire flexure stress <= 550 MPa", "_DRIVE` 8", "1000 Hz",
                   f"{c.operations} arithmetic operations", f"{c.worst_operations} at most", circle.scenario.digest["device"],
-                  "Mech. Mach. Theory", "calls on one state may not"):  # fmt: skip
+                  "Mech. Mach. Theory", "calls on one state must not"):  # fmt: skip
         assert words in text, words
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
     assert len(pictures) == 5 and all((c.path / picture).read_text().startswith("<svg") for picture in pictures)
@@ -99,7 +99,7 @@ def test_the_readme_states_units_limits_statuses_costs_and_provenance(packages, 
 
 def test_the_readme_of_an_unsolved_scenario_says_what_is_absent(unsolved):
     text = (unsolved.path / "README.md").read_text()
-    assert "No player is here" in text and "No figures are here" in text and "_player_" not in text
+    assert "has no player" in text and "has no figures" in text and "_player_" not in text
     assert not list(unsolved.path.glob("*player*")) and not (unsolved.path / "figures").exists()
 
 

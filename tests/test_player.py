@@ -1,4 +1,4 @@
-"""The player: shortest of three curves within a tolerance of what is followed, the same numbers in C and in any order of calls."""
+"""The player: the shorter of table and cubic within a tolerance of what is followed, the same numbers in C and in any order of calls."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from conftest import SCENARIOS
 
 from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.firmware import spline
-from ctrlgen.firmware.compression import ANGLE, BUDGET, LENGTH, SHARE, compress, instructions
+from ctrlgen.firmware.compression import (
+    ANGLE_TOLERANCE,
+    INSTRUCTION_BUDGET,
+    LENGTH_TOLERANCE,
+    TOLERANCE_SHARE,
+    compress,
+    instructions,
+)
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import generate
-from ctrlgen.firmware.fourier import series
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model.simulation import simulate
 
@@ -113,13 +119,14 @@ def test_what_the_chosen_curve_follows_is_within_the_tolerance_and_what_is_recor
 
 @pytest.mark.parametrize("real", list(Real))
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_choice_is_the_shortest_within_tolerance_and_budget_and_all_three_are_recorded(compressions, kind, real):
+def test_the_choice_is_the_shortest_within_tolerance_and_budget_and_both_are_recorded(compressions, kind, real):
     c = compressions[kind][real]
-    assert [x.kind for x in c.candidates] == ["table", "cubic", "Fourier"]
+    assert [x.kind for x in c.candidates] == ["table", "cubic"]
     assert sum(x.chosen for x in c.candidates) == 1 and all(x.remark for x in c.candidates)
     good = [
         x for x in c.candidates
-        if x.bytes and x.length <= SHARE * LENGTH and x.angle <= SHARE * ANGLE and x.instructions <= BUDGET
+        if x.bytes and x.instructions <= INSTRUCTION_BUDGET
+        and x.length <= TOLERANCE_SHARE * LENGTH_TOLERANCE and x.angle <= TOLERANCE_SHARE * ANGLE_TOLERANCE
     ]  # fmt: skip
     assert c.chosen.bytes == min(x.bytes for x in good) == c.curve.bytes(real)
 
@@ -127,8 +134,6 @@ def test_the_choice_is_the_shortest_within_tolerance_and_budget_and_all_three_ar
 def test_a_smooth_circle_takes_a_thirtieth_of_the_table_and_a_short_path_the_table(compressions):
     circle = compressions["closed"][Real.FLOAT]
     assert circle.chosen.kind == "cubic" and 30 * circle.chosen.bytes < circle.candidates[0].bytes
-    fourier = circle.candidates[2]
-    assert fourier.instructions > BUDGET and "instructions" in fourier.remark
     assert compressions["raster"][Real.FLOAT].chosen.kind == "cubic"
     for kind in ("short", "single"):
         assert compressions[kind][Real.FLOAT].chosen.kind == "table"
@@ -152,15 +157,6 @@ def test_drives_stay_inside_their_limits_between_samples_too(solutions, compress
         drives = c.drives(np.arange(n), np.full(n, part))
         assert drives.min() >= 0.0 and drives.max() <= np.float64(0.2)
     assert c.chosen.kind == "cubic" and np.isfinite(c.high).any()  # so the C has a limit to keep
-
-
-def test_a_series_reproduces_its_drive_and_uneven_periods():
-    k = np.arange(37)
-    drive = np.column_stack([1 + np.cos(2 * np.pi * (k - 3) / 37), np.sin(6 * np.pi * k / 37)])
-    curve = series(drive, 3)
-    assert np.abs(curve.values(Real.DOUBLE) - drive).max() < 1e-14
-    between = curve.between(k, np.full(37, 0.4), Real.DOUBLE)[:, 0]
-    assert np.abs(between - 1 - np.cos(2 * np.pi * (k + 0.4 - 3) / 37)).max() < 1e-13
 
 
 def test_a_kink_is_cheaper_by_pieces():
@@ -289,17 +285,20 @@ def test_times_that_are_none_are_refused_and_others_follow_the_curve(solutions, 
     assert np.abs(at_start[1][1] - first).max() < 1e-5 * (1 + np.abs(first).max())
 
 
-def test_the_header_tells_all_three(solutions, tmp_path):
+def test_the_header_compares_table_and_cubic(solutions, tmp_path):
     solution = solutions["closed"]
     folder = generate(solution.scenario, solution.model, tmp_path, solution)
     text = (tmp_path / f"{folder.player[Real.FLOAT]}.h").read_text()
-    for kind in ("table", "cubic", "Fourier"):
+    for kind in ("table", "cubic"):
         assert re.search(rf"\*   {kind} .*bytes.*operations.*instructions.*nm.*rad; \S", text), kind
     assert text.count("chosen: ") == 1
 
 
-def test_more_drives_harmonics_and_limits_cost_more_instructions():
-    wave = np.sin(2 * np.pi * np.arange(64) / 64)[:, None]
-    one, two = series(wave, 3), series(np.hstack([wave, wave]), 3)
-    assert instructions(one, 0) < instructions(two, 0) < instructions(series(np.hstack([wave, wave]), 4), 0)
-    assert instructions(one, 0) < instructions(one, 1)
+def test_more_drives_pieces_and_limits_cost_more_instructions():
+    k = np.arange(200.0)[:, None]
+    free = np.full(2, -np.inf), np.full(2, np.inf)
+    one = spline.fit(np.sin(k / 30), free[0][:1], free[1][:1], np.array([1e-3]), False)
+    two = spline.fit(np.hstack([np.sin(k / 30)] * 2), *free, np.full(2, 1e-3), False)
+    bent = spline.fit(np.hstack([np.abs(k - 77.5)] * 2), *free, np.full(2, 1e-3), False)
+    assert len(one.pieces) == len(two.pieces) == 1 < len(bent.pieces)
+    assert instructions(one, 0) < instructions(two, 0) < instructions(bent, 0) < instructions(bent, 1)

@@ -30,7 +30,7 @@ from ctrlgen.verification.comparison import Comparison, compare
 from ctrlgen.verification.hostile import check_hostile
 from ctrlgen.verification.in_loop import run_in_loop
 from ctrlgen.verification.qemu import check_on_boards
-from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.reference import ReferenceAnswers
 from ctrlgen.verification.rules import check_rules
 from ctrlgen.verification.tracking import tracking_errors
 
@@ -102,7 +102,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
         progress("C sources")
         c = generate(solution.scenario, solution.model, draft / "c", solution, plots.draw_all(solution))
         progress("reference")
-        reference = Reference(solution)
+        reference = ReferenceAnswers(solution)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"), reference)
         progress("error along the trajectory")
         errors = tracking_errors(c, reference)

@@ -1,7 +1,7 @@
-"""How the player holds the solved drive: a table, a piecewise cubic or a Fourier series, whichever is shortest.
+"""How the player stores the solved drive: as a table or as a piecewise cubic, whichever has fewer bytes (docs/player.md).
 
-What counts is not the drive but what follows from it: the compressed drive, computed as the C computes it, is sent
-through the model (a closed path twice around), and what is followed may be off its command by `LENGTH` and `ANGLE`.
+The tolerance is on the followed signal, not on the drive: the model is driven by what the C computes (a closed path for
+two laps), and may differ from the command by `LENGTH_TOLERANCE` and `ANGLE_TOLERANCE`.
 """
 
 from __future__ import annotations
@@ -15,18 +15,17 @@ import numpy as np
 from ctrlgen.core.errors import SolverError
 from ctrlgen.core.units import same_dimension
 from ctrlgen.firmware.cprint import Real
-from ctrlgen.firmware.fourier import FEWEST, Fourier, series
 from ctrlgen.firmware.spline import Spline, fit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.solution import Solution
 
-LENGTH, ANGLE = 1e-10, 1e-8  # m, rad: what a compressed drive may move what is followed
-SHARE = 0.8  # of that; the rest is left to compilers that fuse a product and a sum
-BUDGET = 150  # instructions of one sample, Cortex-M4F
-SEARCH = 22  # of them to find the piece of a cubic
-STEPS = 6  # drive tolerances tried, a decade
-FINEST = 42  # 10^(-42/6) of a drive's range: below a float's rounding
+LENGTH_TOLERANCE, ANGLE_TOLERANCE = 1e-10, 1e-8  # m, rad: error of the followed signal that compression may cause
+TOLERANCE_SHARE = 0.8  # of the tolerances; the rest is left to compilers that fuse a product and a sum
+INSTRUCTION_BUDGET = 150  # of one sample, Cortex-M4F
+SEARCH_INSTRUCTIONS = 22  # of one sample, to find the piece of a cubic
+STEPS_A_DECADE = 6  # of the drive tolerance, in the search for the coarsest
+FINEST_STEP = 42  # 10^(-42/6) of a drive's range: below a float's rounding
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class SampleTable:
     kind = "table"
 
     def bytes(self, real: Real) -> int:
-        """Constants of the C."""
+        """Bytes of constants in the C."""
         return self.drive.size * real.bytes
 
     @property
@@ -54,21 +53,21 @@ class SampleTable:
         """(samples, axes): the drives in the arithmetic of the C."""
         return self.drive.astype(np.float32 if real is Real.FLOAT else np.float64)
 
-    def between(self, k: np.ndarray, part: np.ndarray, real: Real) -> np.ndarray:
-        """The same at k + part, 0 <= part < 1: the straight line to the next sample, or from the last to the first."""
+    def interpolated(self, k: np.ndarray, fraction: np.ndarray, real: Real) -> np.ndarray:
+        """(n, axes): the drives at k + fraction, 0 <= fraction < 1, linear to the next sample; the first follows the last."""
         low, high = self.values(real)[k], self.values(real)[(k + 1) % len(self.drive)]
-        return low + part.astype(low.dtype)[:, None] * (high - low)
+        return low + fraction.astype(low.dtype)[:, None] * (high - low)
 
 
-Curve = SampleTable | Spline | Fourier
+Curve = SampleTable | Spline
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One way to hold the drive. `length` [m], `angle` [rad]: how far the model driven so is off the command.
+    """One way to store the drive.
 
-    `drive`: how far the drive is off the solved one.
-    `instructions` of one sample, Cortex-M4F, are estimated. `remark` says why it was chosen, or why not. Numbers are None
+    `length` [m], `angle` [rad]: largest error of the followed signal; `drive`: largest difference from the solved drive.
+    `instructions`: estimate for one sample on a Cortex-M4F. `remark`: why it was chosen, or why not. Numbers are None
     where there is no such curve.
     """
 
@@ -86,7 +85,10 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Compression:
-    """The chosen `curve` in one arithmetic, the bounds (axes,) it keeps, infinite where it cannot pass them, and all candidates."""
+    """The chosen `curve` in one arithmetic and all candidates.
+
+    `low`, `high` (axes,): bounds checked at run time, infinite where the curve cannot exceed them.
+    """
 
     real: Real
     curve: Curve
@@ -100,17 +102,17 @@ class Compression:
         """The candidate that became the player."""
         return next(c for c in self.candidates if c.chosen)
 
-    def drives(self, k: np.ndarray, part: np.ndarray | None = None) -> np.ndarray:
-        """(n, axes): what the C answers at sample k, or `part` of the way to the next one."""
-        part = np.zeros(len(k)) if part is None else part
+    def drives(self, k: np.ndarray, fraction: np.ndarray | None = None) -> np.ndarray:
+        """(n, axes): what the C answers at sample k plus `fraction` of a sample time."""
+        fraction = np.zeros(len(k)) if fraction is None else fraction
         if not self.closed:
-            part = np.where(k == _samples(self.curve) - 1, 0.0, part)
-        values = self.curve.between(k, part, self.real)
+            fraction = np.where(k == _samples(self.curve) - 1, 0.0, fraction)
+        values = self.curve.interpolated(k, fraction, self.real)
         return np.clip(values, self.low.astype(values.dtype), self.high.astype(values.dtype)).astype(float)
 
 
 def compress(solution: Solution) -> dict[Real, Compression]:
-    """For each arithmetic the representation of fewest bytes within tolerance and `BUDGET`; the table where there is none."""
+    """For each arithmetic the form of fewest bytes within the tolerances and `INSTRUCTION_BUDGET`; else the table."""
     drive, closed = solution.drive, solution.scenario.closed
     low, high = solution.model.u_bounds
     span = np.ptp(drive, axis=0)
@@ -118,18 +120,12 @@ def compress(solution: Solution) -> dict[Real, Compression]:
 
     @cache
     def spline(step: int) -> Spline | None:
-        return fit(drive, low, high, span * 10 ** (-step / STEPS), closed)
+        return fit(drive, low, high, span * 10 ** (-step / STEPS_A_DECADE), closed)
 
-    @cache
-    def harmonics(count: int) -> Fourier:
-        return series(drive, count)
-
-    return {real: _compress(solution, real, spline, harmonics) for real in Real}
+    return {real: _compress(solution, real, spline) for real in Real}
 
 
-def _compress(
-    solution: Solution, real: Real, spline: Callable[[int], Spline | None], harmonics: Callable[[int], Fourier]
-) -> Compression:
+def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | None]) -> Compression:
     bounds = _inward(solution.model, real)
     n, closed = len(solution.drive), solution.scenario.closed
 
@@ -146,40 +142,8 @@ def _compress(
     table = SampleTable(np.clip(solution.drive, *bounds))
     found: list[tuple[Curve | None, Candidate]] = [(table, measured(table))]
 
-    def search(
-        kind: str, make: Callable[[int], Curve | None], first: int, last: int, further: Callable[[int], int]
-    ) -> None:
-        """Appends the coarsest curve within tolerance, or why there is none."""
-        bad, at, good, reached = first - 1, first, None, None
-        while good is None and at <= last:
-            curve = make(at)
-            if curve is None or curve.bytes(real) >= table.bytes(real):
-                break
-            reached = measured(curve)
-            if _within(reached):
-                good = at, curve, reached
-            else:
-                bad, at = at, min(further(at), last) if at < last else last + 1
-        while good is not None and good[0] - bad > 1:
-            middle = (bad + good[0]) // 2
-            curve = make(middle)
-            trial = None if curve is None else measured(curve)
-            if curve is not None and trial is not None and _within(trial):
-                good = middle, curve, trial
-            else:
-                bad = middle
-        if good is None:
-            found.append((None, _none(kind, "no shorter than the table within the tolerance")))
-        else:
-            found.append(good[1:])
-
-    search("cubic", spline, STEPS, FINEST, lambda step: step + STEPS)
-    if not closed:
-        found.append((None, _none("Fourier", "the path is not closed")))
-    elif n < FEWEST:
-        found.append((None, _none("Fourier", f"fewer than {FEWEST} samples")))
-    else:
-        search("Fourier", harmonics, 1, (n - 1) // 2, lambda count: 2 * count)
+    cubic = _coarsest(spline, measured, table.bytes(real))
+    found.append(cubic or (None, _none("cubic", "no shorter than the table within the tolerance")))
     usable = [(curve, c) for curve, c in found if curve is not None and _within(c) and _affordable(c)]
     curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else found[0]
     assert curve is not None
@@ -189,20 +153,46 @@ def _compress(
     return Compression(real, curve, closed, *_kept(curve, bounds, real), candidates)
 
 
-def instructions(curve: Curve, limited: int) -> int:
-    """Estimated instructions of one sample on a Cortex-M4F in float, where `limited` bounds of drives are kept at run time.
+def _coarsest(
+    spline: Callable[[int], Spline | None], measured: Callable[[Curve], Candidate], most: int
+) -> tuple[Spline, Candidate] | None:
+    """The spline of the coarsest drive tolerance that keeps the tolerance of what is followed; None where it needs `most` bytes.
 
-    Fitted to the counts of an emulator for clang -O2, one to eight drives. Double takes a library there, or a Cortex-M7.
+    Tolerances are refined by decades until one serves, then the coarsest that serves is found by bisection.
+    """
+    too_coarse, step, good = STEPS_A_DECADE - 1, STEPS_A_DECADE, None
+    while good is None:
+        curve = spline(step)
+        if curve is None or (candidate := measured(curve)).bytes is None or candidate.bytes >= most:
+            return None
+        if _within(candidate):
+            good = step, curve, candidate
+        elif step == FINEST_STEP:
+            return None
+        else:
+            too_coarse, step = step, min(step + STEPS_A_DECADE, FINEST_STEP)
+    while good[0] - too_coarse > 1:
+        middle = (too_coarse + good[0]) // 2
+        curve = spline(middle)
+        if curve is not None and _within(candidate := measured(curve)):
+            good = middle, curve, candidate
+        else:
+            too_coarse = middle
+    return good[1:]
+
+
+def instructions(curve: Curve, limited: int) -> int:
+    """Estimated instructions of one sample on a Cortex-M4F in float; `limited`: number of bounds checked at run time.
+
+    Fitted to counts of an emulator for clang -O2 with one to eight drives. A Cortex-M4F has no double in hardware.
     """
     if isinstance(curve, SampleTable):
         return 20 + 2 * curve.drive.shape[1]
-    if isinstance(curve, Spline):
-        return round(45 + 12.5 * curve.axes + (SEARCH if len(curve.pieces) > 1 else 0) + 6 * limited)
-    return round(27 + 3 * curve.axes + (7 + 5.25 * curve.axes) * curve.harmonics + 6 * limited)
+    return round(45 + 12.5 * curve.axes + (SEARCH_INSTRUCTIONS if len(curve.pieces) > 1 else 0) + 6 * limited)
 
 
 def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
-    """Worst distance [m] and angle [rad] between command and model driven by `drives`; a closed path is run twice."""
+    """Largest distance [m] and angle [rad] between command and model driven by `drives`; a closed path is run for two laps."""
     m, scenario, start = solution.model, solution.scenario, solution.trace
     command, role = solution.command, scenario.file.follow
     if scenario.closed:
@@ -223,11 +213,16 @@ def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
 
 
 def _within(c: Candidate) -> bool:
-    return c.length is not None and c.angle is not None and c.length <= SHARE * LENGTH and c.angle <= SHARE * ANGLE
+    return (
+        c.length is not None
+        and c.angle is not None
+        and c.length <= TOLERANCE_SHARE * LENGTH_TOLERANCE
+        and c.angle <= TOLERANCE_SHARE * ANGLE_TOLERANCE
+    )
 
 
 def _affordable(c: Candidate) -> bool:
-    return c.instructions is not None and c.instructions <= BUDGET
+    return c.instructions is not None and c.instructions <= INSTRUCTION_BUDGET
 
 
 def _remark(c: Candidate, best: Candidate, usable: bool) -> str:
@@ -236,7 +231,7 @@ def _remark(c: Candidate, best: Candidate, usable: bool) -> str:
         return "fewest bytes" if usable else "as solved; nothing is within the tolerance"
     if not _within(c):
         return "not within the tolerance"
-    return f"more bytes than the {best.kind}" if _affordable(c) else f"more than {BUDGET} instructions"
+    return f"more bytes than the {best.kind}" if _affordable(c) else f"more than {INSTRUCTION_BUDGET} instructions"
 
 
 def _none(kind: str, remark: str) -> Candidate:
@@ -246,8 +241,6 @@ def _none(kind: str, remark: str) -> Candidate:
 def _size(curve: Curve) -> str:
     if isinstance(curve, SampleTable):
         return f"{len(curve.drive)} rows"
-    if isinstance(curve, Fourier):
-        return f"{curve.harmonics} harmonic{'s' * (curve.harmonics > 1)}"
     count = sum(p.segments for p in curve.pieces)
     return f"{count} segments" + (f" in {len(curve.pieces)} pieces" if len(curve.pieces) > 1 else "")
 
@@ -269,7 +262,7 @@ def _inward(model: Model, real: Real) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _kept(curve: Curve, bounds: tuple[np.ndarray, np.ndarray], real: Real) -> tuple[np.ndarray, np.ndarray]:
-    """The bounds that must be kept at run time: those that the curve's own extremes, with eight roundings, may pass; else infinite."""
+    """The bounds to check at run time: those that the curve's extremes, with eight roundings, may exceed; else infinite."""
     low, high = curve.extremes()
     slack = 8 * float(np.finfo(np.float32 if real is Real.FLOAT else np.float64).eps) * np.maximum(abs(low), abs(high))
     if isinstance(curve, SampleTable):

@@ -65,10 +65,13 @@ class Real(Enum):
         return text + ("f" if self is Real.FLOAT else "")
 
 
-WIDER = 0.01  # than the range: the ends are met up to rounding, and so the start is never far off
-MOST_STEPS = {Real.DOUBLE: 4, Real.FLOAT: 3}  # of Heron from a line; beyond, `root` is as cheap
-MOST_FACTORS = 64  # exponents of powers that are multiplied out
-TRUSTED = 1e15  # sizes of products between one over this and this are far from both ends of a float
+WIDER = 0.01  # than the range: arguments may leave it by rounding
+MOST_STEPS = {
+    Real.DOUBLE: 4,
+    Real.FLOAT: 3,
+}  # of Heron's method from a linear start; with more, calling `root` is as cheap
+MOST_FACTORS = 64  # largest whole exponent that is printed as products
+TRUSTED = 1e15  # products between 1/TRUSTED and TRUSTED neither overflow nor underflow a float
 PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
 _OPERATOR = re.compile(r" (?:[-+*/<>?]|<=|==|!=|&&|\|\|) |\(-[a-z]|[a-z]\w*\(")
 

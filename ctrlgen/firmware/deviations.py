@@ -10,9 +10,9 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Deviation:
-    """Rule `number`, the files (patterns of names) it is not followed in, what stands there, and why.
+    """A rule that is not followed: its `number`, patterns of the file names, what the code does, and why.
 
-    `where`: a word of the C without which a file follows the rule after all.
+    `where`: only files that contain this word deviate.
     """
 
     number: str
@@ -29,25 +29,25 @@ class Deviation:
 DEVIATIONS = (
     Deviation(
         "5.9", ("*_online_f??.c", "*_player_f??.c", "*_selftest_f??.c"),
-        "names of static functions and tables that several of these files have",
-        "Each file is complete without the others, and a name that no other file can see cannot be mistaken by the "
-        "linker. The same step has the same name in float and double, so the two can be compared line by line.",
+        "the same names of static functions and tables in several files",
+        "Each file is complete without the others, and the linker does not see static names. The float and the double "
+        "version use the same names, so they can be compared line by line.",
     ),
     Deviation(
         "2.5", ("*_player_f??.h", "*_selftest_f??.h", "*_vectors_f??.h"),
         "constants of an interface that its own source does not read",
-        "They are for the caller: the number of samples, the status to compare with, the tolerance.",
+        "The caller uses them: number of samples, status values, tolerances.",
     ),
     Deviation(
         "19.2", ("*_online_f??.c", "*_plant_f??.c"),
         "the unions in root(), exponential() and logarithm(), by which the exponent of a number is halved, set or read",
-        "C99 defines what is read from another member; it spares a library call, and both members have the same bytes.",
+        "C99 defines the result of reading the other member, both members have the same size, and it avoids a library call.",
         "union",
     ),
     Deviation(
         "19.2", ("*_selftest_f??.c",),
         "the union by which NaN and infinity are written as bits",
-        "C99 has no constant for them without a library header, and an operation that makes one may be folded or may trap.",
+        "C99 has no constant for them without a library header; a compiler may fold an operation that makes one, or it may trap.",
     ),
 )  # fmt: skip
 # Required, not advisory: only in the program that prints the outcome of the test on a computer. No firmware contains it.
@@ -55,7 +55,7 @@ HOST_ONLY = (
     Deviation(
         "21.6", ("test_*.c",),
         "printf",
-        "The test runs on a computer and says which vector disagrees. It is no part of the firmware.",
+        "The test runs on a computer and prints which vector disagrees. It is not part of the firmware.",
     ),
 )  # fmt: skip
 

@@ -67,8 +67,11 @@ class FmiUnit:
 
 @dataclass(frozen=True)
 class Fmus:
-    """What was written: `paths` of the units; `binary` the platform they can run on, None where there are only sources,
-    and then `remark` says why. Without a controller `remark` says that too."""
+    """What was written.
+
+    `paths` of the units; `binary`: the platform they run on, None where only sources were written. `remark` says why a
+    binary or the controller is missing.
+    """
 
     paths: tuple[Path, ...]
     binary: str | None
@@ -101,7 +104,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
     gets no controller. Raises InputError for a scenario without a sample rate, ToolError where a compiler refuses.
     """
     if fmi not in VERSIONS:
-        raise InputError("--fmi", [Fault(str(fmi), "is not a version written here; use 3 or 2")])
+        raise InputError("--fmi", [Fault(str(fmi), "is not a supported FMI version; use 3 or 2")])
     if scenario.sample_time is None:
         what = 'is missing: FMI co-simulation advances by samples; add sample_rate = "1 kHz" and duration = "1 s"'
         raise InputError(scenario.path, [Fault("sample_rate", what)])
@@ -114,7 +117,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
         units = [_plant_unit(scenario, plant, Path(scratch))]
         if plant.inertial:
             remark = " ".join(
-                (remark, "no controller: the device has inertia, which the online controller does not undo")
+                (remark, "no controller: the device has inertia, which the feedforward controller cannot invert")
             )
         else:
             units.insert(0, _controller_unit(scenario, plant, Path(scratch)))
@@ -139,7 +142,7 @@ def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     if m.n_states:
         groups.append(("state", len(outputs)))
         outputs += _variables("state", m.signals["state"], "output", "discrete", 1 + len(inputs) + len(outputs))
-    what = "0, or a sum of 1 displacement, 2 composite limit, 4 state, 8 drive held at its limit, 16 input not usable"
+    what = "0, or a sum of 1 displacement, 2 composite limit, 4 state, 8 drive limit, 16 unusable input"
     status = Variable(1 + len(inputs) + len(outputs), "status", "output", "discrete", what, {}, "Int32")
     return _Unit(
         "controller", core, f"online controller of {m.device.title}", inputs, outputs, status,
@@ -224,8 +227,8 @@ def _write_unit(
     """The FMU of `unit`, whose C is in `folder`, in the folder `out`; its file's name."""
     identifier = f"{scenario.name}_{unit.kind}"
     core = {f"{unit.core}.{end}": (folder / f"{unit.core}.{end}").read_bytes() for end in ("c", "h")}
-    said = repr((__version__, fmi, sorted(scenario.digest.items()))).encode()
-    digest = hashlib.sha256(said + b"".join(core.values())).hexdigest()
+    identity = repr((__version__, fmi, sorted(scenario.digest.items()))).encode()
+    digest = hashlib.sha256(identity + b"".join(core.values())).hexdigest()
     sources = [f"{identifier}.c", f"{unit.core}.c"]
     context = unit.more | {
         "identifier": identifier, "fmi": f"{fmi}.0", "core": unit.core, "title": comment(unit.title), "unit": unit.kind,

@@ -1,11 +1,11 @@
-"""Model and solution -> a folder of C99: the only writer of C.
+"""Model and solution -> a package of C99, the only writer of C.
 
 `online` controllers (any reachable target -> drives) and `player`s (the solved trajectory, compressed), each in
 double and in float, with a test of reference `vectors` that runs on the target; around them the package of
 `ctrlgen.firmware.package`. Same input, same bytes.
 
-The C stands at the root: that is where Arduino looks in a library without src/, and PlatformIO, CMake and Zephyr are
-told. What is for a computer only stands in test/.
+The C is at the root, where Arduino looks in a library without src/; the build files name it for PlatformIO, CMake and
+Zephyr. Programs for a computer are in test/.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PIECES = ("online", "player", "selftest", "vectors")
 
 @dataclass(frozen=True)
 class CFolder:
-    """What was generated: `path`, and the names of the pieces in each arithmetic."""
+    """The generated package: its `path`, and the names of its parts in each arithmetic."""
 
     path: Path
     name: str

@@ -135,7 +135,7 @@ def _context(
 
 
 def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
-    """Rows of the README's table, bytes in double and in float; `chosen` is how the player's samples are held in each."""
+    """Rows of the README's table of memory, bytes in double and float; `chosen`: the player's form in each arithmetic."""
     x, n, n_s, m, count = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
@@ -151,11 +151,11 @@ def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[
         _counted("vectors", count * (m + n) + played * n, 12 * count + 4 * played, vectors),
     ]
     if played:
-        held = "; ".join(
+        forms = "; ".join(
             f"{real.value}: {kept.kind}, {kept.size}" for real, kept in zip(Real, chosen, strict=True) if kept
         )
         sizes = [kept.bytes if kept else 0 for kept in chosen]
-        formula = f"constants, only if the player is called; {held}"
+        formula = f"constants, only if the player is called; {forms}"
         rows.insert(2, {"what": "player's table", "double": sizes[0], "float": sizes[1], "formula": formula})
     return rows
 

@@ -67,7 +67,7 @@ class Plant:
 
     @cached_property
     def rest(self) -> ca.Function:
-        """x after one Newton step on dx/dt = 0, z held; memories by samples take their next value, clocks stand."""
+        """x after one Newton step on dx/dt = 0, z constant; states that step once a sample take their next value, clocks stop."""
         m = self.model
         x = m.x[:]
         rows = [i for i in range(x.numel()) if i not in m.stepped and i not in m.clocks and not m.rates[i].is_zero()]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.firmware.compression import BUDGET, Candidate, Compression, SampleTable
+from ctrlgen.firmware.compression import INSTRUCTION_BUDGET, Candidate, Compression, SampleTable
 from ctrlgen.firmware.spline import Spline
 from ctrlgen.firmware.templates import comment
 from ctrlgen.trajectory.solution import Solution
@@ -32,7 +32,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "limited": limited if any(limited.values()) else None,
         "chosen": compression.chosen,
         "lines": [_line(c) for c in compression.candidates],
-        "budget": BUDGET,
+        "budget": INSTRUCTION_BUDGET,
         "rate": 1 / (solution.scenario.sample_time or 1.0),
     }
 

@@ -18,17 +18,17 @@ import scipy
 
 from ctrlgen.firmware.cprint import Real
 
-DENSE = 400  # samples of a piece up to which a dense solver, which takes rank deficiency, is as fast
-AT_LIMIT = 1e-6  # of a drive's range: nearer to its bound it is held there (IPOPT stays 1e-8 away)
-KINK = 2.5  # times the fourth differences around it: perhaps a kink of the drive's curvature
-NOISE = 1e-3  # of the tolerance: smaller fourth differences do not matter
-JOIN = 4  # rows that a piece more costs, its entry in the search included
+DENSE = 400  # samples of a piece up to which the dense solver is as fast; it also takes rank-deficient fits
+AT_LIMIT = 1e-6  # of a drive's range: nearer to a bound the drive counts as at the bound (IPOPT stays 1e-8 away)
+KINK = 2.5  # times the median of the neighbouring fourth differences: a possible kink of the curvature
+NOISE = 1e-3  # of the tolerance: floor of that median
+JOIN = 4  # rows that one more piece costs, its entry in the table of pieces included
 MOST_KINKS = 64
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Samples `start` to `stop` by `control` (rows, axes), a sixth of the B-spline's, and `segments` of equal length."""
+    """Samples `start` to `stop`: `segments` of equal length, `control` (rows, axes) the control points divided by six."""
 
     start: int
     stop: int
@@ -106,19 +106,19 @@ class Spline:
 
     def values(self, real: Real) -> np.ndarray:
         """(samples, axes): the drives, in the operations and the order of the C."""
-        return self.between(np.arange(self.samples), np.zeros(self.samples), real)
+        return self.interpolated(np.arange(self.samples), np.zeros(self.samples), real)
 
-    def between(self, k: np.ndarray, part: np.ndarray, real: Real) -> np.ndarray:
-        """The same at k + part, 0 <= part < 1: the curve, or across a join the straight line of the two samples."""
+    def interpolated(self, k: np.ndarray, fraction: np.ndarray, real: Real) -> np.ndarray:
+        """(n, axes): the drives at k + fraction, 0 <= fraction < 1: on the curve, or linear where the next sample is in another piece."""
         number = np.float32 if real is Real.FLOAT else np.float64
         starts = [p.start for p in self.pieces]
         piece, after = np.searchsorted(starts, k, side="right") - 1, (k + 1) % self.samples
         same = (np.searchsorted(starts, after, side="right") - 1 == piece) & (after > k)
-        joined = self.periodic | same | (part == 0)
+        joined = self.periodic | same | (fraction == 0)
         if not np.all(joined):
             low, high = self.values(real)[k], self.values(real)[after]
-            straight = low + part.astype(number)[:, None] * (high - low)
-            return np.where(joined[:, None], self.between(k, np.where(joined, part, 0.0), real), straight)
+            straight = low + fraction.astype(number)[:, None] * (high - low)
+            return np.where(joined[:, None], self.interpolated(k, np.where(joined, fraction, 0.0), real), straight)
         start, count, length, row = (
             np.array(column)[piece]
             for column in zip(
@@ -131,7 +131,7 @@ class Spline:
         )
         place = (k - start) * count
         segment = place // length
-        rest = (place - segment * length).astype(number) + part.astype(number) * count.astype(number)
+        rest = (place - segment * length).astype(number) + fraction.astype(number) * count.astype(number)
         over = rest >= length.astype(number)
         rest = np.where(over, rest - length.astype(number), rest)
         segment = np.where(over, segment + 1, segment)

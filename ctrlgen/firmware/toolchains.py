@@ -1,4 +1,4 @@
-"""Compilers: which are there, what they are called with."""
+"""C compilers: finding them, their flags, calling them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COMPILERS = ("gcc", "clang")
 
 
 def find_compilers() -> dict[str, str]:
-    """Present C compilers with their version line: gcc and clang, or else $CC or cc. Raises ToolError when there is none."""
+    """C compilers found -> version line: gcc and clang, or else $CC or cc. Raises ToolError when there is none."""
     present = [name for name in COMPILERS if shutil.which(name)]
     others = [name for name in (os.environ.get("CC", ""), "cc") if name and shutil.which(name)]
     found = {}
@@ -48,5 +48,5 @@ def compile_c(compiler: str, include: Path, words: list[str]) -> None:
     if done.returncode < 0:
         raise KeyboardInterrupt
     if done.returncode != 0:
-        said = done.stderr.strip()[:2000] or f"(it said nothing; status {done.returncode} for: {' '.join(command)})"
-        raise ToolError(f"{compiler} refuses the C:\n{said}")
+        output = done.stderr.strip()[:2000] or f"(no output; status {done.returncode} for: {' '.join(command)})"
+        raise ToolError(f"{compiler} refuses the C:\n{output}")

@@ -1,4 +1,4 @@
-"""Reference vectors: what the controller answers to some targets, for a test that runs on the target."""
+"""Reference vectors: targets and the controller's answers to them, for the self test that runs in the firmware."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ UNUSABLE = 3  # NaN, infinity, minus infinity: each in every channel of the targ
 
 
 def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
-    """Targets and the drives and status the reference answers, and what rounding may change.
+    """Targets with the drives and the status that the model answers, and the tolerance of the drives.
 
-    The tolerance is the change of drive that four roundings of what it follows from cause.
+    The tolerance is the change of drive that four roundings of displacement and actuator state cause.
     """
     controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     rng = np.random.default_rng(0)
@@ -34,9 +34,8 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
         settle = k == 0 or k >= len(targets) - len(beyond) - 1 or controller.moving is None
         before, step = state, controller.step(state, target, settle=settle)
         state = step.state
-        exact = (
-            not step.status & ControllerStatus.DRIVE
-        )  # a bisection may turn the other way in float: only its status is compared
+        # rounding may make the line search accept another trial in float: only the status is compared there
+        exact = not step.status & ControllerStatus.DRIVE
         rows.append(
             {"target": target, "drive": step.drive, "status": int(step.status), "settle": settle, "exact": exact}
         )
@@ -50,8 +49,10 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
 
 
 def played_vectors(compression: Compression | None, samples: int) -> dict[str, Any]:
-    """Samples of what the player answers, the first and the last among them; 16 roundings of the largest, since a target may
-    fuse multiplications with additions."""
+    """Samples of the player, the first and the last among them, and their tolerance.
+
+    The tolerance is 16 roundings of the largest drive, since a processor may fuse products and sums.
+    """
     if compression is None:
         return {"played": [], "played_tolerance": 0.0, "played_unusable": 0}
     indices = np.unique(np.linspace(0, samples - 1, PLAYED).round().astype(int))

@@ -1,6 +1,7 @@
-"""The online controller: wanted signal -> drives, with every limit kept, in a fixed number of operations.
+"""The feedforward controller: commanded signal -> drives, with every limit kept, in a fixed number of operations.
 
-This is the reference of the generated C: the C template does the same steps in the same order.
+It has no feedback: what it keeps of the device is the state that its own model predicts. The generated C
+(`online.c.j2`) makes the same decisions; docs/limiter.md says how their equality is shown.
 """
 
 from __future__ import annotations
@@ -18,26 +19,26 @@ from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.numerics.interval_arithmetic import bounds
 
-SLACK = 1e-9  # of a signal's typical size: what a limit may be missed by before it is reported and made up for
-COMPOSITE_ROUNDS = (
-    8  # an effect's memory does not shrink with the displacement; its share of the excess does, each time
-)
-SECANT_STEPS = 3  # of the way to a target that the drives cannot reach in one sample
-SECANT_FRACTION = (
-    1 - 2**-8
-)  # of the way to where straight drives would meet their limit: curved ones meet it a little earlier or later
-SWEEPS = 3  # over the displacements, toward the nearest pose: 0.5 % farther at most on the shipped devices, clipping 50 to 85 %
-NEGLIGIBLE = 1e-6  # of a limit: directions in which nothing comes near it
+SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
+# The memory of an effect does not scale with the displacement, so its share of the excess is removed over several rounds.
+COMPOSITE_ROUNDS = 8
+
+SECANT_STEPS = 3  # of the line search toward a target that the drives cannot reach in one sample
+SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
+# Of coordinate descent toward the nearest pose. On the shipped devices it ends 0.5 % farther than the optimum at most;
+# clipping alone ends 50 to 85 % farther.
+SWEEPS = 3
+NEGLIGIBLE = 1e-6  # of a limit: a direction that uses less of it over the whole range is left out of the bound
 
 
 class ControllerStatus(IntFlag):
-    """What the controller had to do. 0: everything as commanded."""
+    """What the controller had to change. 0: the target is reached as commanded."""
 
-    DISPLACEMENT = 1  # the target needs a displacement outside its range; the nearest target inside was taken
-    COMPOSITE = 2  # a limit on stress or rotation: the displacement was shrunk toward home
-    STATE = 4  # the actuator state (temperature) was held at its limit
-    DRIVE = 8  # the drive was held at its limit: the target comes later than commanded
-    INPUT = 16  # not a number or absurdly large: drives at zero, target ignored
+    DISPLACEMENT = 1  # the target lies beyond the displacement range; the nearest target inside was taken
+    COMPOSITE = 2  # a limit on stress or rotation: the displacement was scaled toward home
+    STATE = 4  # the actuator state (temperature) was set to its limit
+    DRIVE = 8  # a drive is at its limit: the target is reached later than commanded
+    INPUT = 16  # the target is not a number or absurdly large: it is ignored, drives at zero or the nearest admissible value
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,11 @@ class Controller:
 
     @cached_property
     def nominal(self) -> Model:
-        """The model with every parameter at its nominal number, which is what a controller can use."""
+        """The model with every free parameter at its nominal value."""
         return build_model(self.model.device) if self.model.p.numel() else self.model
 
     def _worst_in_range(self, limit: Limit) -> float:
-        """The largest share of a convex limit over the displacement range, nothing remembered: that of its worst corner."""
+        """The largest ratio of a convex limit's value to its bound over the displacement range, which is at a corner of it."""
         m = self.nominal
         corners = np.array(list(product(*zip(*m.z_bounds, strict=True)))).T
         shares = ca.Function("shares", [m.x, m.z], [limit.expr / limit.upper])
@@ -75,14 +76,14 @@ class Controller:
 
     @cached_property
     def guarded_limits(self) -> tuple[Limit, ...]:
-        """Composite limits that the range of the displacement alone does not keep."""
+        """Composite limits that can be broken by displacements inside their range."""
         limits = [limit for limit in self.nominal.composite_limits() if limit.upper is not None]
         x = self.nominal.x
         return tuple(limit for limit in limits if ca.depends_on(limit.expr, x) or self._worst_in_range(limit) > 1)
 
     @cached_property
     def composite_ratio(self) -> ca.Function:
-        """(x, z, wanted) -> the largest of the guarded limits' expr/upper at the wanted displacement; above 1 one is broken."""
+        """(x, z, wanted) -> the largest ratio of a guarded limit's value to its bound at displacement `wanted`; above 1 it is broken."""
         m = self.nominal
         wanted = ca.SX.sym("wanted", m.z.numel())
         x_then = ca.vertcat(m.x[: m.n_states], (self.moving or self.static).memory(m.x, m.z, wanted))
@@ -97,14 +98,14 @@ class Controller:
 
     @property
     def composite_rounds(self) -> int:
-        """How often a displacement is shrunk toward home: once, if all of a limit shrinks with it."""
+        """How often a displacement is scaled toward home: once where the limited quantities are proportional to it."""
         m = self.nominal
         bent = ca.depends_on(ca.jacobian(m.signals["displacement"].expr, m.z), m.z)
         return COMPOSITE_ROUNDS if bent or m.x.numel() > m.n_states else 1
 
     @cached_property
     def nearest(self) -> ca.Function:
-        """beyond -> the displacement in its range whose followed signal is nearest to that of a displacement beyond it.
+        """beyond -> the displacement in range whose followed signal is nearest to that of the displacement `beyond`.
 
         Minimises |W (z - beyond)|^2 over the box, W the slope of the followed signal at home in its typical sizes, by
         `SWEEPS` of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) from the clipped
@@ -128,7 +129,7 @@ class Controller:
 
     @cached_property
     def composite_bound(self) -> ca.Function | None:
-        """wanted -> a cheap bound of the guarded limits' share; None where there is none.
+        """wanted -> a cheap upper bound of `composite_ratio`; None where there is none.
 
         The followed signal's own directions v_k (to first order at home) are a basis, z = sum_k lambda_k v_k, and for a
         convex f with f(s z) = |s| f(z), as stresses of a linear structure are, f(z) <= sum_k |lambda_k| f(v_k).
@@ -155,14 +156,14 @@ class Controller:
         )
 
     def _composite_ratios(self, displacements: np.ndarray) -> np.ndarray:
-        """The guarded limits' share at each column of `displacements`, nothing remembered."""
+        """`composite_ratio` at each column of `displacements`, with no memory of effects."""
         m, count = self.nominal, displacements.shape[1]
         cold = np.tile(m.rest[:, None], (1, count))
         return self.composite_ratio.map(count)(cold, 0 * displacements, displacements).full().ravel()
 
     @cached_property
     def state_can_be_limited(self) -> bool:
-        """Whether a displacement in its range can want an actuator state beyond its limits, by interval arithmetic."""
+        """Whether a displacement in range can need an actuator state beyond its limits, by interval arithmetic."""
         m, n = self.nominal, self.nominal.n_states
         ranges = {"wanted": m.z_bounds, "z": m.z_bounds, "x": m.x_bounds}
         for k in (self.static, self.moving or self.static) if n else ():
@@ -174,17 +175,20 @@ class Controller:
 
     @cached_property
     def input_limits(self) -> np.ndarray:
-        """Largest |target| per channel that is taken for a command at all: 1e5 typical sizes, far outside any range."""
+        """(channels,) largest |target| that is accepted as a command: 1e5 typical sizes, far outside any range."""
         return 1e5 * np.array(self.model.signals[self.follow].scale)
 
     @cached_property
     def safe_drive(self) -> np.ndarray:
-        """The drive without a usable target: zero, or what is nearest to it in range. A heater off cools passively."""
+        """(n_u,) the drive without a usable target: zero, or the admissible value nearest to it. A heater that is off cools passively."""
         return np.clip(0.0, *self.nominal.u_bounds)
 
     @cached_property
     def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What displacement, actuator state and drive may miss a limit by unreported; the drive's is theirs, carried through."""
+        """Excess over a limit that is clipped without report, for displacement, actuator state and drive.
+
+        That of the drive is what the other two change it by.
+        """
         m, n = self.nominal, self.nominal.n_states
         z_slack, state_slack = self.slack * m.z_scale, self.slack * m.x_scale[:n]
         x, z = self.rest()
@@ -193,7 +197,7 @@ class Controller:
         return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
-        """State of a cold device: (x, z)."""
+        """State (x, z) of a device at rest at ambient temperature."""
         return self.model.rest.copy(), np.zeros(len(self.model.axes))
 
     def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> Step:
@@ -293,7 +297,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Step:
-    """One answer of the controller, SI: what it did, and the state it expects at the next sample."""
+    """One answer of the controller, SI; `state` (x, z) is the one predicted for the next sample."""
 
     status: ControllerStatus
     displacement: np.ndarray
@@ -307,7 +311,7 @@ def _row(value: ca.DM) -> np.ndarray:
 
 
 def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:
-    """`wanted` limited to low ... high, NaN to low, and whether that moved it by more than the slack (NaN always)."""
+    """`wanted` clipped to low ... high (NaN to low), and whether that changed it by more than `slack`; true for NaN."""
     raised = np.where(wanted > low, wanted, low)
     limited = np.where(raised < high, raised, high)
     with np.errstate(invalid="ignore"):  # inf - inf, of a state that overflowed

@@ -13,7 +13,10 @@ from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.verification import comparison
 from ctrlgen.verification.in_loop import TargetRun
 
-SHOWN = {"um": ("nm", comparison.LENGTH, compression.LENGTH), "rad": ("nrad", comparison.ANGLE, compression.ANGLE)}
+SHOWN = {
+    "um": ("nm", comparison.LENGTH_LIMIT, compression.LENGTH_TOLERANCE),
+    "rad": ("nrad", comparison.ANGLE_LIMIT, compression.ANGLE_TOLERANCE),
+}
 SCALES = {"nm": 1e9, "nrad": 1e9}
 DECADES = 18  # that the logarithmic axis shows at most: down to the roundings of a double
 KINDS = {"scenario": "along the scenario", "worst": "worst case", "player": "player"}

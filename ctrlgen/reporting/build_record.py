@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.units import base_unit, from_si, show
-from ctrlgen.firmware.compression import BUDGET
+from ctrlgen.firmware.compression import INSTRUCTION_BUDGET
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.model.feedforward import Controller, ControllerStatus
@@ -22,11 +22,12 @@ from ctrlgen.verification.hostile import SEED
 from ctrlgen.verification.in_loop import InLoop, Stopped, TargetRun
 
 BUDGET_CORE, BUDGET_DRIVES = "Cortex-M4F", 6  # the core and the number of drives that the budgets are stated for
-BUDGETS = {"scenario": 700, "worst": 6000, "player": BUDGET}  # instructions of one sample; goals, not conditions
+# instructions of one sample; goals, not conditions
+BUDGETS = {"scenario": 700, "worst": 6000, "player": INSTRUCTION_BUDGET}
 STATUS_WORDS = {
     ControllerStatus.DISPLACEMENT: "displacement beyond its range: the nearest target inside was taken",
-    ControllerStatus.COMPOSITE: "a limit of several channels, such as a stress: displacement shrunk toward home",
-    ControllerStatus.STATE: "actuator state held at its limit",
+    ControllerStatus.COMPOSITE: "a limit of several channels, such as a stress: displacement scaled toward home",
+    ControllerStatus.STATE: "actuator state set to its limit",
     ControllerStatus.DRIVE: "drive at its limit: as far toward the target as it reaches in one sample",
     ControllerStatus.INPUT: "target is no number, or absurd: safe drives",
 }

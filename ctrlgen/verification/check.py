@@ -1,4 +1,4 @@
-"""What a check of the generated C by a tool found, or why it did not run."""
+"""The result of a tool's check of the generated C, or the reason why it did not run."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Literal
 
 from ctrlgen.firmware.cprint import Real
 
-PATIENCE = 900.0  # s, after which a tool is taken to hang
+PATIENCE = 900.0  # s; a tool that takes longer is stopped
 
-LEFT_OUT = "left out by --quick; run without it"
+LEFT_OUT = "not run because of --quick; run without it"
 
 State = Literal["passed", "failed", "not run"]
 
@@ -45,26 +45,26 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether it ran and found nothing that is not permitted."""
+        """Whether the tool ran and every finding is permitted."""
         return self.state == "passed"
 
 
-def judged(
+def finished(
     tool: str, version: str, subjects: Sequence[tuple[str, Real]], findings: Sequence[CheckFinding], note: str = ""
 ) -> Check:
-    """A check that ran: failed by any finding that is not permitted."""
+    """The check of a tool that ran; it failed where a finding is not permitted."""
     ordered = tuple(sorted(set(findings), key=lambda f: (f.file, f.line, f.rule, f.text)))
     state: State = "passed" if all(f.permitted for f in ordered) else "failed"
     return Check(tool, version, tuple(subjects), state, ordered, note)
 
 
 def not_run(tool: str, subjects: Sequence[tuple[str, Real]], reason: str, version: str = "") -> Check:
-    """A check that did not run, with what to do about it."""
+    """A check that did not run; `reason` also says what to do about it."""
     return Check(tool, version, tuple(subjects), "not run", (), reason)
 
 
 def run_tool(words: Sequence[str], **options: object) -> subprocess.CompletedProcess[str]:
-    """The finished program with its words. Raises KeyboardInterrupt where it was interrupted, OSError where it is missing."""
+    """Runs a program and captures its output. Raises KeyboardInterrupt when interrupted, OSError when the program is missing."""
     try:
         done = subprocess.run(
             list(words), capture_output=True, text=True, errors="replace", check=False, start_new_session=True,

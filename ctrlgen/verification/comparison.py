@@ -1,4 +1,4 @@
-"""The generated C against the model: build it strictly, run it, say where it first differs.
+"""Compares the generated C with the model: builds it strictly, runs it, reports where it first differs.
 
 Every compiler present builds every arithmetic. Three references: the controller evaluated by CasADi
 (`ctrlgen.model.feedforward`), IPOPT's solution of the scenario, and the model simulated forward with the
@@ -28,18 +28,21 @@ from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.host import build_host, run_host
-from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.reference import ReferenceAnswers
 from ctrlgen.verification.tracking import reached
 
 # What a difference may be, and why.
-LENGTH = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}  # m: a hundredth of a nanometre; a tenth, below any sensor here
-ANGLE = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}  # rad: 1e-8 rad moves the platform's rim by 0.02 nm
-RELATIVE = 1e-12  # double C against CasADi: 4500 roundings
-EXCESS = {Real.DOUBLE: 1e-9, Real.FLOAT: 1e-5}  # of a limit's bound: roundings
-EXCESS_REMEMBERED = (
+LENGTH_LIMIT = {
+    Real.DOUBLE: 1e-11,
+    Real.FLOAT: 1e-10,
+}  # m: 0.01 nm, 0.1 nm: below the resolution of every sensor in the shipped devices
+ANGLE_LIMIT = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}  # rad: 1e-8 rad moves the platform's rim by 0.02 nm
+RELATIVE_LIMIT = 1e-12  # double C against CasADi: about 4500 roundings
+EXCESS_LIMIT = {Real.DOUBLE: 1e-9, Real.FLOAT: 1e-5}  # of a limit's bound: rounding
+EXCESS_LIMIT_WITH_MEMORY = (
     1e-3  # the same where effects remember: while the drives are limited a memory moves on under the displacement
 )
-ROUNDINGS = 16  # float C against CasADi: roundings of the largest value that the chain may pile up
+ROUNDINGS = 16  # float C against CasADi: of the largest value, accumulated over one evaluation
 
 
 @dataclass(frozen=True)
@@ -58,13 +61,13 @@ class ComparisonRow:
 
     @property
     def passed(self) -> bool:
-        """Whether every sample is within the limit (not a number is not)."""
+        """Whether every sample is within the limit; NaN is not."""
         return self.first is None
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All rows, and the tools: compiler -> version line; `missing` compilers were not run."""
+    """All rows; `compilers`: name -> version line; `missing`: compilers that were not found."""
 
     rows: tuple[ComparisonRow, ...]
     compilers: dict[str, str]
@@ -72,7 +75,7 @@ class Comparison:
 
     @property
     def passed(self) -> bool:
-        """Whether everything that ran is within tolerance; something did run."""
+        """Whether something ran and everything that ran is within its limit."""
         return bool(self.rows) and all(row.passed for row in self.rows)
 
 
@@ -80,9 +83,9 @@ def compare(
     folder: CFolder,
     solution: Solution,
     progress: Callable[[str], None] = lambda _: None,
-    reference: Reference | None = None,
+    reference: ReferenceAnswers | None = None,
 ) -> Comparison:
-    """Builds and runs `folder` with every compiler present; `reference` where it is there already.
+    """Builds and runs `folder` with every compiler found; `reference`: where it was computed before.
 
     Raises ToolError when a build or a run fails.
     """
@@ -92,7 +95,7 @@ def compare(
         for real in Real:
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
         programs = [pool.submit(build_host, compiler, real, folder, Path(scratch)) for compiler, real in builds]
-        reference = reference or Reference(solution)  # while the compilers work
+        reference = reference or ReferenceAnswers(solution)  # while the compilers work
         rows: list[ComparisonRow] = []
         for (compiler, real), program in zip(builds, programs, strict=True):
             rows += _rows(f"{compiler} {real.value}", real, program.result(), reference, folder.compression.get(real))
@@ -101,7 +104,7 @@ def compare(
 
 
 def _rows(
-    build: str, real: Real, program: Path, ref: Reference, compression: Compression | None
+    build: str, real: Real, program: Path, ref: ReferenceAnswers, compression: Compression | None
 ) -> list[ComparisonRow]:
     """All comparisons of one build."""
     n, m = len(ref.model.axes), ref.model
@@ -117,7 +120,7 @@ def _rows(
         unit = {"um": "nm", "degC": "K", "urad": "rad"}.get(unit, unit)
         rows.append(_row(build, what, signal.label, unit, np.asarray(difference)[:, channels], limit))
 
-    left = (1 - SECANT_FRACTION) ** 2  # of the range: what the third trial toward a limit still moves
+    left = (1 - SECANT_FRACTION) ** 2  # of the range: what the third trial of the line search can still change
     states = (m.x_bounds[0][: m.n_states], m.x_bounds[1][: m.n_states])
     ties_of = {
         role: left * float(np.max(high - low, initial=0.0))
@@ -126,17 +129,17 @@ def _rows(
 
     def strict(role: str, size: float, wider: float) -> float:
         if real is Real.DOUBLE:
-            return RELATIVE * size
+            return RELATIVE_LIMIT * size
         limit = _float_limit(m, role, size, ref)
-        return wider * (max(limit, LENGTH[real]) if role == "displacement" else limit)
+        return wider * (max(limit, LENGTH_LIMIT[real]) if role == "displacement" else limit)
 
     def against_casadi(
         what: str, answer: np.ndarray, reference: np.ndarray, wider: float = 1.0, ties: bool = False
     ) -> None:
-        """`ties`: a drive within the slack of its limit may be taken for admissible or not, and the last trial lost or not:
-        from such a sample on, if the first to differ is one, the difference may be what that trial moves."""
+        """`ties`: a drive within rounding of limit plus slack may count as admissible in one and not in the other. Where the first
+        difference is at such a sample, all may differ by what the last trial of the line search changes."""
         rows.append(_row(build, what, "status", "1", answer[:, :1] - reference[:, :1], 0.0))
-        if real is Real.FLOAT:  # where a limited drive is bisected, float may turn the other way, as good an answer
+        if real is Real.FLOAT:  # in float the line search may accept another trial, an equally good answer
             plain = (reference[:, 0].astype(int) & ControllerStatus.DRIVE) == 0
             answer, reference = answer[plain], reference[plain]
         off = {role: answer[:, columns] - reference[:, columns] for role, columns in signals}
@@ -156,11 +159,11 @@ def _rows(
     )
     against_casadi("scenario, online C - CasADi", followed, ref.followed)
     settled = run_host(program, "settle", ref.random, width)
-    # Far targets are large numbers that cancel on the way to a displacement: their roundings count, not the result's.
+    # Far targets are large numbers that cancel in the displacement: the limit follows their roundings.
     far = ref.cancelling / m.z_bounds[1].max()
     against_casadi("random targets, online C - CasADi", settled, ref.settled, max(1.0, float(far)))
     rows.append(_shipped_test(build, program))
-    for unit, limit in (("rad", ANGLE[real]), ("um", LENGTH[real])):
+    for unit, limit in (("rad", ANGLE_LIMIT[real]), ("um", LENGTH_LIMIT[real])):
         channels = [i for i, u in enumerate(m.signals[ref.scenario.file.follow].units) if same_dimension(u, unit)]
         plain = np.flatnonzero(ref.settled[: len(ref.random) // 2, 0] == 0)
         if channels and plain.size:
@@ -176,10 +179,10 @@ def _rows(
     if moving:
         cold = ref.controller.rest()
         chased = run_host(program, "follow", ref.hostile, width, cold)
-        if real is Real.DOUBLE:  # in float the bisections lead apart
+        if real is Real.DOUBLE:  # in float the line searches accept other trials, and the states drift apart
             against_casadi("hostile sequence, online C - CasADi", chased, ref.chased, ties=True)
         what = "hostile sequence -> model: excess over a limit"
-        allowed = EXCESS[real] if m.x.numel() == m.n_states else EXCESS_REMEMBERED
+        allowed = EXCESS_LIMIT[real] if m.x.numel() == m.n_states else EXCESS_LIMIT_WITH_MEMORY
         excess = _excess(m, chased[:, 1 : 1 + n], ref.sample_time, cold[0])
         rows.append(_row(build, what, "share of its bound", "1", excess, allowed))
 
@@ -192,7 +195,11 @@ def _rows(
     role = ref.scenario.file.follow
     for what, drives in _drive_sets(program, ref, online):
         off = reached(ref, drives, followed) - ref.path
-        angle, length = (ANGLE[real], LENGTH[real]) if what == "online C" else (compressed.ANGLE, compressed.LENGTH)
+        angle, length = (
+            (ANGLE_LIMIT[real], LENGTH_LIMIT[real])
+            if what == "online C"
+            else (compressed.ANGLE_TOLERANCE, compressed.LENGTH_TOLERANCE)
+        )
         for unit, limit in (("rad", angle), ("um", length)):
             channels = [i for i, u in enumerate(m.signals[role].units) if same_dimension(u, unit)]
             if channels:
@@ -213,7 +220,7 @@ def _rows(
 
 
 def _shipped_test(build: str, program: Path) -> ComparisonRow:
-    """The generated folder's own test of reference vectors: 0 when it passes."""
+    """The self test that the package contains: 0 when it passes."""
     done = subprocess.run([f"{program}_test"], capture_output=True, text=True, check=False, start_new_session=True)
     failed = float(done.returncode != 0)
     return ComparisonRow(
@@ -221,8 +228,8 @@ def _shipped_test(build: str, program: Path) -> ComparisonRow:
     )
 
 
-def _equilibria(ref: Reference, answers: np.ndarray) -> np.ndarray:
-    """(n, channels): where the model comes to rest under constant drives, found by simulating it, not by the inverse."""
+def _equilibria(ref: ReferenceAnswers, answers: np.ndarray) -> np.ndarray:
+    """(n, channels): the model's equilibria under constant drives, by simulation, not by the inverse."""
     m = ref.model
     n = len(m.axes)
     drives = answers[:, 1 : 1 + n]
@@ -239,7 +246,7 @@ def _equilibria(ref: Reference, answers: np.ndarray) -> np.ndarray:
     return trace(m, np.zeros(len(drives)), states, displacements, drives).signals[ref.scenario.file.follow]
 
 
-def _drive_sets(program: Path, ref: Reference, online: np.ndarray) -> list[tuple[str, np.ndarray]]:
+def _drive_sets(program: Path, ref: ReferenceAnswers, online: np.ndarray) -> list[tuple[str, np.ndarray]]:
     """Drives to send through the model: those of the online C, and the player's."""
     sets = [("online C", online)]
     if ref.scenario.sample_time:
@@ -268,7 +275,7 @@ def _excess(model: Model, drives: np.ndarray, sample_time: float, x_0: np.ndarra
     return np.column_stack(columns)
 
 
-def _float_limit(model: Model, role: str, size: float, ref: Reference) -> float:
+def _float_limit(model: Model, role: str, size: float, ref: ReferenceAnswers) -> float:
     """What `ROUNDINGS` float roundings of the largest value amount to; for the drive, of what it follows from."""
     eps = float(np.finfo(np.float32).eps)
     if role != "drive":

@@ -1,6 +1,6 @@
 """An emulated microcontroller (Unicorn): calls functions of a linked program and counts what they execute.
 
-Counted are executed instructions, those skipped by an IT block included; they are exact, cycles are not known here.
+It counts executed instructions exactly, those skipped by an IT block included. It does not model cycles.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.firmware.toolchains import compile_c, find_compilers
-from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.reference import ReferenceAnswers
 
 
 def build_host(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
@@ -47,7 +47,7 @@ def run_host(
 class Host:
     """One arithmetic built by the first compiler there is; answers (n, 1 + width) begin with the status."""
 
-    def __init__(self, folder: CFolder, reference: Reference, real: Real, scratch: Path) -> None:
+    def __init__(self, folder: CFolder, reference: ReferenceAnswers, real: Real, scratch: Path) -> None:
         self.real, model = real, reference.model
         write_harness(folder, reference.scenario, model, real, scratch / f"harness_{real.suffix}.c")
         self._program = build_host(next(iter(find_compilers())), real, folder, scratch)

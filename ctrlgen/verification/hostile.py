@@ -22,14 +22,15 @@ from ctrlgen.firmware.templates import write
 from ctrlgen.model.feedforward import Controller, ControllerStatus
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Scenario
-from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, judged, not_run, run_tool, version_of
+from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
 
 RANDOM, FUZZER = "sanitizers, random calls", "libFuzzer"
 RUNS = 200_000
 FUZZ_SECONDS = 20  # at most, for each arithmetic
 SEED = 1
 STOPPING = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
-TOLD = ("-fsanitize=float-divide-by-zero", "-fsanitize-recover=all")  # defined by IEEE 754: told, not judged
+# IEEE 754 defines the division by zero: it is reported, but no failure.
+REPORTED = ("-fsanitize=float-divide-by-zero", "-fsanitize-recover=all")
 FUZZING = ("-fsanitize=fuzzer,address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-DHOSTILE_FUZZ")
 COVERING = ("-fsanitize=fuzzer", "-DHOSTILE_FUZZ", "-O0")
 BUILD = ("-std=c99", "-O1", "-g", "-w")
@@ -42,7 +43,7 @@ RUNTIME_ERROR = re.compile(r"^(?P<file>[^\n:]+):(?P<line>\d+):\d+: runtime error
 ADDRESS = re.compile(r"ERROR: (?P<rule>AddressSanitizer|LeakSanitizer|libFuzzer): (?P<text>[^\n]*)")
 PLACE = re.compile(r"#\d+ 0x\w+ in \w+ (?P<file>[^\s:]+\.c):(?P<line>\d+)")
 EDGES = re.compile(
-    r"^(?P<entered>COVERED|UNCOVERED)_FUNC: hits: \d+ edges: (?P<reached>\d+)/(?P<there>\d+) (?P<function>\w+) (?P<file>[^\n:]+):",
+    r"^(?P<entered>COVERED|UNCOVERED)_FUNC: hits: \d+ edges: (?P<reached>\d+)/(?P<existing>\d+) (?P<function>\w+) (?P<file>[^\n:]+):",
     re.M,
 )
 PROMISE = re.compile(r"^broken promise: (?P<text>.*)$", re.M)
@@ -94,7 +95,7 @@ def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
 
 
 def _build(compiler: str, flags: Sequence[str], sources: Sequence[Path], include: Path, program: Path) -> str:
-    """What the compiler said when it failed; empty when `program` is there."""
+    """The end of the compiler's messages where it failed; empty where `program` was built."""
     done = run_tool([compiler, *BUILD, *flags, "-I", str(include), *map(str, sources), "-o", str(program)])
     return "" if done.returncode == 0 else (done.stderr or done.stdout).strip()[-500:] or f"status {done.returncode}"
 
@@ -104,9 +105,9 @@ def _works(compiler: str, flags: Sequence[str], text: str, scratch: Path, *words
     if not shutil.which(compiler):
         return f"{compiler} is missing"
     (scratch / "empty.c").write_text(text)
-    said = _build(compiler, flags, [scratch / "empty.c"], scratch, scratch / "empty")
-    if said:
-        return f"{compiler} cannot build with {flags[0]}: {said.splitlines()[0]}"
+    problem = _build(compiler, flags, [scratch / "empty.c"], scratch, scratch / "empty")
+    if problem:
+        return f"{compiler} cannot build with {flags[0]}: {problem.splitlines()[0]}"
     done = run_tool([str(scratch / "empty"), *words], cwd=scratch)
     return (
         ""
@@ -119,7 +120,7 @@ def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
     """AddressSanitizer and UndefinedBehaviorSanitizer over calls from a fixed seed."""
     tool, subjects = RANDOM, _subjects(folder)
     against = {compiler: _works(compiler, STOPPING, EMPTY, scratch) for compiler in ("clang", "gcc")}
-    compiler = next((name for name, said in against.items() if not said), None)
+    compiler = next((name for name, problem in against.items() if not problem), None)
     if compiler is None:
         return not_run(
             tool,
@@ -130,34 +131,34 @@ def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
     notes = []
     for real in Real:
         sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
-        for flags in (STOPPING, TOLD):
+        for flags in (STOPPING, REPORTED):
             program = scratch / f"hostile_{real.suffix}"
-            said = _build(compiler, flags, sources, folder.path, program)
-            if said and flags is STOPPING:
-                return judged(
+            problem = _build(compiler, flags, sources, folder.path, program)
+            if problem and flags is STOPPING:
+                return finished(
                     tool,
                     version_of(compiler) or "",
                     subjects,
-                    [CheckFinding(sources[0].name, 0, "build", "error", said)],
+                    [CheckFinding(sources[0].name, 0, "build", "error", problem)],
                 )
-            if said:
+            if problem:
                 notes.append(f"{real.value}: divisions by zero not looked for ({compiler} has no {flags[0]})")
                 continue
             done = run_tool([str(program), str(SEED), str(runs)], cwd=scratch)
-            findings += _told(done.stderr, sources[0].name, done.returncode, judge=flags is STOPPING)
+            findings += _findings_in(done.stderr, sources[0].name, done.returncode, judge=flags is STOPPING)
             if flags is STOPPING:
                 notes.append(f"{real.value}: {done.stdout.strip() or 'stopped early'}, seed {SEED}")
-    return judged(tool, version_of(compiler) or "", subjects, findings, "; ".join(notes))
+    return finished(tool, version_of(compiler) or "", subjects, findings, "; ".join(notes))
 
 
 def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
     """libFuzzer with both sanitizers, from a small fixed corpus."""
     tool, subjects, version = FUZZER, _subjects(folder), version_of("clang")
-    said = _works("clang", FUZZING, EMPTY_FUZZ, scratch, "-runs=1")
-    if said:
+    problem = _works("clang", FUZZING, EMPTY_FUZZ, scratch, "-runs=1")
+    if problem:
         major = re.search(r"version (\d+)", version or "")
         install = "apt-get install clang" + (f" libclang-rt-{major[1]}-dev" if major else " libclang-rt-14-dev")
-        return not_run(tool, subjects, f"{said}; {install}", version or "")
+        return not_run(tool, subjects, f"{problem}; {install}", version or "")
     findings: list[CheckFinding] = []
     notes = []
     for real in Real:
@@ -167,9 +168,11 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
         for k in range(16):
             (corpus / str(k)).write_bytes(rng.integers(0, 256, 64 * (1 + k % 6), dtype=np.uint8).tobytes())
         sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
-        said = _build("clang", FUZZING, sources, folder.path, program)
-        if said:
-            return judged(tool, version or "", subjects, [CheckFinding(sources[0].name, 0, "build", "error", said)])
+        problem = _build("clang", FUZZING, sources, folder.path, program)
+        if problem:
+            return finished(
+                tool, version or "", subjects, [CheckFinding(sources[0].name, 0, "build", "error", problem)]
+            )
         words = [
             f"-runs={runs}",
             f"-max_total_time={FUZZ_SECONDS}",
@@ -178,13 +181,13 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
             "-print_final_stats=1",
         ]
         done = run_tool([str(program), *words, f"-artifact_prefix={scratch}/", str(corpus)], cwd=scratch)
-        told = _told(done.stderr, sources[0].name, done.returncode, judge=True)
-        findings += told
+        found = _findings_in(done.stderr, sources[0].name, done.returncode, judge=True)
+        findings += found
         ran = re.findall(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
         # what writes beyond its arrays may hang where no sanitizer stops it
-        reached = "coverage not counted" if told else _coverage(sources, folder.path, corpus)
+        reached = "coverage not counted" if found else _coverage(sources, folder.path, corpus)
         notes.append(f"{real.value}: {ran[-1] if ran else 'unknown'} runs, {reached}")
-    return judged(tool, version or "", subjects, findings, "; ".join(notes))
+    return finished(tool, version or "", subjects, findings, "; ".join(notes))
 
 
 def _coverage(sources: Sequence[Path], include: Path, corpus: Path) -> str:
@@ -192,15 +195,17 @@ def _coverage(sources: Sequence[Path], include: Path, corpus: Path) -> str:
     program = corpus.with_suffix(".coverage")
     if _build("clang", COVERING, sources, include, program):
         return "coverage not counted"
-    told = run_tool([str(program), "-runs=0", "-print_coverage=1", str(corpus)], cwd=corpus.parent).stderr
-    inside = [m for m in EDGES.finditer(told) if any(m["file"].endswith(path.name) for path in sources[1:])]
-    reached, there = (sum(int(m[k]) for m in inside) for k in ("reached", "there"))
+    output = run_tool([str(program), "-runs=0", "-print_coverage=1", str(corpus)], cwd=corpus.parent).stderr
+    inside = [m for m in EDGES.finditer(output) if any(m["file"].endswith(path.name) for path in sources[1:])]
+    reached, existing = (sum(int(m[k]) for m in inside) for k in ("reached", "existing"))
     never = sorted(m["function"] for m in inside if m["entered"] == "UNCOVERED")
-    return f"{reached} of {there} edges of the generated C" + (f"; never entered: {', '.join(never)}" if never else "")
+    return f"{reached} of {existing} edges of the generated C" + (
+        f"; never entered: {', '.join(never)}" if never else ""
+    )
 
 
-def _told(words: str, harness: str, status: int, *, judge: bool) -> list[CheckFinding]:
-    """The findings in what a sanitized program said. A program that stops without a word is a finding too."""
+def _findings_in(words: str, harness: str, status: int, *, judge: bool) -> list[CheckFinding]:
+    """The findings in the output of a sanitized program; one that fails without a message is a finding too."""
     found = [
         CheckFinding(
             Path(m["file"]).name, int(m["line"]), "undefined", "error" if judge else "information", m["text"], not judge

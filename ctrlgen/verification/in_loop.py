@@ -1,6 +1,6 @@
 """Processor in the loop, emulated: the generated C cross-compiled, run over the scenario and beyond, counted and compared.
 
-What the core answers is held to what the same C answers on this computer, bit for bit.
+The answers of the core must equal those of the same C on this computer bit for bit.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import MISSING, Machine, available
 from ctrlgen.verification.host import Host
-from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.reference import ReferenceAnswers
 
 RANDOM = 400  # of the reference's random targets, reachable and beyond
 
@@ -81,7 +81,7 @@ class TargetRun:
 
 @dataclass(frozen=True)
 class Stopped:
-    """A run that did not come to its end, in the words of what stopped it: a refused program, a fault, a call that hangs."""
+    """A run that did not come to its end, with the message: program refused, processor fault, or a call that does not return."""
 
     core: str
     compiler: str
@@ -91,7 +91,7 @@ class Stopped:
 
 @dataclass(frozen=True)
 class InLoop:
-    """All runs, those that were stopped, and what did not run: (tool, remedy)."""
+    """All runs, those that stopped early, and (tool, remedy) of what did not run."""
 
     runs: tuple[TargetRun, ...]
     stopped: tuple[Stopped, ...]
@@ -103,7 +103,9 @@ class InLoop:
         return not self.stopped and all(run.passed for run in self.runs)
 
 
-def run_in_loop(folder: CFolder, reference: Reference, progress: Callable[[str], None] = lambda _: None) -> InLoop:
+def run_in_loop(
+    folder: CFolder, reference: ReferenceAnswers, progress: Callable[[str], None] = lambda _: None
+) -> InLoop:
     """Every core, arithmetic and cross compiler that is there. Raises ToolError where this computer's own compiler refuses the C."""
     if not available():
         return InLoop((), (), (("emulated cores", MISSING),))
@@ -127,7 +129,7 @@ def run_in_loop(folder: CFolder, reference: Reference, progress: Callable[[str],
 
 
 def _run(
-    folder: CFolder, ref: Reference, host: Host, core: Core, compiler: str, version: str, scratch: Path
+    folder: CFolder, ref: ReferenceAnswers, host: Host, core: Core, compiler: str, version: str, scratch: Path
 ) -> TargetRun:
     real = host.real
     machines = {}
@@ -157,7 +159,7 @@ Answers = Iterator[tuple[np.ndarray, int, int]]  # numbers, status, instructions
 
 
 def _sequences(
-    machines: dict[str, Machine], folder: CFolder, ref: Reference, host: Host
+    machines: dict[str, Machine], folder: CFolder, ref: ReferenceAnswers, host: Host
 ) -> Iterator[tuple[str, Answers, np.ndarray]]:
     """What is run, its answers, and this computer's."""
     online, real, machine = folder.online[host.real], host.real, machines["online"]

@@ -12,14 +12,14 @@ from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import write
-from ctrlgen.verification.check import Check, CheckFinding, judged, not_run, run_tool, version_of
+from ctrlgen.verification.check import Check, CheckFinding, finished, not_run, run_tool, version_of
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile
 
 TOOL = "qemu-system-arm"
 REMEDY = "apt-get install qemu-system-arm"
 WORDS = ("-nographic", "-monitor", "none", "-serial", "none", "-chardev", "stdio,id=sh")
 SEMIHOSTING = ("-semihosting-config", "enable=on,target=native,chardev=sh")
-SAID = re.compile(r"^(\d+) of (\d+) disagree$", re.M)
+OUTCOME = re.compile(r"^(\d+) of (\d+) disagree$", re.M)
 
 
 def check_on_boards(folder: CFolder, progress: Callable[[str], None] = lambda _: None) -> tuple[Check, ...]:
@@ -48,10 +48,10 @@ def _run(folder: CFolder, core: Core, real: Real, compiler: str, scratch: Path) 
     try:
         cross_compile(compiler, core, sources, folder.path, "reset", program, ("-T", str(scratch / "board.ld"), "-lc"))
     except ToolError as error:
-        return judged(tool, version, subject, [CheckFinding(sources[0].name, 1, "build", "error", str(error))])
+        return finished(tool, version, subject, [CheckFinding(sources[0].name, 1, "build", "error", str(error))])
     done = run_tool([TOOL, "-M", core.board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
-    said = SAID.search(done.stdout)
-    if said and said[1] == "0" and done.returncode == 0:
-        return judged(tool, version, subject, (), f"{said[2]} of {said[2]} reference vectors agree")
-    text = done.stdout.strip() or done.stderr.strip()[:500] or f"ended with status {done.returncode} and said nothing"
-    return judged(tool, version, subject, [CheckFinding(f"{subject[0][0]}.c", 1, "vectors", "error", text)])
+    outcome = OUTCOME.search(done.stdout)
+    if outcome and outcome[1] == "0" and done.returncode == 0:
+        return finished(tool, version, subject, (), f"{outcome[2]} of {outcome[2]} reference vectors agree")
+    text = done.stdout.strip() or done.stderr.strip()[:500] or f"ended with status {done.returncode} without output"
+    return finished(tool, version, subject, [CheckFinding(f"{subject[0][0]}.c", 1, "vectors", "error", text)])

@@ -12,8 +12,8 @@ from ctrlgen.trajectory.solution import Solution
 RANDOM_TARGETS = 1000
 
 
-class Reference:
-    """What the C must reproduce, computed once for all builds."""
+class ReferenceAnswers:
+    """The reference answers, computed once for all builds."""
 
     def __init__(self, solution: Solution) -> None:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
@@ -42,7 +42,7 @@ class Reference:
 
     @property
     def cancelling(self) -> float:
-        """The largest sum [m] of sizes that cancel to a displacement on the way from a random target."""
+        """The largest sum [m] of the terms whose difference is the displacement of a random target."""
         kernel, rest = self.controller.static.displacement, self.model.rest
         target = ca.MX.sym("target", self.random.shape[1])
         slope = ca.jacobian(kernel(rest, 0 * self.model.z_scale, target), target)

@@ -16,7 +16,7 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.misra import CPPCHECK, rule_class
-from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, judged, not_run, run_tool, version_of
+from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
 
 MISRA = "cppcheck --addon=misra"
 AT_ONCE = 2  # tools running side by side
@@ -107,20 +107,20 @@ def _misra(folder: CFolder) -> Check:
         programs += [[folder.runner(real), *folder.sources(real)] for real in Real]
         for files in programs:
             done = run_tool([*words, *map(str, files)])
-            said = [line.split("\t", 4) for line in done.stderr.splitlines() if line.count("\t") >= 4]
-            broken = [row for row in said if row[3] in ("internalError", "preprocessorErrorDirective")]
+            rows = [line.split("\t", 4) for line in done.stderr.splitlines() if line.count("\t") >= 4]
+            broken = [row for row in rows if row[3] in ("internalError", "preprocessorErrorDirective")]
             if done.returncode != 0 or broken:
                 words_of_it = (broken[0][4] if broken else done.stdout + done.stderr).strip()[:500]
                 return not_run(
                     tool, subjects, f"cppcheck stopped: {words_of_it}; apt-get install --reinstall cppcheck", version
                 )
-            findings += [_of_cppcheck(*row) for row in said]
+            findings += [_of_cppcheck(*row) for row in rows]
     note = (
         ""
         if version.split()[-1] == CPPCHECK
-        else f"DEVIATIONS.md was held against cppcheck {CPPCHECK}; this one may know other rules"
+        else f"DEVIATIONS.md was checked with cppcheck {CPPCHECK}; this version may check other rules"
     )
-    return judged(tool, version, subjects, findings, note)
+    return finished(tool, version, subjects, findings, note)
 
 
 def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> CheckFinding:
@@ -161,7 +161,7 @@ def _analyzed(analyzer: _Analyzer, folder: CFolder) -> Check:
     silent = [words for _, words in results if words]
     if silent:
         return not_run(analyzer.tool, subjects, f"{analyzer.program} stopped: {silent[0]}; {analyzer.install}", version)
-    return judged(analyzer.tool, version, subjects, _flat([found for found, _ in results]))
+    return finished(analyzer.tool, version, subjects, _flat([found for found, _ in results]))
 
 
 def _flat(rows: Sequence[list[CheckFinding]]) -> list[CheckFinding]:

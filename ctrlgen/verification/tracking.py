@@ -11,10 +11,10 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.verification.host import Host
-from ctrlgen.verification.reference import Reference
+from ctrlgen.verification.reference import ReferenceAnswers
 
 
-def reached(ref: Reference, drives: np.ndarray, followed: np.ndarray) -> np.ndarray:
+def reached(ref: ReferenceAnswers, drives: np.ndarray, followed: np.ndarray) -> np.ndarray:
     """(n, channels) of the followed signal, SI: the model simulated under `drives` (samples, axes) from IPOPT's first sample.
 
     Where the scenario has no sample time, the model at the displacements and states of `followed`, the C's answers.
@@ -29,7 +29,7 @@ def reached(ref: Reference, drives: np.ndarray, followed: np.ndarray) -> np.ndar
     return trace(m, np.zeros(len(z)), x, z, drives).signals[role]
 
 
-def tracking_errors(folder: CFolder, ref: Reference) -> dict[str, dict[Real, np.ndarray]]:
+def tracking_errors(folder: CFolder, ref: ReferenceAnswers) -> dict[str, dict[Real, np.ndarray]]:
     """'online C' and 'player C' -> arithmetic -> (n, channels), SI: the model under their drives minus the command.
 
     Raises ToolError where the C is refused.

@@ -1751,7 +1751,7 @@ static void composite_bound(const float wanted[6], float result[1])
     result[0] = t84;
 }
 
-/* 1 if every displacement is between its limits, by the square of its distance from their middle; 0 for what is not a number. */
+/* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
 static int displacement_inside(const float value[6])
 {
     const float d0 = value[0] - 2.75e-05f;
@@ -1763,7 +1763,7 @@ static int displacement_inside(const float value[6])
     return (((d0 * d0) <= 7.5624856e-10f) && ((d1 * d1) <= 7.5624856e-10f) && ((d2 * d2) <= 7.5624856e-10f) && ((d3 * d3) <= 7.5624856e-10f) && ((d4 * d4) <= 7.5624856e-10f) && ((d5 * d5) <= 7.5624856e-10f)) ? 1 : 0;
 }
 
-/* 1 if every heater power is between its limits, by the square of its distance from their middle; 0 for what is not a number. */
+/* 1 if every heater power is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
 static int drive_inside(const float value[6])
 {
     const float d0 = value[0] - 0.5f;
@@ -1775,7 +1775,7 @@ static int drive_inside(const float value[6])
     return (((d0 * d0) <= 0.24999952f) && ((d1 * d1) <= 0.24999952f) && ((d2 * d2) <= 0.24999952f) && ((d3 * d3) <= 0.24999952f) && ((d4 * d4) <= 0.24999952f) && ((d5 * d5) <= 0.24999952f)) ? 1 : 0;
 }
 
-/* Limits value to low ... high; 1 if that moved any component by more than its slack or one was NaN. */
+/* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
 static int limit_all(float value[6], const float low[6], const float high[6], const float slack[6])
 {
     int hit = 0;
@@ -1793,7 +1793,7 @@ static int limit_all(float value[6], const float low[6], const float high[6], co
     return hit;
 }
 
-/* Limits a displacement to its range; 1 if that moved it. */
+/* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
 static int limit_displacement(float value[6])
 {
     static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
@@ -1802,7 +1802,7 @@ static int limit_displacement(float value[6])
     return limit_all(value, LOW, HIGH, SLACK);
 }
 
-/* 1 if no drive is beyond its limits by more than the slack. */
+/* 1 if every drive is within its limits or beyond by no more than the slack. */
 static int drives_admissible(const float drive[6])
 {
     int admissible = 1;
@@ -1815,7 +1815,7 @@ static int drives_admissible(const float drive[6])
     return admissible;
 }
 
-/* 1 if every component is a number of a size that can be a command. */
+/* 1 if every component is a number of a plausible size. */
 static int is_usable(const float target[6])
 {
     static const float TARGET_LIMIT[6] = { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }; /* SI */
@@ -1848,7 +1848,7 @@ static int limit_composite(const circle20_online_f32_state *state, float wanted[
     (void)state;
     return hit;
 }
-/* Drives that put the device at out->displacement, not limited yet. */
+/* Actuator state (limited) and drives (not limited) that out->displacement needs. */
 static void settle_drives(const circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
@@ -1856,8 +1856,8 @@ static void settle_drives(const circle20_online_f32_state *state, circle20_onlin
     (void)state;
 }
 
-/* Toward out->displacement, on the straight line from origin, as far as 3 secants of the drive that is first at its
- * limit lead. Drives limited; 1 if even those of origin had to be. */
+/* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
+ * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
 static int settle_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
 {
     float direction[6];
@@ -1922,15 +1922,15 @@ static int settle_line_search(const circle20_online_f32_state *state, const floa
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
-/* Drives that put the device at out->displacement, not limited yet. */
+/* Actuator state (limited) and drives (not limited) that out->displacement needs. */
 static void step_drives(const circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
     step_drive(state->x, out->state, out->drive);
 }
 
-/* Toward out->displacement, on the straight line from origin, as far as 3 secants of the drive that is first at its
- * limit lead. Drives limited; 1 if even those of origin had to be. */
+/* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
+ * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
 static int step_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
 {
     float direction[6];
@@ -2008,7 +2008,7 @@ void circle20_online_f32_init(circle20_online_f32_state *state)
         }
     }
 }
-/* Without a usable target: the drive that is safe, and what the device does under it. */
+/* Without a usable target: the safe drive, and the state it leads to. */
 static void settle_safe(circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     int i;
@@ -2021,7 +2021,7 @@ static void settle_safe(circle20_online_f32_state *state, circle20_online_f32_ou
     balance_displacement(state->x, out->displacement, state->z);
 }
 
-/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
+/* Drives for out->displacement with every limit kept; advances the state to the next sample. */
 static int settle_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     int status = 0;
@@ -2052,7 +2052,7 @@ static int settle_within(circle20_online_f32_state *state, circle20_online_f32_o
         balance_displacement(state->x, out->displacement, out->displacement);
     } else {
         for (i = 0; i < 6; i++) {
-            state->x[i] = out->state[i]; /* where the drive was computed for */
+            state->x[i] = out->state[i]; /* the drive was computed for it */
         }
     }
     for (i = 0; i < 6; i++) {
@@ -2089,7 +2089,7 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
     }
     return status;
 }
-/* Without a usable target: the drive that is safe, and what the device does under it. */
+/* Without a usable target: the safe drive, and the state it leads to. */
 static void step_safe(circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     int i;
@@ -2102,7 +2102,7 @@ static void step_safe(circle20_online_f32_state *state, circle20_online_f32_outp
     balance_displacement(state->x, out->displacement, state->z);
 }
 
-/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
+/* Drives for out->displacement with every limit kept; advances the state to the next sample. */
 static int step_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
     int status = 0;
@@ -2132,7 +2132,7 @@ static int step_within(circle20_online_f32_state *state, circle20_online_f32_out
         balance_displacement(state->x, out->displacement, out->displacement);
     } else {
         for (i = 0; i < 6; i++) {
-            state->x[i] = out->state[i]; /* where the drive was computed for */
+            state->x[i] = out->state[i]; /* the drive was computed for it */
         }
     }
     for (i = 0; i < 6; i++) {

@@ -1,12 +1,12 @@
-/* circle20_online_f32: online controller of NIST MEMS hexapod nanopositioner.
+/* circle20_online_f32: feedforward controller of NIST MEMS hexapod nanopositioner, computed online.
  *
  * Commanded platform pose -> heater powers, one call per sample at 1000 Hz.
  * No heap, no globals: the caller owns the state. All numbers are SI.
  *
  * target[6]  platform pose: theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m], delta_y [m], delta_z [m]
  * drive[6]   heater power: 1X [W], 1Y [W], 2X [W], 2Y [W], 3X [W], 3Y [W]
- * displacement[6]: stage displacement [m] that the drive will reach (after an INPUT status: the present one)
- * state[6]   actuator temperature then: 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K]
+ * displacement[6]: stage displacement [m] at the next sample (with status INPUT: the present one)
+ * state[6]   actuator temperature at the next sample: 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K]
  *
  * Limits kept:
  *   0 W <= commanded heater power <= 1 W
@@ -16,8 +16,8 @@
  *   notch rotation <= 5 deg
  *   wire flexure stress <= 550 MPa
  *
- * Arithmetic operations of the physics per call: 315 within limits, 3535 at most
- * (comparisons and the bookkeeping of limits not counted). Arithmetic: float.
+ * Arithmetic operations of the physics per call: 315 while all limits hold, 3535 at most
+ * (comparisons and the limiter's own arithmetic not counted). Arithmetic: float.
  * Physics: S1: Mech. Mach. Theory 80 (2014) 246-264, doi 10.1016/j.mechmachtheory.2014.05.004
  * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4, scenario 6b3b4ab03afed2d5 (sha256). Do not edit.
  */
@@ -28,11 +28,11 @@
 extern "C" {
 #endif
 
-/* Status: 0, or a sum of these. The drive is admissible in every case. */
-#define CIRCLE20_ONLINE_F32_DISPLACEMENT 1 /* beyond the displacement range: the nearest target inside was taken */
-#define CIRCLE20_ONLINE_F32_COMPOSITE 2    /* wire flexure stress: displacement shrunk toward home */
-#define CIRCLE20_ONLINE_F32_DRIVE 8        /* heater power at its limit: as far toward the target as it reaches in one sample */
-#define CIRCLE20_ONLINE_F32_INPUT 16       /* NaN, infinite, absurd or missing input: drives at zero, or nearest to it */
+/* Status: 0, or a sum of these. The drive is within its limits in every case. */
+#define CIRCLE20_ONLINE_F32_DISPLACEMENT 1 /* target beyond the displacement range: the nearest target inside was taken */
+#define CIRCLE20_ONLINE_F32_COMPOSITE 2    /* wire flexure stress: displacement scaled toward home */
+#define CIRCLE20_ONLINE_F32_DRIVE 8        /* heater power at its limit: the target is approached as far as one sample allows */
+#define CIRCLE20_ONLINE_F32_INPUT 16       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
 
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
@@ -48,9 +48,9 @@ typedef struct {
 /* A cold device at rest. */
 void circle20_online_f32_init(circle20_online_f32_state *state);
 
-/* The equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled. */
+/* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled. */
 int circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out);
-/* The drive that, held for one sample, brings the device to target at the next sample. */
+/* Drive that brings the device to target at the next sample, held until then. Call once a sample. */
 int circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out);
 #ifdef __cplusplus
 }
