@@ -6,7 +6,7 @@ in steps of a tenth of a sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -27,6 +27,7 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import estimate_noise
 from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses import priors
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
@@ -277,6 +278,14 @@ def test_of_an_axis(law):
     ]
     fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", parts)
     recover(fitter, AXIS, law.__name__, ON_AXIS[law])
+
+
+@pytest.mark.parametrize("law", [drive_hysteresis, bouc_wen, asymmetric_hysteresis], ids=lambda law: law.__name__)
+def test_of_an_axis_by_a_law_whose_shape_starts_from_the_defaults(law, monkeypatch):
+    """As a law without start values in the table does; that the simulator's form is another one stays known."""
+    rows = {kind: replace(row, parameters={}) for kind, row in priors.PRIORS.items()}
+    monkeypatch.setattr(priors, "PRIORS", rows)
+    test_of_an_axis(law)
 
 
 @cache

@@ -16,7 +16,7 @@ import numpy as np
 from ctrlgen.devices import BalancedPhysics, DevicePhysics
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
 from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
+from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
 from ctrlgen.diagnosis.settings import LTV_MODEL
 from ctrlgen.effects import Place
@@ -114,7 +114,7 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
 def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Simulator, np.ndarray, list[int]]:
     """The response with probes, its parameters, and which of them are the probes at `place`."""
     known = [unknown.path for unknown in fit.structure.free_parameters]
-    device, probes = with_probes(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
+    device, probes = with_disturbance_inputs(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
     key = ("along", fit.structure.causes, record.sample_time, record.linear)
     if key not in fitter.cache:

@@ -1,1 +1,1 @@
-"""What could have been left out: every law at every place of a device."""
+"""Hypotheses of what a model leaves out: every law at every place of a device, and what is believed of it beforehand."""

@@ -1,4 +1,4 @@
-"""A unit disturbance at every place of a device: how an effect's term, whatever its law, reaches the readings."""
+"""Disturbance inputs at every place of a device: how a term of any law there reaches the readings."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ctrlgen.effects import Effect, Param, Place
 from ctrlgen.model.effect_terms import available, channels
 
 
-class _Probe(Effect, listed=False):
-    """Delta = delta, constant over a sample."""
+class _DisturbanceInput(Effect, listed=False):
+    """Delta = delta, constant within a sample."""
 
     source = "definition"
     params = (Param("delta", "channel", (-1.0, 1.0), "the disturbance", off=0.0),)
@@ -26,14 +26,14 @@ class _Probe(Effect, listed=False):
         return p.delta
 
 
-def with_probes(device: Device, physics: DevicePhysics) -> tuple[Device, dict[tuple[Place, int], str]]:
-    """The device with a probe everywhere, and the path of each by place and channel."""
-    probes: list[_Probe] = []
+def with_disturbance_inputs(device: Device, physics: DevicePhysics) -> tuple[Device, dict[tuple[Place, int], str]]:
+    """The device with a disturbance input on every channel of every place, and the path of each by place and channel index."""
+    inputs: list[_DisturbanceInput] = []
     paths: dict[tuple[Place, int], str] = {}
     for place in Place:
         if place is Place.HEAT and "heat" not in available(physics):
             continue
         for i, channel in enumerate(channels(physics, place)):
-            paths[place, i] = f"effect[{len(device.effect) + len(probes)}].delta"
-            probes.append(_Probe(place, channel.name, channel.unit))
-    return device.model_copy(update={"effect": (*device.effect, *probes)}), paths
+            paths[place, i] = f"effect[{len(device.effect) + len(inputs)}].delta"
+            inputs.append(_DisturbanceInput(place, channel.name, channel.unit))
+    return device.model_copy(update={"effect": (*device.effect, *inputs)}), paths

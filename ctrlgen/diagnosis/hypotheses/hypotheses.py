@@ -1,6 +1,5 @@
-"""Step 5: what could have been left out.
-
-Every effect of the library at every place where it can act, and every number of the device that could be off.
+"""Every hypothesis of what the model leaves out: an effect of the library at a place of the device where it can act, or a
+number of the device that is off.
 """
 
 from __future__ import annotations
@@ -39,10 +38,12 @@ class DataHints:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One effect at one place, `at` a channel (or "all") `of` another; or, for `effect` "parameter", one number of the device.
+    """One effect at one place; or, where `effect` is "parameter", one number of the device, at `path`.
 
-    `count` says how many of its kind a structure has there already, where it may have several; `highest` [Hz] what the
-    samples can tell from its aliases, infinite where there is no clock.
+    location: where a report says it is, such as "actuator:1X".
+    at, of: the channel on which the effect acts, or "all"; for effects of pairs, the other channel.
+    count: how many of the same effect a structure has there already, where the effect is repeatable.
+    highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
     """
 
     effect: str
@@ -54,18 +55,20 @@ class Hypothesis:
     highest: float = float("inf")
 
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
-        """The same where `causes` are there already: itself, one more of it, or None where there can be no more."""
+        """The hypothesis to add to `causes`: itself, one more where it is there and repeatable, None where it cannot be added.
+
+        A place has at most one law of a family, and one cause of a law that is not repeatable.
+        """
         if any(
             (c.family, c.location) == (self.family, self.location) and c.effect != self.effect
             for c in causes
             if c.family
         ):
             return None
-        there = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
-        if not there:
+        same = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
+        if not same:
             return self
-        several = self.prior.repeatable
-        return replace(self, count=1 + max(c.count for c in there)) if several else None
+        return replace(self, count=1 + max(c.count for c in same)) if self.prior.repeatable else None
 
     @property
     def family(self) -> str | None:
@@ -124,7 +127,10 @@ class Hypothesis:
 def hypotheses(
     device: Device, physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
 ) -> list[Hypothesis]:
-    """All that can act on `device` and be seen in the channels `observed`."""
+    """Every effect that can act on `device` and reach the channels `observed`, then every number that may be off.
+
+    `sample_time` [s] is None for settled poses; `ambient` says whether the recording has the temperature of the surroundings.
+    """
     laws = (law for _, law in sorted(Effect.library.items()))  # in an order that does not depend on the files
     found = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
     return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
@@ -157,7 +163,7 @@ def _of_law(
 
 
 def _numbers(device: Device) -> Iterator[tuple[str, str]]:
-    """(path, location) of every number that may be off and is not taken as uncertain anyway."""
+    """(path, location) of every number that is not a count."""
     for path, section, number in numbers(device):
         if not number.whole:
             yield path, f"{section.domain}:{path.rpartition('.')[2]}"
@@ -192,7 +198,7 @@ def nominal_physics(device: Device) -> DevicePhysics:
 
 
 def nuisances(device: Device) -> dict[str, float]:
-    """Paths of the numbers that are uncertain by their own statement or their section's tolerance, with that deviation [SI]."""
+    """Path and standard deviation [SI] of every number with a stated `sd`, or of a section with a tolerance."""
     found = {}
     for path, section, number in numbers(device):
         sd = number.sd if number.sd is not None else (section.tolerance or 0.0) * abs(number.si)
@@ -202,6 +208,6 @@ def nuisances(device: Device) -> dict[str, float]:
 
 
 def written(si: float, unit: str, source: str | None = None) -> Quantity:
-    """A number found, as a device file would state it."""
+    """A number in SI as a device file would write it in `unit`."""
     shown = f"{from_si(si, unit):.9g} {'' if unit == '1' else unit}".strip()
     return Quantity(si, shown, source)

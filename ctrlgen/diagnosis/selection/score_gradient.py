@@ -13,7 +13,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_probes
+from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, CandidateTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
@@ -54,7 +54,9 @@ class ScoreGradient:
         seen: Callable[[Place, int], DataHints],
     ) -> None:
         self.fitter, self.record = fitter, record
-        probed, probes = with_probes(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
+        probed, probes = with_disturbance_inputs(
+            fit.structure.device_with_causes, nominal_physics(fit.structure.device)
+        )
         known = [u.path for u in fit.structure.free_parameters]
         numbers = [h for h in hypotheses if h.effect == PARAMETER]
         number_paths = [h.path for h in numbers if h.path not in known]
