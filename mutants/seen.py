@@ -1,7 +1,8 @@
 """Which tests execute which line, by coverage.py's contexts, one test file at a time; kept until the code or that file changes.
 
 A line that runs at import (a constant, a parameter of a law) belongs to no test: it is seen by the tests that execute a line which
-names what it defines, and where there is none, by those that execute anything else of its file.
+names what it defines (`.name` of what a class defines, in any file), and where there is none, by those that execute anything else
+of its file.
 """
 
 from __future__ import annotations
@@ -76,18 +77,25 @@ class Seen:
             if isinstance(node, ast.Assign | ast.AnnAssign) and node.lineno <= first <= node.end_lineno:
                 targets = node.targets if isinstance(node, ast.Assign) else [node.target]
                 names |= {t.id for target in targets for t in ast.walk(target) if isinstance(t, ast.Name)}
+        inside = self._attributes(file)
         names -= {"params", "states", "place"}  # of every law: its file says more
         found: set[str] = set()
         for name in names:
             word = re.compile(rf"\b{re.escape(name)}\b")
+            attribute = re.compile(rf"\.{re.escape(name)}\b") if name in inside else None
             own = any(word.search(text) for k, text in enumerate(self._texts[file], 1) if not first <= k <= last)
             for other in [file] if own and name.startswith("_") else self._texts:
-                if other != file and not self._imports(other, file):
-                    continue
-                for k, text in enumerate(self._texts[other], 1):
-                    if word.search(text) and not (other == file and first <= k <= last):
+                sought = word if other == file or self._imports(other, file) else attribute
+                for k, text in enumerate(self._texts[other] if sought else (), 1):
+                    if sought.search(text) and not (other == file and first <= k <= last):
                         found |= self.by_line.get(other, {}).get(k, set())
         return found
+
+    def _attributes(self, file: str) -> set[str]:
+        """Names that a class of the file defines, which others read without importing it."""
+        classes = (n for n in ast.walk(ast.parse((self.root / file).read_text())) if isinstance(n, ast.ClassDef))
+        rows = (row for c in classes for row in c.body if isinstance(row, ast.Assign))
+        return {t.id for row in rows for t in row.targets if isinstance(t, ast.Name)}
 
     def _imports(self, other: str, file: str) -> bool:
         module = file.removesuffix(".py").replace("/", ".")

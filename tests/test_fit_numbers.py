@@ -10,7 +10,7 @@ from conftest import SCENARIOS
 
 from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 
 AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
@@ -61,3 +61,22 @@ def test_a_fit_leaves_noise_up_to_four_deviations_of_its_squares(side, noise):
     fit = fitted(Hypothesis("creep", "stage:axis", "axis"), {"gain": 0.1, "tau": 1.0, "slow": 0.1}, 1.0)
     left = N + 4 * np.sqrt(2 * N) + side
     assert Fit(fit.structure, fit.theta, (), left - 3.0, N, fit.residual, fit.J, 3.0).is_noise == noise
+
+
+@pytest.mark.parametrize("path", sorted((SCENARIOS / "devices").glob("*.toml")), ids=lambda path: path.stem)
+def test_a_number_of_a_device_is_changed_where_it_stands_and_no_other(path):
+    device = load_device(path)
+    before = dict(device.quantities())
+    for name, quantity in list(before.items())[::5]:
+        after = dict(changed(device, {name: 1.25 * quantity.si}).quantities())
+        assert after[name].si == pytest.approx(1.25 * quantity.si)
+        assert {k: q.si for k, q in after.items() if k != name} == {k: q.si for k, q in before.items() if k != name}
+
+
+def test_a_number_stands_once_in_a_structure_and_a_fringe_as_often_as_there_are_some():
+    number = Hypothesis("parameter", "stage:axis", path="mechanics.mass")
+    assert number.beside([]) is number and number.beside([number]) is None
+    cyclic = Hypothesis("cyclic", "sensor:axis", "axis")
+    creep = Hypothesis("creep", "stage:axis", "axis")
+    second = cyclic.beside([cyclic])
+    assert second.count == 1 and cyclic.beside([cyclic, second]).count == 2 and creep.beside([creep]) is None

@@ -40,3 +40,16 @@ def test_one_stretch_is_one_record_of_the_same_name_with_one_note(tmp_path, mode
     (note,) = recording.notes
     assert "missing in 10 samples" in note and recording.records[0].name == "fit.csv"
     assert len(recording.records[0].time) == 390
+
+
+@pytest.mark.parametrize("ambient, fault", [("23 degC", False), ("23 um", True), ("warm", True)])
+def test_surroundings_are_a_temperature(tmp_path, model, ambient, fault):
+    for name, seed in (("fit", 1), ("held", 2)):
+        (tmp_path / f"{name}.csv").write_text(csv_text(samples(seed=seed)))
+    first = {"file": "fit.csv", "role": "fit", "conditions": {"ambient": ambient}}
+    folder = described(tmp_path, first, {"file": "held.csv", "role": "hold_out"})
+    if fault:
+        with pytest.raises(InputError, match=r"conditions\.ambient"):
+            load_recordings([folder], model)
+    else:
+        load_recordings([folder], model)

@@ -216,8 +216,21 @@ def test_a_cause_whose_law_does_not_hold_means_nothing(period, means):
     fit = fitted(causes=(cause, GAIN))
     fit.values = lambda k: {"amplitude": 1.0, "period": period} if k == 0 else {"gain": 0.1}
     weigh = ModelSelection(
-        SimpleNamespace(to_fit=[], held=[], recording=SimpleNamespace(channels=(), records=())), None
+        SimpleNamespace(fit_records=[], held_out_records=[], recording=SimpleNamespace(channels=(), records=())), None
     )
     assert weigh.physically_meaningful(SimpleNamespace(fit=fit)) == means and weigh.physically_meaningful(
         SimpleNamespace(fit=fit), (cause,)
     )
+
+
+def test_two_lines_that_only_beat_as_one_mean_nothing():
+    causes = tuple(Hypothesis("cyclic", "sensor:axis", "axis", count=k) for k in range(2))
+    fit = fitted(causes=causes)
+    record = SimpleNamespace(
+        role="fit", time=np.arange(11), valid=np.ones((11, 1), bool), observed=np.linspace(0, 10, 11)[:, None]
+    )
+    recording = SimpleNamespace(channels=("reading.axis",), records=(record,))
+    weigh = ModelSelection(SimpleNamespace(fit_records=[], held_out_records=[], recording=recording), None)
+    for apart, means in ((0.049, False), (0.051, True)):
+        fit.values = lambda k, apart=apart: {"amplitude": 0.01, "period": 1 / (5.0 + k * apart)}
+        assert weigh.physically_meaningful(SimpleNamespace(fit=fit)) == means
