@@ -2,7 +2,7 @@
 
 A line that runs at import (a constant, a parameter of a law) belongs to no test: it is seen by the tests that execute a line which
 names what it defines (`.name` of what a class defines, in any file), and where there is none, by those that execute anything else
-of its file.
+of its file. What a class assigns is seen by both.
 """
 
 from __future__ import annotations
@@ -54,11 +54,17 @@ class Seen:
         first, last = self._statement(file, line)
         lines = self.by_line.get(file, {})
         tests: set[str] = set().union(*(lines.get(k, set()) for k in range(first, last + 1)))
-        if not tests:
-            tests = self._through_names(file, first, last)
-        if not tests:
-            tests = set().union(*lines.values())
-        return sorted(tests, key=lambda t: (self.seconds[t] + 0.01) * self.breadth[t])
+        if tests:
+            return self._ranked(tests)
+        named = self._ranked(self._through_names(file, first, last))
+        if named and not self._assigned(file, first) & self._attributes(file):
+            return named
+        return list(
+            dict.fromkeys([*self._ranked(set().union(*lines.values())), *named])
+        )  # of a law its own tests first
+
+    def _ranked(self, tests: set[str]) -> list[str]:
+        return sorted(tests, key=lambda t: ((self.seconds[t] + 0.01) * self.breadth[t], t))
 
     def _statement(self, file: str, line: int) -> tuple[int, int]:
         """First and last line of the innermost statement; of a compound one, its head."""
@@ -71,14 +77,17 @@ class Seen:
                     best = (node.lineno, max(end, node.lineno))
         return best
 
-    def _through_names(self, file: str, first: int, last: int) -> set[str]:
+    def _assigned(self, file: str, line: int) -> set[str]:
+        """The names that the statement assigns."""
         names = set()
         for node in ast.walk(ast.parse((self.root / file).read_text())):
-            if isinstance(node, ast.Assign | ast.AnnAssign) and node.lineno <= first <= node.end_lineno:
+            if isinstance(node, ast.Assign | ast.AnnAssign) and node.lineno <= line <= node.end_lineno:
                 targets = node.targets if isinstance(node, ast.Assign) else [node.target]
                 names |= {t.id for target in targets for t in ast.walk(target) if isinstance(t, ast.Name)}
-        inside = self._attributes(file)
-        names -= {"params", "states", "place"}  # of every law: its file says more
+        return names
+
+    def _through_names(self, file: str, first: int, last: int) -> set[str]:
+        names, inside = self._assigned(file, first), self._attributes(file)
         found: set[str] = set()
         for name in names:
             word = re.compile(rf"\b{re.escape(name)}\b")
@@ -92,7 +101,7 @@ class Seen:
         return found
 
     def _attributes(self, file: str) -> set[str]:
-        """Names that a class of the file defines, which others read without importing it."""
+        """Names that a class of the file assigns, which others read without importing it."""
         classes = (n for n in ast.walk(ast.parse((self.root / file).read_text())) if isinstance(n, ast.ClassDef))
         rows = (row for c in classes for row in c.body if isinstance(row, ast.Assign))
         return {t.id for row in rows for t in row.targets if isinstance(t, ast.Name)}
