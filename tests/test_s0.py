@@ -18,7 +18,7 @@ from ctrlgen.physics import meso_hexapod
 from ctrlgen.recordings.calibration import calibrate_jacobian
 from ctrlgen.recordings.pose_errors import opposites, parasitic, pose_drift, pose_errors, repeatability
 from ctrlgen.reproduce import s0, s0_figures
-from ctrlgen.reproduce.rounding import carried, half_units
+from ctrlgen.reproduce.rounding import half_units, propagated_rounding
 from ctrlgen.reproduce.row import ReproductionStatus
 from ctrlgen.reproduce.s0_data import load_s0, read_jacobian
 
@@ -282,7 +282,7 @@ def test_rounded_data_move_a_mean_by_three_standard_deviations() -> None:
     half = half_units(np.array([201.0, -9.81e-3, 0.0, 100.0, 1.0]), 3)
     assert half == pytest.approx([0.5, 5e-6, 0.0, 0.5, 5e-3])
     data, each = np.zeros(300), np.full(300, 0.5)
-    moved = carried(lambda x: np.array([x.mean()]), data, each)[0]
+    moved = propagated_rounding(lambda x: np.array([x.mean()]), data, each)[0]
     assert moved == pytest.approx(3 * 0.5 / np.sqrt(3 * 300), rel=0.15)  # of 1000 draws: 2.6 to 3.4 sd
 
 

@@ -1,1 +1,1 @@
-"""Measurement files -> recordings in SI: read, checked, marked, never filled in."""
+"""Measurement files -> recordings in SI: read, preprocessed, validated, doubtful samples marked and never filled in."""

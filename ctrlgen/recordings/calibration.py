@@ -1,4 +1,4 @@
-"""Calibration: recordings of commanded inputs and measured poses -> Jacobian with its covariance. Source: S0 section 4.
+"""Calibration: commanded inputs and measured poses -> Jacobian with its covariance. Source: S0 section 4.
 
 Noise model: T_j = J U_j (+ T_0) + e_j. The inputs U_j are exact; the errors e_j have mean zero, are independent from
 pose to pose, and have one covariance N (channels, channels) in every pose, correlated between channels or not. With
@@ -14,17 +14,19 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 
-CONDITION_LIMIT = 1e6  # an input combination moved by a millionth of the largest drowns in the noise of any sensor
+# a combination of inputs that moves a millionth of the largest is lost in the noise of any sensor
+CONDITION_LIMIT = 1e6
+NAMED_SHARE = 0.05  # of a direction: smaller components are not named in a message
 
 
 @dataclass(frozen=True)
 class JacobianCalibration:
     """A calibrated Jacobian; SI.
 
-    `jacobian` (channels, inputs); `covariance` of its entries row by row (`jacobian.ravel()`), None where as many poses
-    as unknowns leave nothing to tell the noise from and none was given; `noise` N (channels, channels) per pose, None
-    likewise; `offset` T_0 (channels,), None where not asked for, and `offset_covariance`; `residuals` measured minus
-    fitted, (n, channels); `condition` of the inputs, the ratio of the best to the least moved combination.
+    `jacobian` (channels, inputs); `covariance` of its entries row by row (`jacobian.ravel()`), None where there are only as
+    many poses as unknowns and no noise was given; `noise` N (channels, channels) of one pose, None likewise; `offset` T_0
+    (channels,), None where not asked for, and `offset_covariance`; `residuals` measured minus fitted, (n, channels);
+    `condition` number of the inputs: the largest over the smallest combination that the poses move.
     """
 
     jacobian: np.ndarray
@@ -99,7 +101,7 @@ def calibrate_jacobian(
 def _check(U: np.ndarray, T: np.ndarray, noise: np.ndarray | None) -> None:
     faults = []
     if U.ndim != 2 or T.ndim != 2 or len(U) != len(T):
-        what = f"shapes {U.shape} and {T.shape} do not fit; give one row a pose in both"
+        what = f"shapes {U.shape} and {T.shape} do not fit; give one row per pose in both"
         raise InputError("calibration", [Fault("inputs, measured", what)])
     for name, values in (("inputs", U), ("measured", T)):
         bad = np.flatnonzero(~np.isfinite(values).all(1))
@@ -112,9 +114,9 @@ def _check(U: np.ndarray, T: np.ndarray, noise: np.ndarray | None) -> None:
 
 
 def _unmoved(direction: np.ndarray, k: int, singular: np.ndarray) -> str:
-    """The combination of inputs that the poses do not move, in words."""
+    """A sentence that names the combination of inputs that the poses do not move."""
     if singular[0] == 0:
         return "no input moves in any pose; record poses away from home"
     names = [f"input {i + 1}" if i < k else "offset" for i in range(len(direction))]
-    parts = [f"{value:+.2f} {name}" for name, value in zip(names, direction, strict=True) if abs(value) > 0.05]
+    parts = [f"{value:+.2f} {name}" for name, value in zip(names, direction, strict=True) if abs(value) > NAMED_SHARE]
     return f"the combination {' '.join(parts)} stays still in all of them; record poses that move it"

@@ -1,4 +1,4 @@
-"""Measurement files in: one small reader a format, each giving named columns of numbers.
+"""Reading measurement files: one reader per format, each giving named columns of numbers.
 
 CSV, MATLAB (.mat up to 7, and 7.3), HDF5, TDMS, MDF4 and JSON. A column of a matrix is named `matrix[k]`, a field
 of a MATLAB or JSON structure `structure.field`, a dataset of HDF5 and a channel of TDMS by its path `group/name`.
@@ -25,14 +25,14 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
 
 MISSING = {"", "nan", "na", "n/a", "null", "none", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan"}
-MOST_FAULTS = 5  # bad cells of one column that are listed; the others are counted
+MOST_LISTED = 5  # bad cells or lines of a file that a message lists; the others are counted
 
 
 @dataclass(frozen=True)
 class MeasurementTable:
-    """Columns of one file by name: numbers (n,), or cells of text (CSV) that become numbers when asked for.
+    """The columns of one file by name: numbers (n,), or cells of text (CSV) that `numbers` converts.
 
-    `units` holds what the file itself says, where it does; `lines` the line of each row in a text file.
+    `units`: those that the file itself states. `lines`: the line number of each row in a text file.
     """
 
     path: Path
@@ -41,9 +41,9 @@ class MeasurementTable:
     lines: tuple[int, ...] = ()
 
     def find(self, wanted: str | int) -> str:
-        """The full name of a column: by name, by number from 0, without its `[unit]`, or without its group.
+        """The full name of a column that is given by name, by number from 0, without its `[unit]`, or without its group.
 
-        Raises InputError naming the columns there are.
+        Raises InputError that lists the columns, or the nearest name.
         """
         names = list(self.columns)
         if isinstance(wanted, int):
@@ -51,19 +51,20 @@ class MeasurementTable:
                 return names[wanted]
             raise self._fault(f"has columns 0 to {len(names) - 1}, not {wanted}")
         for shorten in (str, lambda name: name.partition("[")[0].strip(), lambda name: re.split(r"[/.]", name)[-1]):
-            found = [name for name in names if shorten(name) == wanted]
-            if len(found) == 1:
-                return found[0]
-            if found:
-                raise self._fault(f"has {len(found)} columns {wanted!r}: write one of {', '.join(found)}")
+            matching = [name for name in names if shorten(name) == wanted]
+            if len(matching) == 1:
+                return matching[0]
+            if matching:
+                raise self._fault(f"has {len(matching)} columns {wanted!r}: write one of {', '.join(matching)}")
         near = difflib.get_close_matches(wanted, names, n=1)
-        there = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
+        listed = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
         raise self._fault(
-            f"has no column {wanted!r}; " + (f"did you mean {near[0]!r}?" if near else f"there are: {there or 'none'}")
+            f"has no column {wanted!r}; "
+            + (f"did you mean {near[0]!r}?" if near else f"its columns are: {listed or 'none'}")
         )
 
     def numbers(self, name: str) -> np.ndarray:
-        """Column `name` as float64 (n,); NaN where a cell is empty or says so. Raises InputError for other text."""
+        """Column `name` as float64 (n,), NaN where a cell is empty or a word for missing. Raises InputError for other text."""
         column = self.columns[name]
         if isinstance(column, np.ndarray):
             return column
@@ -77,10 +78,10 @@ class MeasurementTable:
             except ValueError:
                 faults.append(f"line {self.lines[k]} {cell!r}")
         if faults:
-            more = f" and {len(faults) - MOST_FAULTS} more" if len(faults) > MOST_FAULTS else ""
-            listed = ", ".join(faults[:MOST_FAULTS]) + more
+            more = f" and {len(faults) - MOST_LISTED} more" if len(faults) > MOST_LISTED else ""
+            listed = ", ".join(faults[:MOST_LISTED]) + more
             raise self._fault(
-                f"column {name!r} holds what is no number ({listed}); write numbers, leave missing ones empty"
+                f"column {name!r} holds text that is no number ({listed}); write numbers, leave missing ones empty"
             )
         return values
 
@@ -89,14 +90,20 @@ class MeasurementTable:
 
 
 def read_table(path: Path) -> MeasurementTable:
-    """The columns of a measurement file. Raises InputError: no such file, unknown or damaged format, missing package."""
+    """The columns of a measurement file. Raises InputError where it does not exist, cannot be read, or needs a package."""
     if path.is_dir():
         raise InputError(path, [Fault(path.name, "is a folder; name the file inside it")])
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(READERS)
         raise InputError(
-            path, [Fault(path.name, f"{path.suffix or 'no ending'!r} is no format I read; known: {known}")]
+            path,
+            [
+                Fault(
+                    path.name,
+                    f"has the ending {path.suffix or 'none'!r}, which is no known format; known are {known}: export it as one of these",
+                )
+            ],
         )
     if not path.is_file():
         raise InputError(path, [Fault(path.name, f"does not exist in {path.parent}; check the name")])
@@ -104,13 +111,13 @@ def read_table(path: Path) -> MeasurementTable:
         return reader(path)
     except InputError:
         raise
-    except Exception as error:  # the five libraries raise dozens of types for a damaged file
+    except Exception as error:  # the libraries raise dozens of types for a damaged file
         what = f"cannot be read as {path.suffix}: {type(error).__name__}: {error}; export it again"
         raise InputError(path, [Fault(path.name, what)]) from None
 
 
 def read_csv(path: Path) -> MeasurementTable:
-    """Text separated by comma, semicolon or tab; a header unless row 1 is numbers; lines with # are left out."""
+    """Text separated by comma, semicolon or tab, with a header unless the first row is numbers; lines with # are skipped."""
     text = read_text(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     separator = next((mark for mark in "\t;," if mark in first), ",")
@@ -118,17 +125,17 @@ def read_csv(path: Path) -> MeasurementTable:
     rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     rows = [(line, row) for line, row in rows if any(row) and not row[0].startswith("#")]
     if not rows:
-        raise InputError(path, [Fault(path.name, "has no rows; write a header and one row a sample")])
+        raise InputError(path, [Fault(path.name, "has no rows; write a header and one row per sample")])
     width = len(rows[0][1])
     ragged = [f"line {line} has {len(row)}" for line, row in rows if len(row) != width]
     if ragged:
-        listed = ", ".join(ragged[:MOST_FAULTS]) + (", ..." if len(ragged) > MOST_FAULTS else "")
+        listed = ", ".join(ragged[:MOST_LISTED]) + (", ..." if len(ragged) > MOST_LISTED else "")
         raise InputError(path, [Fault(path.name, f"line {rows[0][0]} has {width} cells, but {listed}; repair these")])
     header = not all(_is_number(cell) for cell in rows[0][1])
     names = rows[0][1] if header else [str(k) for k in range(width)]
     twice = sorted({name for name in names if names.count(name) > 1 and name})
     if twice:
-        raise InputError(path, [Fault(path.name, f"column {twice[0]!r} stands twice in the header; rename one")])
+        raise InputError(path, [Fault(path.name, f"column {twice[0]!r} occurs twice in the header; rename one")])
     body = rows[header:]
     cells = list(zip(*(row for _, row in body), strict=True)) or [()] * width
     units = {name: match[1].strip() for name in names if (match := re.search(r"\[([^]]+)\]$", name))}
@@ -144,7 +151,7 @@ def _is_number(cell: str) -> bool:
 
 
 def read_mat(path: Path) -> MeasurementTable:
-    """Variables of a .mat file, structures flattened; 7.3, which is HDF5 with rows and columns exchanged, by h5py."""
+    """Variables of a .mat file, structures flattened; version 7.3 is HDF5 with rows and columns exchanged, read by h5py."""
     try:
         content = scipy.io.loadmat(path, simplify_cells=True)
     except NotImplementedError:
@@ -153,7 +160,7 @@ def read_mat(path: Path) -> MeasurementTable:
 
 
 def read_hdf5(path: Path) -> MeasurementTable:
-    """Datasets by their path; the attribute `unit` or `units` says the unit."""
+    """Datasets by their path; their unit is the attribute `unit` or `units`."""
     return _read_h5(path, "/", turned=False)
 
 
@@ -179,7 +186,7 @@ def _read_h5(path: Path, joint: str, turned: bool) -> MeasurementTable:
 
 
 def read_tdms(path: Path) -> MeasurementTable:
-    """Channels of LabVIEW's TDMS as `group/channel`; the property `unit_string` says the unit."""
+    """Channels of LabVIEW's TDMS as `group/channel`; their unit is the property `unit_string`."""
     nptdms = _package("nptdms", path)
     columns, units = {}, {}
     with nptdms.TdmsFile.open(path) as file:
@@ -202,7 +209,7 @@ def read_mdf4(path: Path) -> MeasurementTable:
         for signal in file.iter_channels(skip_master=True):
             if signal.name in columns:
                 raise InputError(
-                    path, [Fault(path.name, f"channel {signal.name!r} stands in several groups; keep one")]
+                    path, [Fault(path.name, f"channel {signal.name!r} occurs in several groups; keep one")]
                 )
             columns.update(_flat(np.asarray(signal.samples), signal.name))
             units[signal.name] = signal.unit
@@ -228,7 +235,7 @@ def read_json(path: Path) -> MeasurementTable:
 
 
 def _flat(value: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Every numeric vector in nested structures with its name; scalars, texts and ragged lists are no columns."""
+    """Every numeric vector in nested structures with its name; scalars, text and ragged lists are left out."""
     if isinstance(value, dict):
         for key, member in value.items():
             yield from _flat(member, f"{name}.{key}" if name else str(key))

@@ -1,4 +1,7 @@
-"""Errors between two sets of poses: norms, per channel, parasitic motion, repeats, drift. Source: S0 section 5.
+"""Errors between two sets of poses: norms, statistics per channel, parasitic motion, repeatability, drift.
+
+Source: S0 section 5.
+
 
 Poses are rows (theta_x, theta_y, theta_z, delta_x, delta_y, delta_z) [rad, m]; an error is measured minus expected.
 """
@@ -17,7 +20,7 @@ BOX = (5.0, 95.0)  # percentiles: the boxes of S0 Figs. 7 and 8 hold 90 % of the
 
 @dataclass(frozen=True)
 class ErrorStatistics:
-    """Statistics over poses: a number for a norm, or one number a channel; SI. `sd` divides by n - 1."""
+    """Statistics over poses in SI, per channel, or a single number for a norm. `sd` divides by n - 1."""
 
     maximum: np.ndarray
     minimum: np.ndarray
@@ -47,12 +50,12 @@ class PoseErrors:
 
     @property
     def signed(self) -> ErrorStatistics:
-        """Of the errors, channel by channel."""
+        """Statistics of the errors, channel by channel."""
         return error_statistics(self.errors)
 
     @property
     def absolute(self) -> ErrorStatistics:
-        """Of the absolute errors, channel by channel."""
+        """Statistics of the absolute errors, channel by channel."""
         return error_statistics(np.abs(self.errors))
 
 
@@ -75,7 +78,7 @@ class Parasitic:
 
 @dataclass(frozen=True)
 class Repeatability:
-    """Scatter of poses commanded more than once: `groups` of pose numbers from 0, `sd` (6,) within them, pooled.
+    """Repeatability of poses commanded more than once: `groups` of pose numbers from 0, pooled `sd` (6,) within them.
 
     `sd` is None where no command was repeated: the recording then says nothing about repeatability.
     """
@@ -96,9 +99,9 @@ class PoseDrift:
 
 @dataclass(frozen=True)
 class Opposites:
-    """Poses commanded at +T and at -T: `pairs` of pose numbers from 0, `even` (pairs, 6) half the sum of the two.
+    """Poses commanded at +T and at -T: `pairs` of pose numbers from 0, `even` (pairs, 6) half the sum of both poses.
 
-    The even part is what no Jacobian can give: offset of home, even nonlinearity, drift between the two.
+    No Jacobian explains the even part: it is an offset of home, an even nonlinearity, or drift between the two.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -111,7 +114,7 @@ def error_statistics(values: np.ndarray) -> ErrorStatistics:
 
 
 def pose_errors(measured: np.ndarray, expected: np.ndarray) -> PoseErrors:
-    """Measured minus expected. Source: S0 section 5.1, steps 5 and 6. Raises InputError where the sets do not fit."""
+    """Measured minus expected. Source: S0 section 5.1, steps 5 and 6. Raises InputError where the shapes do not fit."""
     measured, expected = _two(measured, expected)
     return PoseErrors(measured - expected)
 
@@ -138,7 +141,7 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
 
 
 def repeatability(commanded: np.ndarray, measured: np.ndarray) -> Repeatability:
-    """Scatter within groups of equal commands, home included where it was recorded more than once."""
+    """The pooled scatter within groups of equal commands; home counts where it was recorded more than once."""
     measured, commanded = _two(measured, commanded)
     _, member = np.unique(commanded, axis=0, return_inverse=True)
     member = member.ravel()
@@ -152,10 +155,10 @@ def repeatability(commanded: np.ndarray, measured: np.ndarray) -> Repeatability:
 
 
 def pose_drift(errors: np.ndarray) -> PoseDrift:
-    """Least-squares line through the errors in order of measurement; `errors` (n, 6), n >= 3.
+    """Least-squares line through `errors` (n, 6) in order of measurement, n >= 3. Raises InputError for fewer.
 
-    Errors that depend on the command (a wrong Jacobian) pass for drift where the order of the commands does: fit
-    the residuals of a calibration. Standard deviations hold for errors independent from pose to pose.
+    Errors that depend on the command (a wrong Jacobian) look like drift where the commands themselves rise in time: give
+    the residuals of a calibration. The standard deviations hold for errors that are independent from pose to pose.
     """
     n = len(errors)
     if n < 3:
@@ -168,7 +171,7 @@ def pose_drift(errors: np.ndarray) -> PoseDrift:
 
 
 def opposites(commanded: np.ndarray, measured: np.ndarray) -> Opposites:
-    """Every two poses whose commands are each other's negative, home excepted."""
+    """Every pair of poses with opposite commands, home excepted."""
     measured, commanded = _two(measured, commanded)
     where = {tuple(row): k for k, row in enumerate(commanded + 0.0)}
     pairs = []

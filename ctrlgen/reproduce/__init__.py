@@ -1,1 +1,1 @@
-"""Every number the papers print and the program can compute: printed, ours, difference, status."""
+"""Every number that the papers print beside the program's own: printed, ours, difference, status, reason."""

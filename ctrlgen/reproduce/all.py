@@ -1,4 +1,4 @@
-"""The whole comparison with print: rows of all four sources, as a table, as JSON and as a page with figures."""
+"""All comparisons with the papers: the printed numbers of the four sources, as rows, as JSON and as a page with figures."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _s1_figures() -> dict[str, str]:
 
 
 def _s3_figures() -> dict[str, str]:
-    """Figs. 3-5, the hinge equations against finite elements; none where scikit-fem is not installed."""
+    """Figs. 3-5, the hinge equations against finite elements; empty where scikit-fem is not installed."""
     if find_spec("skfem") is None:
         return {}
     from ctrlgen.reproduce import hinge_errors
@@ -60,12 +60,12 @@ FIGURES = {"S0": s0_figures.figures, "S1": _s1_figures, "S2": s2_figures.figures
 
 
 def reproduce(sources: list[str]) -> list[PrintedNumber]:
-    """Rows of the named sources, in the order of the papers."""
+    """The printed numbers of the named sources, in the order of each paper."""
     return [row for name in sources for row in SOURCES[name]()]
 
 
 def as_json(rows: list[PrintedNumber]) -> list[dict[str, Any]]:
-    """A list of plain rows: source, where, printed, ours, difference, unit, status, reason."""
+    """The rows as plain dicts: source, where, printed, ours, difference, unit, status, reason."""
     return [
         {
             "source": row.source, "where": row.where, "printed": row.printed, "ours": row.ours, "difference": row.difference,
@@ -76,12 +76,12 @@ def as_json(rows: list[PrintedNumber]) -> list[dict[str, Any]]:
 
 
 def counts(rows: list[PrintedNumber]) -> Counter[tuple[str, str]]:
-    """How many rows of each (source, status)."""
+    """The number of rows of each (source, status)."""
     return Counter((row.source, row.status.value) for row in rows)
 
 
 def write_page(rows: list[PrintedNumber], path: Path) -> None:
-    """One self-contained HTML page: counts, the figures redrawn from our own results, and every row."""
+    """Writes one self-contained HTML page: counts, the figures redrawn from our own results, and every row."""
     sources = list(dict.fromkeys(row.source for row in rows))
     figures = {source: FIGURES[source]() for source in sources if source in FIGURES}
     page = render(

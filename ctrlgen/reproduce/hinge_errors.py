@@ -27,7 +27,7 @@ _PLACE = {table.ALPHA: (2, 2), table.DELTA_Y: (1, 1), table.DELTA_X: (0, 0)}
 class HingeErrors:
     """`errors[compliance][group]`: (equation - finite elements)/finite elements over `ratios` = t/R.
 
-    Not a number where an equation does not exist.
+    NaN where an equation does not exist.
     """
 
     ratios: np.ndarray
@@ -35,7 +35,10 @@ class HingeErrors:
     errors: dict[str, dict[str, np.ndarray]]
 
     def summary(self, compliance: str, group: str) -> tuple[float, float, float]:
-        """Smallest, largest and mean size of the error in percent over the equation's t/R range, as S3 Table 3 has."""
+        """Smallest, largest and mean absolute error [%] over the equation's t/R range, as S3 Table 3 prints.
+
+        Raises ValueError for an equation without a range.
+        """
         equation = table.named(compliance, group)
         if equation.within is None:
             raise ValueError(f"{equation.number} has no range: {equation.range_source}")
@@ -50,14 +53,14 @@ def hinge_errors(
     poisson: float = POISSON,
     reading: hinge_fem.Reading = hinge_fem.Reading.CENTRE,
 ) -> HingeErrors:
-    """Every equation against the finite-element hinge. The differences depend on t/R and Poisson's ratio alone.
+    """Every hinge equation against the finite-element hinge; the differences depend only on t/R and Poisson's ratio.
 
-    The centre-line reading is the one whose delta_x/F_x errors resemble those S3 prints; S3 does not name its own.
+    S3 does not say where it reads the displacement; `reading` on the centre line resembles its printed delta_x/F_x errors.
     """
     truth = hinge_fem.sweep(ratios, poisson, reading)
     errors: dict[str, dict[str, np.ndarray]] = {key: {} for key in table.PLANAR}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", table.HingeRangeWarning)  # the plots show what happens outside, too
+        warnings.simplefilter("ignore", table.HingeRangeWarning)  # the plots also show what happens outside
         for equation in table.EQUATIONS:
             if equation.compliance in _PLACE:
                 i, j = _PLACE[equation.compliance]
@@ -95,7 +98,7 @@ def draw_hinge_errors(data: HingeErrors, compliance: str) -> str:
 
 
 def _distinct(errors: dict[str, np.ndarray]) -> list[tuple[list[str], np.ndarray]]:
-    """Groups whose equations are the same formula in other letters share one curve."""
+    """One curve for all groups whose equations are the same formula in other letters."""
     curves: list[tuple[list[str], np.ndarray]] = []
     for group, values in errors.items():
         for groups, known in curves:

@@ -1,4 +1,4 @@
-"""How far the rounding of printed data can move a number computed from them."""
+"""Propagation of the rounding of printed data to the numbers computed from them."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ COVERED = 0.9973  # three standard deviations of a normal variable
 
 
 def half_units(values: np.ndarray, digits: int) -> np.ndarray:
-    """Half a unit of the last of `digits` significant digits of every value; 0 for a printed zero."""
+    """Half a unit of the last of `digits` significant digits of each value; 0 for a printed zero."""
     size = np.abs(values)
     exponent = np.floor(np.log10(np.where(size > 0, size, 1.0)) + 1e-12)
     return np.where(size > 0, 0.5 * 10.0 ** (exponent - digits + 1), 0.0)
 
 
-def carried(statistics: Callable[[np.ndarray], np.ndarray], data: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """How far each statistic may lie from that of the data before they were rounded, (k,).
+def propagated_rounding(
+    statistics: Callable[[np.ndarray], np.ndarray], data: np.ndarray, half: np.ndarray
+) -> np.ndarray:
+    """How far each statistic (k,) may be from its value for the data before they were rounded.
 
-    Every rounding error counts as uniform within its half unit and independent; the answer is the move that
-    COVERED of SAMPLES draws stay below, the same on every run. `data`, `half` (m,); `statistics` gives (k,).
+    By Monte Carlo: the rounding errors of `data` (m,) are independent and uniform within `half` (m,) a unit; the COVERED
+    quantile of the changes of `statistics` (data) over SAMPLES draws, the same on every run.
     """
     rng = np.random.default_rng(0)
-    here = statistics(data)
-    moves = (np.abs(statistics(data + half * rng.uniform(-1, 1, data.shape)) - here) for _ in range(SAMPLES))
-    return np.quantile(list(moves), COVERED, axis=0)
+    nominal = statistics(data)
+    changes = (np.abs(statistics(data + half * rng.uniform(-1, 1, data.shape)) - nominal) for _ in range(SAMPLES))
+    return np.quantile(list(changes), COVERED, axis=0)

@@ -1,4 +1,4 @@
-"""One printed number beside ours, and the rule that decides whether it is reproduced."""
+"""A number that a paper prints, beside the program's own, and the rule that decides whether it is reproduced."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from enum import Enum
 
 
 class ReproductionStatus(Enum):
-    """What became of a printed number."""
+    """Whether a printed number is reproduced."""
 
     REPRODUCED = "reproduced"
     DIFFERS = "differs"
@@ -18,10 +18,10 @@ class ReproductionStatus(Enum):
 
 @dataclass(frozen=True)
 class PrintedNumber:
-    """`source` such as 'S3', `where` such as 'Table 4, case 1, C_oFin (1,2)', `printed` the text as printed, `unit`.
+    """A printed number and ours. `source` such as 'S3', `where` such as 'Table 4, case 1, C_oFin (1,2)', `printed` its text.
 
     `ours` is None where it cannot be computed. `tolerance` is half a unit of the last printed digit
-    unless another is stated with a `reason`. A row that differs or cannot be computed needs a `reason`.
+    unless another is stated with a `reason`. A number that differs or cannot be computed needs a `reason`.
     """
 
     source: str
@@ -39,7 +39,7 @@ class PrintedNumber:
 
     @property
     def allowed(self) -> float:
-        """How far ours may be from the print and count as the same."""
+        """The largest difference with which ours still counts as reproduced."""
         return half_unit(self.printed) if self.tolerance is None else self.tolerance
 
     @property
@@ -49,14 +49,14 @@ class PrintedNumber:
 
     @property
     def status(self) -> ReproductionStatus:
-        """Reproduced within what the print can tell; not a number never is."""
+        """Reproduced where the difference is within `allowed`; NaN never is."""
         if self.ours is None:
             return ReproductionStatus.NOT_COMPUTABLE
         close = math.isfinite(self.ours) and abs(self.ours - self.value) <= self.allowed * (1 + 1e-9)
         return ReproductionStatus.REPRODUCED if close else ReproductionStatus.DIFFERS
 
-    def settled(self) -> PrintedNumber:
-        """This row without its reason where the print is reproduced after all."""
+    def without_needless_reason(self) -> PrintedNumber:
+        """This number without its reason where it is reproduced, which needs none."""
         return replace(self, reason="") if self.status is ReproductionStatus.REPRODUCED else self
 
 

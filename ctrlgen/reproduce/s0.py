@@ -1,8 +1,8 @@
-"""Every number S0 prints that can be computed: Tables 1 to 4, eq. (14) and (16), the errors of section 5.
+"""Every printed number of S0 that can be computed: Tables 1 to 4, eq. (14) and (16), the errors of section 5.
 
-Without a row: the numbers of eq. (10) and (15), lost with the scan; measured and commanded poses, which are data;
-accuracies of the instruments. Whatever is computed from Table 4 carries its rounding to three digits, stated as the
-tolerance. What follows from the device as printed differs; a device corrected by a diagnosis can be given instead.
+Left out: the numbers of eq. (10) and (15), which the scan has lost; measured and commanded poses, which are data;
+accuracies of the instruments. What is computed from Table 4 has the propagated rounding of its three digits as tolerance.
+Numbers that follow from the device as printed differ; a device corrected by a diagnosis can be given instead.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.meso_hexapod import MesoHexapod
 from ctrlgen.physics import meso_hexapod
 from ctrlgen.recordings.pose_errors import CHANNELS, parasitic, pose_errors
-from ctrlgen.reproduce.rounding import carried, half_units
+from ctrlgen.reproduce.rounding import half_units, propagated_rounding
 from ctrlgen.reproduce.row import PrintedNumber, half_unit
 from ctrlgen.reproduce.s0_data import PaperRecordings, load_s0
 
@@ -26,7 +26,7 @@ SCALE = np.array([to_si(1.0, unit) for unit in UNITS])
 DIGITS = 3  # of Table 4
 AS_PRINTED = "r_a, eq. (4) and eq. (9) as printed contradict each other and the recordings"
 ROUNDED = "computed from Table 4, which is rounded to three digits"
-RADIUS = "r_a = 81.44 mm contradicts c_3, c_4 and L, which want 64.29 mm"
+RADIUS = "r_a = 81.44 mm contradicts c_3, c_4 and L, which need 64.29 mm"
 
 # Table 2: measured motion of the cube for the commands 0.1 deg and 100 um, one axis a line. The scan scatters it;
 # which number stands where follows from Table 4.
@@ -72,7 +72,7 @@ EXTREMES = (
 
 
 def rows(device: MesoHexapod | None = None) -> list[PrintedNumber]:
-    """One row a printed number, in the order of the paper; `device` replaces the one printed."""
+    """The printed numbers in the order of the paper; `device` replaces the one as printed."""
     printed, recordings = load_s0()
     used = device or printed
     return [
@@ -152,7 +152,7 @@ def _table_2(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumber]:
 
     printed = data.kinematic / SCALE
     ours = cube(printed.ravel())
-    extra = carried(cube, printed.ravel(), half_units(printed, DIGITS).ravel())
+    extra = propagated_rounding(cube, printed.ravel(), half_units(printed, DIGITS).ravel())
     return [
         _row(
             f"Table 2, i = {k // 6 + 1}, {CHANNELS[k % 6]}", text, UNITS[k % 6], ours[k], extra=extra[k], reason=ROUNDED
@@ -173,7 +173,7 @@ def _equation_14(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumb
         return (factor * np.linalg.solve(inputs.T, motion.T).T).ravel()
 
     table = np.array(TABLE_2.split(), dtype=float)
-    ours, extra = jacobian(table), carried(jacobian, table, half_units(table, DIGITS))
+    ours, extra = jacobian(table), propagated_rounding(jacobian, table, half_units(table, DIGITS))
     found = []
     for k, value in enumerate((factor * data.J_cube).ravel()):
         text, unit = f"{value:.5f}", "rad/mm" if k < 18 else "mm/mm"
@@ -198,7 +198,7 @@ def _equation_16(data: PaperRecordings) -> list[PrintedNumber]:
 
     numbers = np.concatenate([(data.kinematic / SCALE).ravel(), table.ravel()])
     half = np.concatenate([half_units(data.kinematic / SCALE, DIGITS).ravel(), half_units(table, DIGITS).ravel()])
-    extra = carried(depth, numbers, half)[0]
+    extra = propagated_rounding(depth, numbers, half)[0]
     reason = "computed from Tables 2 and 4, which are rounded to three digits"
     return [_row("Eq. (16), h", "31.57", "mm", depth(numbers)[0], extra=extra, reason=reason)]
 
@@ -232,7 +232,7 @@ def _statistics(data: PaperRecordings, numbers: np.ndarray) -> np.ndarray:
 def _section_5(data: PaperRecordings) -> tuple[np.ndarray, np.ndarray]:
     printed = np.concatenate([data.measured / SCALE, data.kinematic / SCALE]).ravel()
     half = half_units(printed, DIGITS)
-    return _statistics(data, printed), carried(lambda numbers: _statistics(data, numbers), printed, half)
+    return _statistics(data, printed), propagated_rounding(lambda numbers: _statistics(data, numbers), printed, half)
 
 
 def _norms(data: PaperRecordings) -> list[PrintedNumber]:
@@ -268,7 +268,9 @@ def _table_4(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumber]:
         return ((J_k @ inputs).T / SCALE).ravel()
 
     ours = poses(data.J_cube.ravel())
-    extra = carried(poses, data.J_cube.ravel(), np.repeat([0.5e-2, 0.5e-5], 18))  # rad/m and 1, of five decimals in mm
+    extra = propagated_rounding(
+        poses, data.J_cube.ravel(), np.repeat([0.5e-2, 0.5e-5], 18)
+    )  # rad/m and 1, of five decimals in mm
     printed = (data.kinematic / SCALE).ravel()
     found = []
     for k, value in enumerate(printed):
@@ -280,7 +282,7 @@ def _table_4(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumber]:
 
 
 def _row(where: str, printed: str, unit: str, ours: float, *, extra: float = 0.0, reason: str = "") -> PrintedNumber:
-    """A row; `extra` is what rounded data add to half a unit of the print. The reason stands where it is needed."""
+    """A printed number; `extra` is what rounded data add to half a unit of the print. A reason is kept where it is needed."""
     tolerance = half_unit(printed) + extra if extra else None
     row = PrintedNumber("S0", where, printed, unit, float(ours), reason, tolerance)
     needed = extra or abs(row.difference or 0.0) > row.allowed * (1 + 1e-9)

@@ -1,4 +1,4 @@
-"""The recordings of S0 as arrays in SI, from the files of scenarios/nist_hexapod."""
+"""The published poses of S0 as arrays in SI, from the files of scenarios/nist_hexapod."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class PaperRecordings:
 
 
 def load_paper_recordings(device: MesoHexapod, folder: Path = SCENARIOS / "nist_hexapod") -> PaperRecordings:
-    """The four files of `folder`; the depth of the cube is the device's."""
+    """The data in the four files of `folder`; the depth of the cube is the device's. Raises InputError."""
     commanded, kinematic, measured = (
         read_poses(folder / f"{name}.csv", FRAME) for name in ("commanded", "kinematic_model", "measured")
     )
@@ -71,7 +71,7 @@ def read_jacobian(path: Path, axes: tuple[str, ...]) -> np.ndarray:
 
 
 def load_s0(scenarios: Path = SCENARIOS) -> tuple[MesoHexapod, PaperRecordings]:
-    """The device as printed and the paper's recordings."""
+    """The device as printed and the paper's data."""
     device = load_device(scenarios / "devices" / "meso_hexapod.toml")
     assert isinstance(device, MesoHexapod)
     return device, load_paper_recordings(device, scenarios / "nist_hexapod")

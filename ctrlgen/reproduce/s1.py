@@ -1,4 +1,4 @@
-"""Numbers of S1: actuator and notch stiffness, force laws, geometry, case studies."""
+"""Printed numbers of S1: actuator and notch stiffness, force laws, geometry, case studies."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ NO_PLANT = "compares with the paper's own finite elements; an independent plant 
 
 
 def rows() -> list[PrintedNumber]:
-    """Every number of S1 that is printed, with what the program makes of it."""
+    """Every printed number of S1 beside ours."""
     device = cast(MemsHexapod, load_device(DEVICE))
     return [*_matrices(device), *_geometry(device), *_force(device), *_signs(device), *_table_3(device), *_circle()]
 
@@ -120,7 +120,7 @@ def _signs(device: MemsHexapod) -> list[PrintedNumber]:
 
 
 def _table_3(device: MemsHexapod) -> list[PrintedNumber]:
-    """The printed errors from the printed values, as far as their digits tell; and whether the poses can be held."""
+    """The printed errors computed from the printed values, to their rounding; and whether the poses can be held."""
     workspace = Workspace(build_model(device))
     result = []
     for (channel, analytic, element, percent), pose in zip(TABLE_3, _poses(workspace.model), strict=True):
@@ -136,7 +136,7 @@ def _table_3(device: MemsHexapod) -> list[PrintedNumber]:
 
 
 def _circle() -> list[PrintedNumber]:
-    """Section 6.3: the mean of the three printed means; the rest needs a plant."""
+    """Section 6.3: the mean of the three printed means; the other numbers need an independent plant."""
     means = ("3.94", "3.65", "2.55")
     mean = float(np.mean([float(m) for m in means]))
     result = [

@@ -1,4 +1,4 @@
-"""Rows of S2: the measuring chain of its Appendix A and the hinge coefficients of Appendix C."""
+"""Printed numbers of S2: the sensors of its Appendix A and the hinge coefficients of its Appendix C."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ WRONG_DIGIT = "10.184 um/V times 20 V/2^16 is 3.108 nm; the print has cut the di
 
 
 def rows() -> list[PrintedNumber]:
-    """Every number of S2 beside ours."""
+    """Every printed number of S2 beside ours."""
     return [*_adc_and_noise(), *_statistics(), *_ranges(), *_coefficients()]
 
 
@@ -118,4 +118,4 @@ def _coefficients() -> list[PrintedNumber]:
 
 
 def _row(where: str, what: str, printed: str, unit: str, ours: float, reason: str = "") -> PrintedNumber:
-    return PrintedNumber("S2", f"{where}, {what}", printed, unit, ours, reason).settled()
+    return PrintedNumber("S2", f"{where}, {what}", printed, unit, ours, reason).without_needless_reason()

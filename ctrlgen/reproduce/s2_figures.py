@@ -1,4 +1,4 @@
-"""S2 Figs. A.3, A.8, A.9 and A.10 from simulated recordings of its measuring chain, as SVG."""
+"""S2 Figs. A.3, A.8, A.9 and A.10 from simulated recordings of its sensors, as SVG."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 SECONDS = 12.0  # of a recording; the printed ones are not published
 TEMPERATURES = (19.0, 26.0)  # degC
-SHARE = 0.95  # of the range that is travelled, to stay clear of its ends
+SHARE = 0.95  # of the range is travelled, to stay clear of its ends
 
 
 def figures() -> dict[str, str]:
@@ -51,10 +51,10 @@ def draw_fringes_and_offsets() -> Figure:
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.4))
     run = record(sensor, laser, 1.5e-6, 1e-6, np.random.default_rng(0))
     fringes = find_fringes(run.photodiode)
-    way = np.arange(run.photodiode.size) / run.rate * 1e-6
-    left.plot(from_si(way, "um"), run.photodiode, color=COLOURS[0], lw=0.6)
+    displacement = np.arange(run.photodiode.size) / run.rate * 1e-6
+    left.plot(from_si(displacement, "um"), run.photodiode, color=COLOURS[0], lw=0.6)
     for at in fringes.at:
-        left.axvline(from_si(np.interp(at, np.arange(way.size), way), "um"), color=COLOURS[2], lw=1)
+        left.axvline(from_si(np.interp(at, np.arange(displacement.size), displacement), "um"), color=COLOURS[2], lw=1)
     left.set_title("red: extrema found, a quarter wave apart", fontsize=8)
     left.set_xlabel("displacement [um]")
     left.set_ylabel("photodiode [V]")

@@ -1,4 +1,4 @@
-"""Every number of S3 that the kinetostatic model gives: Tables 1, 4, 5 and 6 and the figures of its text."""
+"""Every printed number of S3 that the kinetostatic model gives: Tables 1, 4, 5 and 6 and the numbers of its text."""
 
 from __future__ import annotations
 
@@ -26,13 +26,16 @@ from ctrlgen.reproduce.s3_tables import (
     unit,
 )
 
-POINT = 0.1  # percentage points that Table 6 may be off: it and the entries of Table 5 are rounded
-COMPLETE = {"C_inFin": "input_compliance", "J": "complete_J"}  # the same with the platform-held compliance
+POINT = 0.1  # percentage points that Table 6 may be off, because it and the entries of Table 5 are rounded
+COMPLETE = {
+    "C_inFin": "input_compliance",
+    "J": "complete_J",
+}  # the same with the input compliance that (B.83) leaves out
 STRUCTURAL = "zero by the threefold symmetry; allowed: rounding of the model"
 
 
 def rows() -> list[PrintedNumber]:
-    """All rows of S3, in the order of the print."""
+    """The printed numbers of S3, in the order of the paper."""
     return [*_table_1(), *_text_on_coupling(), *_table_4(), *_table_5(), *_table_6(), *_text_on_agreement()]
 
 
@@ -116,16 +119,17 @@ def _gap(symbol: str, i: int, j: int, text: str) -> str:
 
 @dataclass(frozen=True)
 class FiniteElementValue:
-    """A finite-element number of Table 5: `value` in the unit of the print, `reason` where it is not the print itself."""
+    """A finite-element number of Table 5: `value` in the printed unit, and a `reason` where it is not the printed number."""
 
     value: float
     reason: str
 
 
 def finite_element_value(symbol: str, i: int, j: int) -> FiniteElementValue:
-    """The finite-element value that Table 6 was made with.
+    """The finite-element value from which Table 6 was computed.
 
-    The print, unless it is too short for Table 6: then the one number within its half digit that meets both cases best.
+    The printed number, unless it has too few digits for Table 6: then the number within half its last digit that fits both
+    cases best.
     """
     text = next(t for s, row, column, t in entries(TABLE_5) if (s, row, column) == (symbol, i, j))
     printed, ours, percent = float(text), [], []
@@ -142,7 +146,7 @@ def finite_element_value(symbol: str, i: int, j: int) -> FiniteElementValue:
 
 
 def _percent(case: int, symbol: str, i: int, j: int) -> float:
-    """The number Table 6 means, its lost sign given back."""
+    """The number of Table 6, with its minus sign where the print has lost it."""
     text = next(t for s, row, column, t in entries(TABLE_6[case]) if (s, row, column) == (symbol, i, j))
     return -float(text) if (case, symbol, i, j) in SIGN_LOST_6 else float(text)
 

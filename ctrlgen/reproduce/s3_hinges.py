@@ -1,4 +1,4 @@
-"""Rows of S3 Table 3: the hinge equations of S2 Appendix C against finite elements."""
+"""Printed numbers of S3 Table 3: the hinge equations of S2 Appendix C against finite elements."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def rows() -> list[PrintedNumber]:
         for what, printed, value in zip(("min.", "max.", "mean"), texts.split(), ours, strict=True):
             where = f"Table 3, {equation.compliance}, {equation.group}, {what} error"
             reason = missing or _why_errors_differ(equation, what)
-            found.append(PrintedNumber("S3", where, printed, "%", value, reason).settled())
+            found.append(PrintedNumber("S3", where, printed, "%", value, reason).without_needless_reason())
     for compliance, texts in ((table.DELTA_Y, "0 2.7 0.07"), (table.DELTA_X, "0 1.1 0.08")):
         for what, printed in zip(("min.", "max.", "mean"), texts.split(), strict=True):
             where = f"Table 3, {compliance}, its own empirical equation, {what} error"

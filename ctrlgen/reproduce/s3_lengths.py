@@ -1,7 +1,7 @@
-"""Which printed link lengths of S3 contradict its Table 4, and what they must be instead.
+"""Which printed link lengths of S3 contradict its Table 4, and the values that agree with it.
 
-Two lengths at a time, and the frame angle that the paper leaves out, are fitted to the printed entries of both
-cases in units of half their last digit. A pair explains the table when no entry is left outside its digit.
+Two lengths at a time, and the frame angle that the paper does not state, are fitted to the printed entries of both cases,
+weighted by half their last digit. A pair explains the table where every entry is reproduced to its last digit.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class LengthFit:
 
     @property
     def outside(self) -> int:
-        """How many entries are not reproduced."""
+        """The number of entries that are not reproduced."""
         return int((np.abs(self.misfit) > 1).sum())
 
     @property
@@ -125,13 +125,13 @@ def fit(*freed: str) -> LengthFit:
 
 @cache
 def diagnosis() -> tuple[LengthFit, ...]:
-    """Every pair of lengths as the explanation of Table 4, the best first; a negative length explains nothing."""
+    """Every pair of lengths fitted to Table 4, the best first; pairs with a negative length are left out."""
     pairs = (fit(*pair) for pair in combinations(LENGTHS, 2))
     return tuple(sorted((f for f in pairs if min(f.lengths.values()) >= 0), key=lambda f: f.cost))
 
 
 def corrected(case: int, found: LengthFit | None = None) -> SimpleNamespace:
-    """Values of the stage of case 1 or 2 with the lengths and frame angle of `found`, by default the best pair's."""
+    """Values of the stage of case 1 or 2 with the lengths and frame angle of `found`, by default those of the best pair."""
     found = diagnosis()[0] if found is None else found
     p = printed_device(case).values()
     p.lengths, p.frame_angle = SimpleNamespace(**found.lengths), found.frame_angle

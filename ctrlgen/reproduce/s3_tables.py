@@ -1,4 +1,4 @@
-"""What S3 prints in Tables 1, 4, 5 and 6, digit by digit; thousands separators left out."""
+"""The printed numbers of S3 Tables 1, 4, 5 and 6, digit by digit, without thousands separators."""
 
 from __future__ import annotations
 
