@@ -10,40 +10,96 @@ from typing import TYPE_CHECKING, Any
 from ctrlgen._version import __version__
 
 if TYPE_CHECKING:
-    from ctrlgen.app.pipeline import Outcome, run
-    from ctrlgen.core.errors import CtrlgenError, InputError, SolverError, ToolError, Unreachable
-    from ctrlgen.devices import load_device
+    from ctrlgen.app.batch import load_batch, run_batch
+    from ctrlgen.app.pipeline import Outcome, run, verify
+    from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
+    from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user import user_device
     from ctrlgen.diagnosis.pipeline import diagnose
-    from ctrlgen.diagnosis.selection.result import Diagnosis
-    from ctrlgen.firmware.folder import generate
+    from ctrlgen.diagnosis.selection.result import Diagnosis, Estimate, Finding
+    from ctrlgen.firmware.folder import CFolder, generate
     from ctrlgen.model.assembly import build_model
-    from ctrlgen.model.feedforward import Controller, ControllerStatus
+    from ctrlgen.model.feedforward import Controller, ControllerStatus, ControllerStep
     from ctrlgen.model.model import Model
     from ctrlgen.model.simulation import Trace, simulate
     from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
     from ctrlgen.recordings.reader import load_recordings
-    from ctrlgen.trajectory.scenario import load_scenario
-    from ctrlgen.trajectory.solution import Solution, solve
+    from ctrlgen.recordings.recording import Record, Recording
+    from ctrlgen.reporting.build_record import Build
+    from ctrlgen.trajectory.scenario import Scenario, load_scenario
+    from ctrlgen.trajectory.solution import Margin, Solution, solve
+    from ctrlgen.trajectory.workspace import Workspace
     from ctrlgen.verification.comparison import Comparison, compare
 
 _EXPORTS = {
-    "app.pipeline": ("Outcome", "run"),
-    "core.errors": ("CtrlgenError", "InputError", "SolverError", "ToolError", "Unreachable"),
-    "devices": ("load_device",),
+    "app.batch": (
+        "load_batch",
+        "run_batch",
+    ),
+    "app.pipeline": (
+        "Outcome",
+        "run",
+        "verify",
+    ),
+    "core.errors": (
+        "CtrlgenError",
+        "Fault",
+        "Infeasibility",
+        "InputError",
+        "SolverError",
+        "ToolError",
+        "Unreachable",
+    ),
+    "devices": (
+        "Device",
+        "load_device",
+    ),
     "devices.user": ("user_device",),
     "diagnosis.pipeline": ("diagnose",),
-    "diagnosis.selection.result": ("Diagnosis",),
-    "firmware.folder": ("generate",),
-    "model.feedforward": ("Controller", "ControllerStatus"),
+    "diagnosis.selection.result": (
+        "Diagnosis",
+        "Estimate",
+        "Finding",
+    ),
+    "firmware.folder": (
+        "CFolder",
+        "generate",
+    ),
     "model.assembly": ("build_model",),
+    "model.feedforward": (
+        "Controller",
+        "ControllerStatus",
+        "ControllerStep",
+    ),
     "model.model": ("Model",),
-    "model.simulation": ("Trace", "simulate"),
-    "model.virtual_sensors": ("SensorReadings", "simulate_sensors"),
+    "model.simulation": (
+        "Trace",
+        "simulate",
+    ),
+    "model.virtual_sensors": (
+        "SensorReadings",
+        "simulate_sensors",
+    ),
     "recordings.reader": ("load_recordings",),
-    "trajectory.scenario": ("load_scenario",),
-    "trajectory.solution": ("Solution", "solve"),
-    "verification.comparison": ("Comparison", "compare"),
+    "recordings.recording": (
+        "Record",
+        "Recording",
+    ),
+    "reporting.build_record": ("Build",),
+    "trajectory.scenario": (
+        "Scenario",
+        "load_scenario",
+    ),
+    "trajectory.solution": (
+        "Margin",
+        "Solution",
+        "solve",
+    ),
+    "trajectory.workspace": ("Workspace",),
+    "verification.comparison": (
+        "Comparison",
+        "compare",
+    ),
 }
 _MODULE = {name: module for module, names in _EXPORTS.items() for name in names}
 
@@ -56,31 +112,47 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Build",
+    "CFolder",
     "Comparison",
     "Controller",
     "ControllerStatus",
+    "ControllerStep",
     "CtrlgenError",
+    "Device",
     "Diagnosis",
+    "Estimate",
+    "Fault",
+    "Finding",
+    "Infeasibility",
     "InputError",
+    "Margin",
     "Model",
     "Outcome",
+    "Record",
+    "Recording",
+    "Scenario",
     "SensorReadings",
     "Solution",
     "SolverError",
     "ToolError",
     "Trace",
     "Unreachable",
+    "Workspace",
     "__version__",
     "build_model",
     "compare",
     "diagnose",
     "generate",
+    "load_batch",
     "load_device",
     "load_recordings",
     "load_scenario",
     "run",
+    "run_batch",
     "simulate",
     "simulate_sensors",
     "solve",
     "user_device",
+    "verify",
 ]

@@ -9,6 +9,8 @@ from graphlib import TopologicalSorter
 import pytest
 from conftest import ROOT, SCENARIOS
 
+import ctrlgen
+
 PACKAGE = ROOT / "ctrlgen"
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
 FOUNDATION = "core numerics"
@@ -142,3 +144,12 @@ def test_the_independent_models_import_nothing_of_ctrlgen() -> None:
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             assert not any(name.split(".")[0] == "ctrlgen" for name in names), path.name
+
+
+def test_a_public_class_has_a_name_of_its_own():
+    """What `ctrlgen` exports means one thing, wherever in the package it is met."""
+    defined = [
+        node.name for path in MODULES for node in ast.parse(path.read_text()).body if isinstance(node, ast.ClassDef)
+    ]
+    exported = [name for name in ctrlgen.__all__ if isinstance(getattr(ctrlgen, name), type)]
+    assert len(exported) > 20 and {name: defined.count(name) for name in exported} == dict.fromkeys(exported, 1)

@@ -46,7 +46,7 @@ class Cube(Section):
     depth: Length
 
 
-class Workspace(Section):
+class RatedTravel(Section):
     """Largest rotation and translation of any axis that the paper states; no limit of the model, `travel` is."""
 
     rotation: Annotated[Quantity, In("deg", positive=True)]
@@ -61,7 +61,7 @@ class MesoHexapod(Device):
     hexapod: Hexapod
     directions: Directions
     cube: Cube
-    workspace: Workspace
+    workspace: RatedTravel
     travel: Length
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:

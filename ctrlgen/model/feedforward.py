@@ -200,7 +200,7 @@ class Controller:
         """State (x, z) of a device at rest at ambient temperature."""
         return self.model.rest.copy(), np.zeros(len(self.model.axes))
 
-    def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> Step:
+    def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> ControllerStep:
         """Drives that bring the followed signal to `target` (channels,) [SI] at the next sample, from `state` (x, z).
 
         With `settle`: the equilibrium at `target`, and its state. Every limit is kept; `ControllerStatus` says which ones acted.
@@ -236,16 +236,16 @@ class Controller:
             u, limited = _clamp(drive, *m.u_bounds, u_slack)
             status |= ControllerStatus.DRIVE
         if not limited and len(x) == n:  # only actuators have memory: their state is what the drive was computed for
-            return Step(status, wanted, state_wanted, u, (state_wanted, wanted))
+            return ControllerStep(status, wanted, state_wanted, u, (state_wanted, wanted))
         x_next = _row(k.advance(x, wanted if static else z, u))
         z_next = _row(k.settle(x_next, wanted, u)) if limited else wanted
-        return Step(status, z_next, state_wanted, u, (x_next, z_next))
+        return ControllerStep(status, z_next, state_wanted, u, (x_next, z_next))
 
-    def _without_target(self, k: Inverse, x: np.ndarray, z: np.ndarray) -> Step:
+    def _without_target(self, k: Inverse, x: np.ndarray, z: np.ndarray) -> ControllerStep:
         """The safe drive, and what the device does under it for one sample."""
         x_next = _row(k.advance(x, z, self.safe_drive))
         z_next = _row(k.settle(x_next, z, self.safe_drive))
-        return Step(ControllerStatus.INPUT, z, x[: self.nominal.n_states], self.safe_drive, (x_next, z_next))
+        return ControllerStep(ControllerStatus.INPUT, z, x[: self.nominal.n_states], self.safe_drive, (x_next, z_next))
 
     def _limited_state(self, k: Inverse, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, bool]:
         """The actuator state that displacement `wanted` needs, limited to its range, and whether that changed it."""
@@ -296,7 +296,7 @@ class Controller:
 
 
 @dataclass(frozen=True)
-class Step:
+class ControllerStep:
     """One answer of the controller, SI; `state` (x, z) is the one predicted for the next sample."""
 
     status: ControllerStatus
