@@ -23,7 +23,6 @@ from ctrlgen.app.batch import load_batch, run_batch
 from ctrlgen.app.cli import execute
 from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.evidence.bootstrap import block_length, bootstrap, redrawn
-from ctrlgen.effects import Effect
 from ctrlgen.recordings.recording import Record
 
 SERVO = 'kind = "servo"\nname = "table"\ntitle = "a table"\nsource = "an example"\ntravel = "90 deg"\n'
@@ -81,9 +80,8 @@ def test_each_recording_gets_its_folder_and_its_line(jobs, tmp_path):
     assert not list(out.glob(".*"))
 
 
-def test_what_is_there_is_kept_and_what_changed_is_made_again(jobs, tmp_path, monkeypatch):
-    few = ("sensor_gain", "bow")
-    monkeypatch.setattr(Effect, "library", {kind: Effect.library[kind] for kind in few})
+def test_what_is_there_is_kept_and_what_changed_is_made_again(jobs, tmp_path):
+    jobs.write_text('laws = ["sensor_gain", "bow"]\n' + jobs.read_text())
     out = tmp_path / "out"
     run_batch(load_batch(jobs)[:2], out, jobs=0)
     times = {p: p.stat().st_mtime_ns for p in out.rglob("diagnosis.json")}
@@ -101,7 +99,7 @@ def test_a_list_says_all_its_faults(tmp_path):
     servo_poses(tmp_path / "b" / "run", 0.0, 0)
     job = '[[job]]\ndevice = "{}"\nrecordings = {}\n'
     text = job.format("none.toml", '["c*"]') + job.format("table.toml", '["a/run", "b/run", ["a/run", "nowhere"]]')
-    (tmp_path / "jobs.toml").write_text(text)
+    (tmp_path / "jobs.toml").write_text('laws = ["creeep"]\n' + text)
     with pytest.raises(InputError) as caught:
         load_batch(tmp_path / "jobs.toml")
     for part in (
@@ -109,6 +107,7 @@ def test_a_list_says_all_its_faults(tmp_path):
         "nothing matches 'c*'",
         "nothing matches 'nowhere'",
         "would have the result folder table--run",
+        "laws: creeep is not a known effect",
     ):
         assert part in str(caught.value), part
 
@@ -175,11 +174,9 @@ def test_a_cluster_gives_the_same_though_a_worker_is_killed(jobs, tmp_path):
 def creeping(tmp_path_factory):
     """A diagnosis of an axis that creeps."""
     axis = SCENARIOS / "devices" / "flexure_axis.toml"
-    with pytest.MonkeyPatch.context() as patch:
-        few = ("creep", "drive_gain", "stiffening")
-        patch.setattr(Effect, "library", {kind: Effect.library[kind] for kind in few})
-        creep = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0"\n'
-        return ctrlgen.diagnose(axis, axis_recording(tmp_path_factory.mktemp("axis"), axis.read_text() + creep))
+    creep = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0"\n'
+    folder = axis_recording(tmp_path_factory.mktemp("axis"), axis.read_text() + creep)
+    return ctrlgen.diagnose(axis, folder, laws=("creep", "drive_gain", "stiffening"))
 
 
 def test_replicates_agree_with_the_slopes_where_the_noise_is_white(creeping):
@@ -202,10 +199,9 @@ def test_replicates_are_the_same_in_other_processes(creeping):
 
 
 def test_the_command_prints_and_keeps_the_intervals(jobs, tmp_path, monkeypatch, capsys):
-    few = ("sensor_gain", "bow")
-    monkeypatch.setattr(Effect, "library", {kind: Effect.library[kind] for kind in few})
     files = [str(tmp_path / "table.toml"), str(tmp_path / "runs" / "run0")]
     command = ["ctrlgen", "diagnose", *files, "--out", str(tmp_path / "out"), "--bootstrap", "20", "--jobs", "0"]
+    command += ["--laws", "sensor_gain,bow"]
     monkeypatch.setattr(sys, "argv", command)
     assert execute() == 0
     printed = capsys.readouterr().out

@@ -25,7 +25,7 @@ from ctrlgen.diagnosis.evidence.experiment_files import files
 from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
 from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
 from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
-from ctrlgen.diagnosis.evidence.supporting_analyses import evidence
+from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.evidence.unknown_input import estimate_unknown_input
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, written
@@ -401,7 +401,7 @@ def test_evidence_is_numbers_that_json_knows():
     fitter = axis_fitter(lambda t, q, v, memory: (cubic(t, q, v, 0)[0] + 0.02 * detent(t, q, v, 0)[0], 0), n=1000)
     searcher = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None)
     search = searcher.run(Structure(AXIS))
-    found = evidence(fitter, search, explained=False)
+    found = run_supporting_analyses(fitter, search, explained=False)
     text = json.dumps(
         [found.residual_location, found.detectability, found.next_experiment, found.search_history, found.extra],
         allow_nan=False,

@@ -30,23 +30,17 @@ from ctrlgen.diagnosis.report.plots import POINTS, _density, thinned
 from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.selection.result import Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED
-from ctrlgen.effects import Effect
-from ctrlgen.effects.quantisation import Quantisation
-from ctrlgen.effects.saturation import Saturation
 
 AXIS, MESO = SCENARIOS / "devices" / "flexure_axis.toml", SCENARIOS / "devices" / "meso_hexapod.toml"
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
 STEP = 1e-3
+LAWS = (
+    "creep",
+    "drive_gain",
+    "home_offset",
+    "stiffening",
+)  # four effects instead of all: the report is the same, and quick
 RECORD = '[[record]]\nfile = "{0}.csv"\nrole = "{0}"\ntime = {{ column = "t", unit = "s" }}\n'
-
-
-@pytest.fixture(scope="module", autouse=True)
-def small_library():
-    """Four laws instead of all: the report is the same, and quick."""
-    with pytest.MonkeyPatch.context() as patch:
-        few = ("creep", "drive_gain", "home_offset", "stiffening")
-        patch.setattr(Effect, "library", {kind: Effect.library[kind] for kind in few})
-        yield
 
 
 def axis_recording(folder: Path, true: str, title: str = "creeping axis") -> Path:
@@ -111,7 +105,7 @@ def creeping(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(creeping):
-    return ctrlgen.diagnose(AXIS, creeping)
+    return ctrlgen.diagnose(AXIS, creeping, laws=LAWS)
 
 
 def same_prediction(diagnosis, text: str, folder: Path) -> None:
@@ -189,10 +183,8 @@ def test_the_next_device_states_the_deviations_of_the_fit(found, tmp_path):
         assert stated[unknown.path].sd == pytest.approx(np.sqrt(variance), rel=0.01), unknown.path
 
 
-def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(found, tmp_path, monkeypatch):
+def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(found, tmp_path):
     """A saturation clips or does not: its share is not fitted, and is written all the same; so are steps of a converter."""
-    for law in (Saturation, Quantisation):
-        monkeypatch.setitem(Effect.library, law.kind, law)
     clip = Hypothesis("saturation", "actuator:axis", "axis")
     trial = found.search.chosen
     structure = trial.fit.structure.with_cause(clip, {"share": 1.0, "level": 2.0})
@@ -214,7 +206,7 @@ def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(foun
 def test_an_effect_that_is_there_already_stays_and_the_new_one_follows(creeping, tmp_path):
     known = AXIS.read_text() + "\n# glue\n" + CREEP.replace("0.03", "0.01").replace("0.2 s", "0.05 s")
     (tmp_path / "known.toml").write_text(known)
-    again = ctrlgen.diagnose(tmp_path / "known.toml", creeping)
+    again = ctrlgen.diagnose(tmp_path / "known.toml", creeping, laws=LAWS)
     text = next_text(again, known)
     assert "# glue" in text and text.count('kind = "creep"') == 2 and 'tau = "0.05 s"' in text
     same_prediction(again, text, tmp_path)
@@ -224,7 +216,7 @@ def test_effects_written_in_one_line_are_continued_in_that_line(creeping, tmp_pa
     first = 'effect = [{ kind = "home_offset", at = "axis", offset = "0 um" }] # level\n'
     known = first + AXIS.read_text()
     (tmp_path / "known.toml").write_text(known)
-    again = ctrlgen.diagnose(tmp_path / "known.toml", creeping)
+    again = ctrlgen.diagnose(tmp_path / "known.toml", creeping, laws=LAWS)
     text = next_text(again, known)
     assert text.startswith("effect = [{ kind") and "# level" in text and "[[effect]]" not in text
     same_prediction(again, text, tmp_path)
@@ -239,7 +231,7 @@ def test_a_number_in_a_list_changes_in_place_and_says_what_it_was(tmp_path, layo
     (tmp_path / "device.toml").write_text(written)
     (tmp_path / "true.toml").write_text(MESO.read_text().replace('"51 deg"', '"51.2 deg"', 1))
     folder = poses_recording(tmp_path, ctrlgen.load_device(tmp_path / "true.toml"))
-    turned = ctrlgen.diagnose(tmp_path / "device.toml", folder)
+    turned = ctrlgen.diagnose(tmp_path / "device.toml", folder, laws=LAWS)
     assert [f.cause.path for f in turned.findings] == ["hexapod.platform_angles[3]"]
     text = next_text(turned, written)
     assert "[[effect]]" not in text and text.count("diagnosed from turned strut; was 51 deg") == 1
@@ -371,7 +363,7 @@ def command(*words: object) -> int:
 
 def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path, capsys):
     out = tmp_path / "out"
-    assert command("diagnose", AXIS, creeping, "--out", out, "--seed", 3) == 0
+    assert command("diagnose", AXIS, creeping, "--out", out, "--seed", 3, "--laws", ",".join(LAWS)) == 0
     assert {p.name for p in out.iterdir()} == {"report.html", "diagnosis.json", "device.next.toml", ".ctrlgen"}
     printed = capsys.readouterr().out
     told = json.loads((out / "diagnosis.json").read_text())
@@ -380,7 +372,10 @@ def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path
     assert "Explained: a flexure" in printed and "stage:axis" in printed and str(out / "report.html") in printed
     page_text = (out / "report.html").read_text()
     assert "seed 3" in page_text and "/fit.csv" in page_text and "/recording.toml" in page_text
-    assert command("diagnose", out / "device.next.toml", creeping, "--out", tmp_path / "next") == 0
+    assert (
+        command("diagnose", out / "device.next.toml", creeping, "--out", tmp_path / "next", "--laws", ",".join(LAWS))
+        == 0
+    )
     assert json.loads((tmp_path / "next" / "diagnosis.json").read_text())["verdict"] == CONSISTENT
 
 
@@ -427,22 +422,22 @@ def test_an_interruption_keeps_the_earlier_result(creeping, tmp_path, at):
             raise KeyboardInterrupt
 
     out = tmp_path / "out"
-    diagnose_into(AXIS, [creeping], out)
+    diagnose_into(AXIS, [creeping], out, laws=LAWS)
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     with pytest.raises(KeyboardInterrupt):
-        diagnose_into(AXIS, [creeping], out, progress=stop)
+        diagnose_into(AXIS, [creeping], out, progress=stop, laws=LAWS)
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
     assert set(tmp_path.iterdir()) <= {out, unfinished(out)}  # the fits, for when it is asked again
 
 
 def test_objects_and_paths_give_the_same_answer_and_the_same_page(creeping, found):
     device = ctrlgen.load_device(AXIS)
-    again = ctrlgen.diagnose(device, ctrlgen.load_recordings([creeping], ctrlgen.build_model(device)))
+    again = ctrlgen.diagnose(device, ctrlgen.load_recordings([creeping], ctrlgen.build_model(device)), laws=LAWS)
     assert isinstance(again, ctrlgen.Diagnosis) and diagnosis_record(again, MADE_FROM) == diagnosis_record(
         found, MADE_FROM
     )
     assert page(again, Provenance({}, 0)) == page(found, Provenance({}, 0))
-    several = ctrlgen.diagnose(str(AXIS), [str(creeping / "recording.toml")])
+    several = ctrlgen.diagnose(str(AXIS), [str(creeping / "recording.toml")], laws=LAWS)
     assert diagnosis_record(several, MADE_FROM) == diagnosis_record(found, MADE_FROM)
 
 

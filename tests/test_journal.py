@@ -54,7 +54,7 @@ def test_what_is_stopped_goes_on_and_ends_alike(asked, sought, tmp_path):
     sought.clear()
     diagnose_into(*asked, stopped, progress=said.append)
     assert len(sought) == needed - done
-    assert any(s.startswith("going on after") for s in said)
+    assert any(s.startswith("continuing after") for s in said)
     assert (stopped / "diagnosis.json").read_bytes() == (whole / "diagnosis.json").read_bytes()
     assert not unfinished(stopped).exists()
 

@@ -32,7 +32,7 @@ MAY_IMPORT = {  # package -> packages; every module may import its own package a
     "diagnosis.report": f"{DIAGNOSIS} reporting diagnosis.selection",
     "diagnosis": f"{DIAGNOSIS} diagnosis.selection diagnosis.evidence diagnosis.report",
     "reproduce": STAGES,
-    "app": f"{STAGES} reproduce diagnosis diagnosis.selection diagnosis.evidence diagnosis.report",
+    "app": f"{STAGES} reproduce diagnosis diagnosis.hypotheses diagnosis.selection diagnosis.evidence diagnosis.report",
 }  # fmt: skip
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

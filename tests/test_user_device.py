@@ -13,10 +13,10 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
 from ctrlgen.diagnosis.selection.verdict import EXPLAINED
-from ctrlgen.effects import Effect
 
 INERTIA, WEIGHT, DAMPING, MOTOR = 2e-4, 0.02, 4e-4, 0.015
 STEP = 2e-3
+LAWS = ("coulomb", "creep", "sensor_gain", "stiffening", "quadratic_damping")
 
 
 def pendulum(**other):
@@ -83,12 +83,6 @@ def drives_of(n_u, size, n=700):
     return {"fit": size / 2.5 * np.array(fit).T, "hold_out": size * np.array(held).T}
 
 
-@pytest.fixture
-def small_library(monkeypatch):
-    few = ("coulomb", "creep", "sensor_gain", "stiffening", "quadratic_damping")
-    monkeypatch.setattr(Effect, "library", {kind: Effect.library[kind] for kind in few})
-
-
 def test_it_moves_as_scipy_integrates_it():
     drive = drives_of(1, 1.5)["fit"][:300]
     trace = ctrlgen.simulate(ctrlgen.build_model(pendulum()), drive, STEP)
@@ -144,21 +138,21 @@ def test_states_of_its_own_may_depend_on_everything():
 
 
 @pytest.mark.long
-def test_friction_of_a_pendulum_is_found(tmp_path, small_library):
+def test_friction_of_a_pendulum_is_found(tmp_path):
     def force(u, q, v):
         return MOTOR * u - WEIGHT * np.sin(q) - DAMPING * v - 2e-3 * np.tanh(v / 0.3)
 
     drives = drives_of(1, 1.0)
     folder = recorded(tmp_path, "pendulum", force, [INERTIA], drives, (["swing"], "deg"), 2e-4)
     device = pendulum()
-    found = ctrlgen.diagnose(device, folder)
+    found = ctrlgen.diagnose(device, folder, laws=LAWS)
     assert found.verdict == EXPLAINED
     assert [(f.effect, f.location) for f in found.findings] == [("coulomb", "stage:swing")]
     assert found.findings[0].parameters["force"].value == pytest.approx(2e-3, rel=0.05)
     assert {"mechanism.inertia", "effect[0].force"} <= set(found.values)
     numbers = dict(found.corrected.quantities())
     assert numbers["effect[0].force"].si == pytest.approx(2e-3, rel=0.05)
-    again = ctrlgen.diagnose(found.corrected, folder)
+    again = ctrlgen.diagnose(found.corrected, folder, laws=LAWS)
     assert again.findings == ()
 
 
@@ -177,7 +171,7 @@ def stage():
     )  # fmt: skip
 
 
-def test_stiffening_of_one_axis_of_two_is_found_there(tmp_path, small_library):
+def test_stiffening_of_one_axis_of_two_is_found_there(tmp_path):
     K = np.array([[20e3, 2e3], [2e3, 30e3]])
 
     def force(u, q, v):
@@ -185,7 +179,7 @@ def test_stiffening_of_one_axis_of_two_is_found_there(tmp_path, small_library):
 
     drives = drives_of(2, 3.0)
     folder = recorded(tmp_path, "stage", force, [0.4, 0.4], drives, (["x", "y"], "um"), 2e-7)
-    found = ctrlgen.diagnose(stage(), folder)
+    found = ctrlgen.diagnose(stage(), folder, laws=LAWS)
     assert found.verdict == EXPLAINED
     assert [(f.effect, f.location) for f in found.findings] == [("stiffening", "stage:y")]
     k3 = found.findings[0].parameters["k3"]

@@ -1,6 +1,7 @@
 """Batch diagnosis: from a list of recordings, one result folder per diagnosis and a table of all.
 
     seed = 0                              # optional
+    laws = ["creep", "stiffening"]        # optional: the effects to consider, by default all
     [[job]]
     device = "devices/stage.toml"         # paths as seen from this file
     recordings = ["runs/*", ["a", "b"]]   # a diagnosis for each match; the recordings of an inner list are joined
@@ -29,6 +30,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
 from ctrlgen.core.parallel import Failure, run_all
 from ctrlgen.devices.section import Section
+from ctrlgen.diagnosis.hypotheses.hypotheses import selected_laws
 from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests
 
 MADE_FROM = "made_from.json"  # in each result folder: what the result depends on
@@ -49,6 +51,7 @@ class BatchFile(Section):
     """The schema of the list."""
 
     seed: int = 0
+    laws: tuple[str, ...] | None = None
     job: Annotated[tuple[JobTable, ...], Field(min_length=1)]
 
 
@@ -61,18 +64,20 @@ class Task:
     recordings: tuple[str, ...]
     seed: int
     replicates: int = 0
+    laws: tuple[str, ...] | None = None
 
     def made_from(self) -> dict[str, Any]:
         """Everything the result depends on, files as their SHA-256. Raises InputError where a file cannot be read."""
         hashes = digests(Path(self.device), [Path(r) for r in self.recordings])
-        return {"version": __version__, "seed": self.seed, "replicates": self.replicates, "files": hashes}
+        laws = None if self.laws is None else list(self.laws)
+        return {"version": __version__, "seed": self.seed, "replicates": self.replicates, "laws": laws, "files": hashes}
 
     def __call__(self) -> dict[str, bytes]:
         """The content of the result folder by file name; it is made in a temporary folder."""
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "result"
             replicates = Replicates(self.replicates, jobs=0) if self.replicates else None
-            diagnose_into(self.device, list(self.recordings), out, self.seed, replicates=replicates)
+            diagnose_into(self.device, list(self.recordings), out, self.seed, replicates=replicates, laws=self.laws)
             paths = sorted(p for p in out.rglob("*") if p.is_file() and p.name != MARKER)
             return {str(p.relative_to(out)): p.read_bytes() for p in paths}
 
@@ -111,7 +116,12 @@ def load_batch(path: Path | str, seed: int | None = None, replicates: int = 0) -
                 continue
             name = f"{job.name or device.stem}--{'+'.join(_name(p) for p in group)}"
             paths = tuple(str(p.resolve()) for p in group)
-            tasks.append(Task(name, str(device.resolve()), paths, written.seed if seed is None else seed, replicates))
+            chosen = written.seed if seed is None else seed
+            tasks.append(Task(name, str(device.resolve()), paths, chosen, replicates, written.laws))
+    try:
+        selected_laws(written.laws)
+    except InputError as error:
+        faults += [Fault("laws", f"{fault.where} {fault.what}") for fault in error.faults]
     names = [task.name for task in tasks]
     for name in sorted({n for n in names if names.count(n) > 1}):
         faults.append(

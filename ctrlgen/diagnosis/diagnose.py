@@ -1,12 +1,17 @@
-"""Recordings -> what was left out: the steps, in order. Each is a module of its own.
+"""The steps of a diagnosis in their order, from a validated recording to the answer.
 
-gate (in `ctrlgen.recordings.validation`), `noise`, nominal refit (`fit`), is there a mismatch (`screen`, `adequacy`), `hypotheses`,
-`screen`, `search` (fit, choose, swap), `adequacy`, verdict (`diagnosis`), `where`, `writeback`.
+1. Channels that read one constant value are taken out (`selection.dead_channels`).
+2. The noise of every channel is estimated (`estimation.noise`), and isolated outliers are marked.
+3. The device as described is refitted within its stated uncertainty (`estimation.fit`).
+4. Hypotheses are listed: every effect at every location, every parameter of the device (`hypotheses`).
+5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
+6. Residual tests and the held-out data give the verdict (`estimation.residual_tests`, `selection.verdict`).
+7. Supporting analyses: where the residual is, what was detectable, what to record next (`evidence`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +27,8 @@ from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
 from ctrlgen.diagnosis.estimation.profile_likelihood import profiles
 from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.evidence.supporting_analyses import evidence
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_physics
+from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
 from ctrlgen.diagnosis.selection.result import Diagnosis, findings, held_out_errors
@@ -31,12 +36,14 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.verdict import verdict
 from ctrlgen.diagnosis.settings import NOISE_UPDATE, SIMULATION
+from ctrlgen.effects import Effect
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
-RESTLESS = "{}: what is left at rest is no noise, it jumps or remembers; something acts there that is not described"
+RESTLESS = "{}: at rest the residual jumps or has memory, so it is not noise; something acts there that the device file does not describe"
+RESTRICTED = "only these effects were considered, beside the device's own parameters: {}"
 
 
 def diagnose_recording(
@@ -45,26 +52,34 @@ def diagnose_recording(
     seed: int = 0,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
+    laws: Sequence[str] | None = None,
 ) -> Diagnosis:
-    """What `device` leaves out that `recording` shows.
+    """The physics that `recording` shows and `device` leaves out.
 
-    Deterministic for a given `seed`. `progress` is called with a sentence before each step; what was fitted before stands
-    in the `journal`. Raises InputError where the recording holds nothing to fit or to hold out.
+    Deterministic for a given `seed`. `progress` is called with a sentence before each step. Fits that the `checkpoint`
+    holds are not repeated. `laws` restricts the hypotheses to the effects of these names and the device's own parameters.
+    Raises InputError where no record has the role fit or hold_out, where no channel varies, or for an unknown effect.
     """
-    # one thread: the matrices are small; no warnings: a trial may leave the numbers, and is then rejected
+    # One thread: the matrices are small. No warnings: a candidate model may diverge, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _diagnose(device, recording, seed, progress or (lambda _: None), checkpoint)
+        return _diagnose(device, recording, seed, progress or (lambda _: None), checkpoint, laws)
 
 
 def _diagnose(
-    device: Device, recording: Recording, seed: int, step: Progress, checkpoint: Checkpoint | None = None
+    device: Device,
+    recording: Recording,
+    seed: int,
+    step: Progress,
+    checkpoint: Checkpoint | None,
+    laws: Sequence[str] | None,
 ) -> Diagnosis:
+    effects = selected_laws(laws)
     recording = _relative_ambient(recording)
     missing = [role for role in ("fit", "hold_out") if not any(r.role == role for r in recording.records)]
     if missing:
         raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
     step("noise")
-    live = without_dead_channels(device, recording)
+    live = without_dead_channels(device, recording, effects)
     recording = live.recording
     noise = estimate_noise(recording, settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time)))
     fitter = Fitter(recording, noise, checkpoint)
@@ -72,52 +87,55 @@ def _diagnose(
         fitter.noise = update_guessed_noise(fitter, fitter.fit(Structure(device)))
     noise = fitter.noise
     described = fitter.fit_described(device)
-    fitter.recording, spikes = mark_outliers(recording, lambda record: fitter.predict(described, record))
-    acting = set(movable(device))
-    sample_times = {r.sample_time for r in recording.records}
-    physics = nominal_physics(device)
-    look_back = min(sample_times) if np.isfinite(min(sample_times)) else None
-    ambient = any(r.ambient is not None for r in recording.records)
-    open_ = [
-        h for h in hypotheses(device, physics, recording.channels, look_back, ambient)
-        if h.effect != PARAMETER or h.path in acting
-    ]  # fmt: skip
-    step(f"refit of the device as described, {len(open_)} hypotheses")
-    found = Searcher(fitter, Screen(fitter, open_, seed), step).run(Structure(device))
-    step("judging")
-    after = run_residual_tests(fitter, found.chosen.fit)
-    seen = (*live.findings, *directly_detected_findings(fitter, found))
-    said = verdict(fitter, found, after, bool(seen))
-    step("evidence")
-    sure = profiles(fitter, found.chosen.fit)
-    beside = evidence(fitter, found, after.passed, seed)
+    fitter.recording, outliers = mark_outliers(recording, lambda record: fitter.predict(described, record))
+    suspected = _hypotheses(device, recording, effects)
+    step(f"refit of the device as described, {len(suspected)} hypotheses")
+    search = Searcher(fitter, Screen(fitter, suspected, seed), step).run(Structure(device))
+    step("residual tests")
+    tests = run_residual_tests(fitter, search.chosen.fit)
+    detected = (*live.findings, *directly_detected_findings(fitter, search, effects))
+    answer = verdict(fitter, search, tests, bool(detected))
+    step("supporting analyses")
+    likelihoods = profiles(fitter, search.chosen.fit)
+    analyses = run_supporting_analyses(fitter, search, tests.passed, seed)
     return Diagnosis(
-        verdict=said,
-        findings=(*findings(found, sure), *seen),
-        held_out=held_out_errors(fitter, found, noise.known),
-        residual_tests=after,
-        residual_location=beside.residual_location,
-        detectability=beside.detectability,
-        next_experiment=beside.next_experiment,
-        search_history=beside.search_history,
+        verdict=answer,
+        findings=(*findings(search, likelihoods), *detected),
+        held_out=held_out_errors(fitter, search, noise.known),
+        residual_tests=tests,
+        residual_location=analyses.residual_location,
+        detectability=analyses.detectability,
+        next_experiment=analyses.next_experiment,
+        search_history=analyses.search_history,
         notes=(
             *recording.notes,
-            *live.said,
+            *live.notes,
             *fitter.noise.notes,
-            *([spikes] if spikes else []),
-            *map(RESTLESS.format, after.restless),
+            *([outliers] if outliers else []),
+            *map(RESTLESS.format, tests.restless),
+            *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
         ),
         device=device,
         recording=fitter.recording,
-        search=found,
+        search=search,
         fitter=fitter,
-        profiles=sure,
-        extra=beside.extra,
+        profiles=likelihoods,
+        extra=analyses.extra,
     )
 
 
+def _hypotheses(device: Device, recording: Recording, effects: Sequence[type[Effect]]) -> list[Hypothesis]:
+    """Hypotheses that the recording can test; of the device's parameters, those that change its readings."""
+    acting = set(movable(device))
+    shortest = min(r.sample_time for r in recording.records)
+    sample_time = shortest if np.isfinite(shortest) else None
+    ambient = any(r.ambient is not None for r in recording.records)
+    found = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
+    return [h for h in found if h.effect != PARAMETER or h.path in acting]
+
+
 def _relative_ambient(recording: Recording) -> Recording:
-    """The surroundings as a rise over their mean in the records to fit."""
+    """The ambient temperature [K] relative to its mean over the records to fit; without one there, it is left out."""
     given = [r.ambient for r in recording.records if r.ambient is not None and r.role == "fit"]
     if not given:
         return replace(recording, records=tuple(replace(r, ambient=None) for r in recording.records))

@@ -1,4 +1,4 @@
-"""The whole diagnosis: files in, a folder with report.html, diagnosis.json and device.next.toml out, whole or not at all."""
+"""The whole diagnosis from files to a folder with report.html, diagnosis.json and device.next.toml, written as a whole or not at all."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ Paths = Path | str | Sequence[Path | str]
 
 @dataclass(frozen=True)
 class Replicates:
-    """How many bootstrap replicates, and where they run (see `ctrlgen.core.parallel`)."""
+    """Number of bootstrap replicates, and where they run (see `ctrlgen.core.parallel`)."""
 
     count: int
     scheduler: str | None = None
     jobs: int | None = None
 
     def of(self, found: Diagnosis, seed: int, step: Progress) -> Bootstrap:
-        """The bootstrap of a diagnosis; `step` is told how far it is."""
+        """The bootstrap of a diagnosis; `step` is called with its progress."""
         step(f"bootstrap, {self.count} replicates")
 
         def told(done: int, of: int) -> None:
@@ -54,10 +54,12 @@ def diagnose(
     seed: int = 0,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
+    laws: Sequence[str] | None = None,
 ) -> Diagnosis:
-    """What `device` leaves out that `recording` shows; each may be an object or its file, a recording also several files.
+    """The physics that `recording` shows and `device` leaves out; each may be an object or its file, a recording also several.
 
-    Deterministic for a given `seed`; `progress` is called with a sentence before each step. Raises InputError.
+    Deterministic for a given `seed`; `progress` is called with a sentence before each step. `laws` restricts the hypotheses
+    to the effects of these names and the device's own parameters. Raises InputError.
     """
     device = device if isinstance(device, Device) else load_device(device)
     if not isinstance(recording, Recording):
@@ -65,7 +67,7 @@ def diagnose(
             progress("reading")
         paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
         recording = load_recordings(paths, build_model(device))
-    return diagnose_recording(device, recording, seed, progress, checkpoint)
+    return diagnose_recording(device, recording, seed, progress, checkpoint, laws)
 
 
 def diagnose_into(
@@ -75,21 +77,22 @@ def diagnose_into(
     seed: int = 0,
     progress: Progress | None = None,
     replicates: Replicates | None = None,
+    laws: Sequence[str] | None = None,
 ) -> Diagnosis:
-    """The same, reported into the folder `out`, which is replaced whole or left alone. Raises InputError.
+    """`diagnose`, reported into the folder `out`, which is replaced as a whole or left unchanged. Raises InputError.
 
-    What is stopped leaves its fits in a file beside `out`, and goes on from there when it is asked the same again.
-    With `replicates` bootstrap.json is written too, and stands in the diagnosis' `extra` as "bootstrap".
+    An interrupted diagnosis leaves its fits in a file beside `out`; the same call continues from them. With `replicates`
+    bootstrap.json is written too, and the diagnosis' `extra` holds it as "bootstrap".
     """
     step = progress or (lambda _: None)
     with whole_folder(Path(out)) as draft:
         model = build_model(load_device(device))
         step("reading")
         recording = load_recordings(list(recordings), model)
-        checkpoint = _checkpoint(Path(out), device, recordings, seed)
+        checkpoint = _checkpoint(Path(out), device, recordings, seed, laws)
         if checkpoint.reused:
-            step(f"going on after {checkpoint.reused} fits")
-        found = diagnose(model.device, recording, seed, step, checkpoint)
+            step(f"continuing after {checkpoint.reused} fits")
+        found = diagnose(model.device, recording, seed, step, checkpoint, laws)
         if replicates is not None:
             found.extra["bootstrap"] = replicates.of(found, seed, step)
             write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
@@ -102,20 +105,23 @@ def diagnose_into(
         record = diagnosis_record(found, provenance)
         write_text(draft / "diagnosis.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
         write_text(draft / "report.html", page(found, provenance))
-    checkpoint.done()  # not before: what is stopped among its replicates need not fit anew
+    checkpoint.done()  # only now: a diagnosis interrupted during its replicates need not repeat its fits
     return found
 
 
 def unfinished(out: Path) -> Path:
-    """Where a diagnosis into `out` keeps its fits until it is done."""
+    """The checkpoint file of a diagnosis into `out`; it exists until the diagnosis is done."""
     out = out.resolve()  # "." has no name of its own
     return out.with_name(f"{out.name}.unfinished")
 
 
-def _checkpoint(out: Path, device: Path | str, recordings: Sequence[Path | str], seed: int) -> Checkpoint:
-    """Of the fits of a diagnosis into `out`."""
+def _checkpoint(
+    out: Path, device: Path | str, recordings: Sequence[Path | str], seed: int, laws: Sequence[str] | None
+) -> Checkpoint:
+    """The checkpoint of a diagnosis into `out`, valid for the same program, files, seed and effects."""
+    files = digests(Path(device), recordings)
     return Checkpoint(
-        unfinished(out), {"version": __version__, "seed": seed, "files": digests(Path(device), recordings)}
+        unfinished(out), {"version": __version__, "seed": seed, "laws": laws and sorted(laws), "files": files}
     )
 
 

@@ -31,6 +31,14 @@ def diagnose(
     ],
     out_folder: OutFolder,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers; the same seed gives the same answer.")] = 0,
+    laws: Annotated[
+        str | None,
+        typer.Option(
+            help="Effects to consider, separated by commas; by default all. The device's own parameters always are.",
+            metavar="NAME,...",
+            show_default=False,
+        ),
+    ] = None,
     bootstrap: BootstrapCount = 0,
     scheduler: SchedulerAddress = None,
     jobs: JobCount = None,
@@ -63,8 +71,9 @@ def diagnose(
         )
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
+        chosen = None if laws is None else [name.strip() for name in laws.split(",") if name.strip()]
         with progress() as advance:
-            found = diagnose_into(device, recording, out_folder, seed, advance, replicates)
+            found = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen)
     except KeyboardInterrupt:
         kept = unfinished(out_folder)
         if kept.exists():

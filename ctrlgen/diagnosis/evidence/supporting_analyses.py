@@ -19,7 +19,7 @@ NEXT_DEVICE = "../device.next.toml"  # from the folder of the next experiment
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class SupportingAnalyses:
     """`where`, `detectable`, `next_experiment`, `history` and `extra` (unknown, files of the next experiment)
     as plain numbers and words, in the reader's units."""
 
@@ -30,7 +30,7 @@ class Evidence:
     extra: dict[str, Any]
 
 
-def evidence(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 0) -> Evidence:
+def run_supporting_analyses(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 0) -> SupportingAnalyses:
     """Everything beside the findings. `explained`: the chosen structure leaves nothing over."""
     recording = fitter.recording
     nominal, chosen = search.nominal.fit, search.chosen.fit
@@ -53,7 +53,7 @@ def evidence(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 
     experiment = next_experiment(fitter, search, explained, seed)
     if experiment is not None:
         extra["files"] = files(fitter, chosen, experiment, NEXT_DEVICE)
-    return Evidence(
+    return SupportingAnalyses(
         residual_location={"before": place(nominal, before), "after": left},
         detectability=plain(detectability(chosen, search.final_screen, chosen.n)),
         next_experiment=_next(experiment),

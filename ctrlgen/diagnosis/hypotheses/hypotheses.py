@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
+from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity, from_si
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.base import Section
@@ -124,14 +125,29 @@ class Hypothesis:
         return low, high
 
 
+def selected_laws(names: Sequence[str] | None = None) -> tuple[type[Effect], ...]:
+    """The effects of these names, all for None, in alphabetical order. Raises InputError for a name that is no effect's."""
+    unknown = sorted(set(names or ()) - set(Effect.library))
+    if unknown:
+        known = ", ".join(sorted(Effect.library))
+        raise InputError("laws", [Fault(name, f"is not a known effect; known are: {known}") for name in unknown])
+    return tuple(law for name, law in sorted(Effect.library.items()) if names is None or name in names)
+
+
 def hypotheses(
-    device: Device, physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+    device: Device,
+    physics: DevicePhysics,
+    observed: tuple[str, ...],
+    sample_time: float | None,
+    ambient: bool,
+    laws: Sequence[type[Effect]] | None = None,
 ) -> list[Hypothesis]:
-    """Every effect that can act on `device` and reach the channels `observed`, then every number that may be off.
+    """Every effect of `laws` (None: all) that can act on `device` and reach the channels `observed`, then every number that may
+    be off.
 
     `sample_time` [s] is None for settled poses; `ambient` says whether the recording has the temperature of the surroundings.
     """
-    laws = (law for _, law in sorted(Effect.library.items()))  # in an order that does not depend on the files
+    laws = selected_laws() if laws is None else laws
     found = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
     return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
 

@@ -1,8 +1,8 @@
-"""Channels that read one number throughout: no part of any fit, and a finding where the described device moves them."""
+"""Dead channels, which read one constant value: left out of every fit, and a finding where the device should move them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from ctrlgen.core.units import difference, show
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
-from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
+from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics, selected_laws
 from ctrlgen.diagnosis.selection.direct_detection import unfitted_finding
 from ctrlgen.diagnosis.selection.result import Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
@@ -23,15 +23,18 @@ from ctrlgen.recordings.recording import Recording
 
 @dataclass(frozen=True, eq=False)
 class LiveChannels:
-    """A recording without the channels that say nothing, what was found of these, and a sentence on each."""
+    """A recording without its dead channels, the findings on those, and a note on each."""
 
     recording: Recording
     findings: tuple[Finding, ...] = ()
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
-def without_dead_channels(device: Device, recording: Recording) -> LiveChannels:
-    """The channels that read more than one number. Raises InputError where there is none."""
+def without_dead_channels(
+    device: Device, recording: Recording, laws: Sequence[type[Effect]] | None = None
+) -> LiveChannels:
+    """The recording without channels that read one constant value; a finding by one of the `laws` (None: all) for each of
+    them that should vary. Raises InputError where every channel is constant."""
     moving = [r for r in recording.records if r.role != "rest"]
     values = [np.concatenate([r.observed[r.valid[:, i], i] for r in moving]) for i in range(len(recording.channels))]
     dead = {i: float(y[0]) for i, y in enumerate(values) if len(y) and np.ptp(y) == 0}
@@ -41,33 +44,35 @@ def without_dead_channels(device: Device, recording: Recording) -> LiveChannels:
         faults = [
             Fault(
                 f"columns.{recording.channels[i]!r}",
-                f"reads {show(level, recording.units[i])} in all records: dead, stuck or of the wrong column; there is "
-                "nothing to compare with the device",
+                f"reads {show(level, recording.units[i])} in all records: the sensor is dead or stuck, or the "
+                "column is wrong; nothing can be compared with the device",
             )
             for i, level in dead.items()
         ]
         raise InputError(recording.title, faults)
     structure = Structure(device)
     simulators = structure.simulators(recording, {})
-    foreseen = [simulators[r.sample_time, r.linear].simulate(r, structure.start) for r in moving]
+    predicted = [simulators[r.sample_time, r.linear].simulate(r, structure.start) for r in moving]
     places = {f"reading.{c.name}": c for c in channels(nominal_physics(device), Place.SENSOR)}
-    findings, said = [], []
+    findings, notes = [], []
     for i, level in dead.items():
         name, unit = recording.channels[i], recording.units[i]
-        way = float(np.ptp(np.concatenate([y[:, i] for y in foreseen])))
-        moves = f"the device as described moves it by {way * difference(1.0, unit):.3g} {unit}"
-        said.append(f"{name}: reads {show(level, unit)} throughout, {moves}; it is left out of every fit.")
+        travel = float(np.ptp(np.concatenate([y[:, i] for y in predicted])))
+        moves = f"the device as described moves it by {travel * difference(1.0, unit):.3g} {unit}"
+        notes.append(f"{name}: reads {show(level, unit)} in every sample, {moves}; it is left out of every fit.")
         channel = places.get(name)
-        if channel is not None and way > DIRECT_DETECTION.dead_motion * channel.scale:
-            findings += [unfitted_finding(law, channel, read) for law, read in _laws(channel, values[i])]
+        if channel is not None and travel > DIRECT_DETECTION.dead_motion * channel.scale:
+            findings += [unfitted_finding(law, channel, read) for law, read in _detected(channel, values[i], laws)]
     return LiveChannels(
-        _only(recording, [i for i in range(len(recording.channels)) if i not in dead]), tuple(findings), tuple(said)
+        _only(recording, [i for i in range(len(recording.channels)) if i not in dead]), tuple(findings), tuple(notes)
     )
 
 
-def _laws(channel: Channel, values: np.ndarray) -> Iterator[tuple[type[Effect], dict[str, float]]]:
-    """What reads one number throughout, by the laws of a sensor that read themselves off."""
-    for law in Effect.library.values():
+def _detected(
+    channel: Channel, values: np.ndarray, laws: Sequence[type[Effect]] | None
+) -> Iterator[tuple[type[Effect], dict[str, float]]]:
+    """Sensor laws that constant readings show, with their parameters [SI]."""
+    for law in selected_laws() if laws is None else laws:
         if law.place is Place.SENSOR and law.applies_to(channel) and (seen := detect_directly(law, values)) is not None:
             yield law, seen[0]
 

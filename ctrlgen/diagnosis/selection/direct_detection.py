@@ -1,16 +1,18 @@
-"""What raw readings show without any model: a finding beside those of the search.
+"""Effects that raw readings show without any model, such as quantisation: findings beside those of the search.
 
-It is named where it does more than a share of the noise to a reading; below, it is part of the noise.
+An effect is named where it changes the readings by more than a share of the noise; below that it counts as noise.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
-from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_physics
+from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_physics, selected_laws
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.result import Estimate, Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
@@ -18,8 +20,11 @@ from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.model.effect_terms import channels
 
 
-def directly_detected_findings(fitter: Fitter, search: SearchResult) -> tuple[Finding, ...]:
-    """Findings of every sensor's law that reads itself off the recorded values, where the device and the search have none."""
+def directly_detected_findings(
+    fitter: Fitter, search: SearchResult, laws: Sequence[type[Effect]] | None = None
+) -> tuple[Finding, ...]:
+    """Findings of the sensor laws, of `laws` (None: all), that the readings of a channel show directly, where neither the
+    device file nor the search has that law there; none for settled poses."""
     recording, structure = fitter.recording, search.chosen.fit.structure
     if recording.kind != "series":
         return ()
@@ -31,7 +36,7 @@ def directly_detected_findings(fitter: Fitter, search: SearchResult) -> tuple[Fi
             continue
         i = recording.channels.index(name)
         values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
-        for law in Effect.library.values():
+        for law in selected_laws() if laws is None else laws:
             seen = detect_directly(law, values) if law.place is Place.SENSOR and law.applies_to(channel) else None
             if (
                 seen is None
@@ -44,7 +49,7 @@ def directly_detected_findings(fitter: Fitter, search: SearchResult) -> tuple[Fi
 
 
 def unfitted_finding(law: type[Effect], channel: Channel, values: dict[str, float]) -> Finding:
-    """A sensor's law with parameters [SI] that were not fitted."""
+    """The finding of a sensor law whose parameters [SI] were detected, not fitted: its intervals have no width."""
     parameters = {}
     for p in law.params:
         unit = channel.unit_of(p)
