@@ -92,11 +92,11 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
 def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, effects, text, size, steps, linear, worth):
     monkeypatch.setattr(integrators, "substeps", lambda *_: steps)
     monkeypatch.setattr(
-        integrators, "SOLVING", 14
+        integrators, "VELOCITY_NEWTON_STEPS", 14
     )  # to the end: where N is solved for, slopes of steps on the way are others
     monkeypatch.setattr(sample_equations, "SIMULATION", replace(SIMULATION, parametric_operations=worth))
     r, p = simulator(text, effects, linear, tmp_path)
-    assert isinstance(r._equations.steps, integrators.ImplicitRadau) == ("coulomb" in effects)
+    assert isinstance(r._equations.integrator, integrators.ImplicitRadau) == ("coulomb" in effects)
     assert r._equations.model.held.numel() == ("loop" in text)
     moved = record(size)
     y, Y = r.sensitivities(moved, p)

@@ -16,7 +16,7 @@ from scipy.linalg import expm
 import ctrlgen
 from ctrlgen import build_model, load_device
 from ctrlgen.model.discretisation import balanced, one_step_map
-from ctrlgen.numerics.phi_functions import driven, driven_lags, phis
+from ctrlgen.numerics.phi_functions import increment, lag_increment, phi_matrices
 
 H, TAU = 2e-3, 5e-3
 ROUNDING = 1e-12  # of the largest value: what double precision leaves after some hundred operations
@@ -314,18 +314,18 @@ NUMBERS = [-20.0, -3.0, -1e-3, -1.000001, -0.999999, -0.2, -1e-7, 0.0, 1e-5, 0.7
 def test_the_phi_functions_are_their_series(a):
     """Of a number, of a matrix with that eigenvalue, and as a model's steps apply them."""
     wanted = [series(a, k) for k in range(4)]
-    assert [float(value[0, 0]) for value in phis(np.array([[a]]), 3)] == pytest.approx(wanted, rel=1e-12)
+    assert [float(value[0, 0]) for value in phi_matrices(np.array([[a]]), 3)] == pytest.approx(wanted, rel=1e-12)
     T = np.array([[1.0, 2.0], [0.5, -1.0]])
     M = T @ np.diag([a, -0.4]) @ np.linalg.inv(T)
     exact = [T @ np.diag([value, series(-0.4, k)]) @ np.linalg.inv(T) for k, value in enumerate(wanted)]
     size = max(1.0, abs(a))  # a matrix as large as this loses so many digits
-    for found, value in zip(phis(M, 3), exact, strict=True):
+    for found, value in zip(phi_matrices(M, 3), exact, strict=True):
         assert np.abs(found - value).max() < 1e-13 * size * max(1.0, np.abs(value).max())
     h, v = 0.1, np.eye(2)[0]
     halvings = max(0, int(np.ceil(np.log2(np.abs(M).sum(axis=1).max()))))
     for k in range(3):
         values = [ca.SX(v * (j == k)) for j in range(3)]
-        lags = ca.DM(driven_lags(ca.SX([a / h, -0.4 / h]), values, h)).full().ravel()
+        lags = ca.DM(lag_increment(ca.SX([a / h, -0.4 / h]), values, h)).full().ravel()
         assert lags[0] == pytest.approx(h * wanted[k + 1] * v[0], rel=1e-13)
-        coupled = ca.DM(driven(ca.SX(M / h), values, h, halvings)).full().ravel()
+        coupled = ca.DM(increment(ca.SX(M / h), values, h, halvings)).full().ravel()
         assert np.abs(coupled - h * exact[k + 1] @ v).max() < 1e-13 * size * h * max(1.0, np.abs(exact[k + 1]).max())

@@ -22,7 +22,7 @@ DRIVES = {
 }  # fmt: skip
 
 
-def simulated(effect: str, drive: np.ndarray, folder) -> tuple[np.ndarray, integrators.Steps]:
+def simulated(effect: str, drive: np.ndarray, folder) -> tuple[np.ndarray, integrators.ExponentialIntegrator]:
     """Displacement (N + 1,) [m] by ctrlgen, and the steps it took."""
     (folder / "device.toml").write_text(f"{AXIS}\n[[effect]]\nat = 'axis'\n{effect}")
     model = build_model(load_device(folder / "device.toml"))
@@ -145,6 +145,6 @@ def test_a_law_that_ends_within_the_typical_travel_is_simulated_inside():
         restoring_force=lambda d, p: p.spring * (1 - ca.sqrt(1 - d.way / 0.8)),
     )  # fmt: skip
     model = build_model(device)
-    assert not np.isfinite(integrators.home_slope(model, away=1.0)).all()
+    assert not np.isfinite(integrators.slope_at_rest(model, displacement=1.0)).all()
     found = simulate(model, np.full((200, 1), 0.5), H).signals["displacement"]
     assert np.isfinite(found).all() and 0 < found.max() < 0.1

@@ -25,7 +25,7 @@ from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.model.assembly import build_model
-from ctrlgen.model.discretisation import balanced, one_step_map
+from ctrlgen.model.discretisation import balanced, held_step, one_step_map
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Scenario
 
@@ -58,7 +58,7 @@ class Plant:
         if self.inertial:
             after = one_step_map(m, self.sample_time)
             return self._kernel("advance", ca.vertcat(after.x, after.z))
-        return self._kernel("advance", m.step(self.sample_time))
+        return self._kernel("advance", held_step(m, self.sample_time))
 
     @cached_property
     def balance(self) -> ca.Function:
@@ -72,8 +72,7 @@ class Plant:
         x = m.x[:]
         rows = [i for i in range(x.numel()) if i not in m.stepped and i not in m.clocks and not m.rates[i].is_zero()]
         rates, own = m.rates[rows], m.x[rows]
-        slope = ca.jacobian(rates, own)
-        x[rows] = own - (rates / ca.diag(slope) if slope.sparsity().is_diag() else ca.solve(slope, rates))
+        x[rows] = own - ca.solve(ca.jacobian(rates, own), rates)
         for i, value in m.stepped.items():
             x[i] = value
         return self._kernel("rest", x)

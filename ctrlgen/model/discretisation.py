@@ -1,24 +1,33 @@
-"""One sample of a model, symbolic: from x, z under the drive to x, z at the next sample.
+"""One sample of a model, symbolic: from x, z and the drive to x, z at the next sample.
 
-A stage in balance: x by its exact lag, under a drive held (zero-order hold) or linear between samples (first-order hold), z by
-Newton's method on 0 = g(x, z, u). A stage with inertia: exponential
-steps, exact for the nominal linear part.
+A stage in balance: x by the exact step of its lags, under a drive held (zero-order hold) or linear between samples
+(first-order hold), then z by Newton's method on 0 = g(x, z, u). A stage with inertia: the steps of
+`ctrlgen.model.integrators`, exact for the nominal linear part.
 """
 
 from __future__ import annotations
 
 from itertools import pairwise
+from math import ceil, log2
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 import scipy
 
-from ctrlgen.model.integrators import integrator_of
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.model.integrators import NEAR_HOME, integrator_of
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.newton import newton_root
+from ctrlgen.numerics.phi_functions import held_gain, increment, lag_increment
 
-CHAINED = 3  # memories on memories on heaters whose power depends on their temperature
-SETTLED = 14.0  # time constants: e^-14 is a millionth
+NEWTON_STEPS = 4  # from the displacement one sample before, each step doubles the digits
+SETTLING_SWEEPS = 3  # memories that follow memories that follow heaters whose power depends on their temperature
+SETTLING_TIME_CONSTANTS = 14.0  # e^-14 is a millionth
+# Sample time times the fastest rate of coupled states, beyond which the sample time is refused:
+LONGEST_HELD_STEP = 1024.0  # held drive; ten doublings of the phi functions
+LONGEST_RAMP_STEP = 2.0**20  # linear drive: 20 doublings leave 1e-10 of rounding
+SLOWEST_RATE = 1e-6  # [1/s] a slower state is taken to stand: an integrator, not a lag
 
 
 class Sample(NamedTuple):
@@ -29,7 +38,7 @@ class Sample(NamedTuple):
     z: ca.SX
 
 
-def one_step_map(model: Model, sample_time: float, linear: bool = False, newton_steps: int = 4) -> Sample:
+def one_step_map(model: Model, sample_time: float, linear: bool = False, newton_steps: int = NEWTON_STEPS) -> Sample:
     """x and z one `sample_time` [s] on, with the drive held, or `linear` between samples.
 
     An infinite sample time gives the settled pose (clocks then count poses). Raises InputError where the sample
@@ -42,53 +51,105 @@ def one_step_map(model: Model, sample_time: float, linear: bool = False, newton_
     if not np.isfinite(sample_time):
         x, z = _settle(model, u_next, newton_steps)
         return Sample(u_next, x, z)
-    x = _ramped(model, sample_time, u_next, newton_steps) if linear else model.step(sample_time)
+    x = _ramp_step(model, sample_time, u_next, newton_steps) if linear else held_step(model, sample_time)
     return Sample(u_next, x, balanced(model, x, u_next, newton_steps))
 
 
-def _ramped(model: Model, sample_time: float, u_next: ca.SX, newton_steps: int) -> ca.SX:
-    """x after a sample in which the drive goes linearly to `u_next`, and the displacement that balances it goes along."""
-    A, rates = ca.jacobian(model.rates, model.x), [model.rates]
-    carried = ca.depends_on(model.rates, model.z)
-    bending = ca.vertcat(model.rates, model.balance) if carried else model.rates
-    bent = any(ca.which_depends(bending, ca.vertcat(model.u, model.z), 2, True))
-    if carried:
-        slope = ca.solve(ca.jacobian(model.balance, model.z), ca.jacobian(model.balance, model.x))
-        A -= ca.mtimes(ca.jacobian(model.rates, model.z), slope)
-    for share in (0.5, 1.0) if bent else (1.0,):
+def held_step(model: Model, sample_time: float, rates: ca.SX | None = None) -> ca.SX:
+    """x (n_x,) after one `sample_time` h [s] with u and z held: x + h phi_1(h A) f(x), A = df/dx.
+
+    `rates` f are those of the model unless given. Exact where f is linear in x. Raises InputError where h is more than
+    `LONGEST_HELD_STEP` times the fastest rate of states that act on one another.
+    """
+    rates, h = model.rates if rates is None else rates, sample_time
+    A = ca.jacobian(rates, model.x)
+    if _uncoupled(A):
+        gain = ca.vertcat(*(held_gain(rate, h) for rate in ca.vertsplit(ca.diag(A))))
+        return _with_sampled_states(model, model.x + gain * rates)
+    return _with_sampled_states(model, model.x + increment(A, [rates], h, _doublings(model, A, h, LONGEST_HELD_STEP)))
+
+
+def _ramp_step(model: Model, sample_time: float, u_next: ca.SX, newton_steps: int) -> ca.SX:
+    """x after a sample in which the drive goes linearly from u to `u_next` and the balanced displacement with it.
+
+    x + h (phi_1(hA) f_0 + phi_2(hA) f' + phi_3(hA) f''), f' and f'' those of the parabola through the rates at the present x
+    under the drive at the beginning, the middle and the end of the sample. Exact for rates linear in x and quadratic in u.
+    Where the rates depend on the displacement, A includes what x does through it: df/dx - df/dz (dg/dz)^-1 dg/dx.
+    """
+    A, h = ca.jacobian(model.rates, model.x), sample_time
+    through_z = ca.depends_on(model.rates, model.z)
+    if through_z:
+        z_by_x = ca.solve(ca.jacobian(model.balance, model.z), ca.jacobian(model.balance, model.x))
+        A -= ca.mtimes(ca.jacobian(model.rates, model.z), z_by_x)
+
+    def rates_at(share: float) -> ca.SX:
         u = model.u + share * (u_next - model.u)
-        z = balanced(model, model.x, u, newton_steps) if carried else model.z
-        here = ca.vertcat(model.z, model.u), ca.vertcat(z, u)
-        rates.append(ca.substitute(model.rates, *here))
-    return model.ramp(sample_time, A, rates)
+        z = balanced(model, model.x, u, newton_steps) if through_z else model.z
+        return ca.substitute(model.rates, ca.vertcat(model.z, model.u), ca.vertcat(z, u))
+
+    followed = ca.vertcat(model.rates, model.balance) if through_z else model.rates
+    first = model.rates
+    if any(ca.which_depends(followed, ca.vertcat(model.u, model.z), 2, True)):  # not linear in the drive
+        middle, last = rates_at(0.5), rates_at(1.0)
+        values = [first, 4 * middle - 3 * first - last, 4 * (first - 2 * middle + last)]
+    else:
+        values = [first, rates_at(1.0) - first]
+    if _uncoupled(A):
+        after = model.x + lag_increment(ca.diag(A), values, h)
+    else:
+        after = model.x + increment(A, values, h, _doublings(model, A, h, LONGEST_RAMP_STEP))
+    return _with_sampled_states(model, after)
 
 
-def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = 4) -> ca.SX:
-    """The displacement that balances the forces at `x`, a function of z or not, and `u`, by Newton's method from model.z; one
-    step if linear."""
-    g = ca.substitute(
+def _with_sampled_states(model: Model, x: ca.SX) -> ca.SX:
+    """`x` with the states that change once a sample at their new values."""
+    for i, value in model.stepped.items():
+        x[i] = value
+    return x
+
+
+def _uncoupled(A: ca.SX) -> bool:
+    """Whether no state acts on another."""
+    return (A.sparsity() + ca.Sparsity.diag(A.size1())).is_diag()
+
+
+def _doublings(model: Model, A: ca.SX, h: float, longest: float) -> int:
+    """How often the sample time `h` [s] must be halved until |h A| is at most 1, at rest; refuses |h A| above `longest`."""
+    at_rest = ca.Function("A", [model.x, model.z, model.u, model.p], [A])(model.rest, 0, 0, model.p_nominal)
+    norm = float(ca.norm_inf(at_rest * (model.x_scale[None, :] / model.x_scale[:, None])))
+    if h * norm > longest:
+        what = f"{h:g} s is too long for the fastest coupled state; use {longest / norm:.2g} s or less"
+        raise InputError(model.name, [Fault("sample time", what)])
+    return max(0, ceil(log2(h * norm))) if norm else 0
+
+
+def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = NEWTON_STEPS) -> ca.SX:
+    """The displacement (n_axes,) that balances the forces at `x` and `u`, by Newton's method from model.z.
+
+    `x` may be an expression in model.z. One step where the balance is linear in z.
+    """
+    balance = ca.substitute(  # both at once: x may hold the drive of the sample before
         model.balance, ca.vertcat(model.x, model.u), ca.vertcat(x, u)
-    )  # at once: x depends on the drive before
-    slope = ca.jacobian(g, model.z)
-    diagonal = slope.sparsity().is_diag()
-    z = model.z
-    for _ in range(newton_steps if ca.depends_on(slope, model.z) else 1):
-        residual, S = (ca.substitute(e, model.z, z) for e in (g, slope))
-        z = z - (residual / ca.diag(S) if diagonal else ca.solve(S, residual))
-    return z
+    )
+    linear = not ca.depends_on(ca.jacobian(balance, model.z), model.z)
+    return newton_root(balance, model.z, model.z, 1 if linear else newton_steps)
 
 
 def _settle(model: Model, u: ca.SX, newton_steps: int) -> tuple[ca.SX, ca.SX]:
-    """Actuators and memories at rest under `u`, as the displacement has it, and the displacement that balances with them."""
+    """x at rest under `u`, and the displacement that balances with it.
+
+    Newton's method by blocks: only states that act on one another are solved together, in `SETTLING_SWEEPS` sweeps, since a
+    memory such as a play operator has no rate of its own to solve for.
+    """
     rates = ca.substitute(model.rates, model.u, u)
     A = ca.jacobian(rates, model.x)
-    x, groups = model.x, _together(A)
-    for _ in range(CHAINED):
+    x, blocks = model.x, _coupled_blocks(A)
+    for _ in range(SETTLING_SWEEPS):
         slope, rate = (ca.substitute(e, model.x, x) for e in (A, rates))
-        moved = ca.SX(x)
-        for group in groups:
-            moved[group] = x[group] - ca.solve(slope[group, group], rate[group])
-        x = moved
+        corrected = ca.SX(x)
+        for block in blocks:
+            corrected[block] = x[block] - ca.solve(slope[block, block], rate[block])
+        x = corrected
     z = balanced(model, x, u, newton_steps)
     x = ca.substitute(x, model.z, z)
     for i in model.clocks:
@@ -98,44 +159,40 @@ def _settle(model: Model, u: ca.SX, newton_steps: int) -> tuple[ca.SX, ca.SX]:
     return x, z
 
 
-def _together(A: ca.SX) -> list[list[int]]:
-    """The states that come to rest, those together that act on one another (the two of a second-order filter)."""
+def _coupled_blocks(A: ca.SX) -> list[list[int]]:
+    """Places of the states that come to rest; those that act on one another (the two of a second-order filter) together."""
     sparsity = A.sparsity()
-    acts = np.zeros(A.shape, dtype=bool)
-    acts[sparsity.row(), sparsity.get_col()] = True
-    count, label = scipy.sparse.csgraph.connected_components(acts, connection="strong")
-    groups = [np.flatnonzero(label == k).tolist() for k in range(count)]
-    return [g for g in groups if len(g) > 1 or acts[g[0], g[0]]]
+    acts_on = np.zeros(A.shape, dtype=bool)
+    acts_on[sparsity.row(), sparsity.get_col()] = True
+    count, label = scipy.sparse.csgraph.connected_components(acts_on, connection="strong")
+    blocks = [np.flatnonzero(label == k).tolist() for k in range(count)]
+    return [block for block in blocks if len(block) > 1 or acts_on[block[0], block[0]]]
 
 
 def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) -> tuple[ca.SX, ca.SX]:
-    """x and z one sample on, with inertia."""
+    """x and z one sample on, with inertia, by the steps of the model's integrator."""
     state = ca.vertcat(model.x, model.z)
-    steps = integrator_of(model, sample_time)
-    own = [model.held, model.p, model.ambient_symbol]
-    rest = ca.Function("N", [state, model.u, *own], [steps.rest(model)])
-    y, drives = state, steps.drives(model.u, u_next, linear)
-    for u, u_end in pairwise(drives):
-        y = steps.step(lambda y, u: rest(y, u, model.held_value, *own[1:]), y, u, u_end)
-    x, z = y[: model.x.numel()], y[model.x.numel() :]
-    for i, value in model.stepped.items():
-        x[i] = value
-    return x, z
+    integrator = integrator_of(model, sample_time)
+    p, ambient = model.p, model.ambient_symbol
+    nonlinear = ca.Function("N", [state, model.u, model.held, p, ambient], [integrator.nonlinear_rates(model)])
+
+    def N(y: ca.SX, u: ca.SX) -> ca.SX:
+        return nonlinear(y, u, model.held_value, p, ambient)
+
+    y = state
+    for u, u_end in pairwise(integrator.drives(model.u, u_next, linear)):
+        y = integrator.step(N, y, u, u_end)
+    return _with_sampled_states(model, y[: model.x.numel()]), y[model.x.numel() :]
 
 
 def settling_time(model: Model) -> float:
-    """How long [s] the actuators and the stage itself go on after a change of drive, to a millionth of it."""
+    """How long [s] actuators and stage keep moving after a change of drive, to a millionth of the change; by the slopes near
+    rest. 0 where nothing lags."""
+    rates, state = model.rates, model.x
     if model.inertial:
-        state = ca.vertcat(model.x, model.z)
-        A = ca.Function(
-            "A", [state, model.u, model.p, model.ambient_symbol], [ca.jacobian(ca.vertcat(model.rates, model.v), state)]
-        )  # fmt: skip
-        here = np.concatenate([model.rest, 1e-3 * model.z_scale])
-        slow = np.abs(np.linalg.eigvals(A(here, 0, model.p_nominal, 0).full()).real)
-    else:
-        A = ca.Function(
-            "A", [model.x, model.z, model.u, model.p, model.ambient_symbol], [ca.jacobian(model.rates, model.x)]
-        )
-        slow = np.abs(np.diag(A(model.rest, 1e-3 * model.z_scale, 0, model.p_nominal, 0).full())[: model.n_states])
-    slow = slow[slow > 1e-6]
-    return float(SETTLED / slow.min()) if slow.size else 0.0
+        rates, state = ca.vertcat(model.rates, model.v), ca.vertcat(model.x, model.z)
+    slope = ca.Function("A", [model.x, model.z, model.u, model.p, model.ambient_symbol], [ca.jacobian(rates, state)])
+    A = slope(model.rest, NEAR_HOME * model.z_scale, 0, model.p_nominal, 0).full()
+    decay = np.abs(np.linalg.eigvals(A).real) if model.inertial else np.abs(np.diag(A)[: model.n_states])
+    decay = decay[decay > SLOWEST_RATE]
+    return float(SETTLING_TIME_CONSTANTS / decay.min()) if decay.size else 0.0

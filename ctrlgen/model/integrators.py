@@ -1,7 +1,8 @@
-"""Steps of y' = A y + N(y, u), the motion of a stage with inertia: e^(A h) exactly, with A the nominal slope, N approximately.
+"""Exponential integrators of y' = A y + N(y, u), the motion of a stage with inertia, y = (x, z).
 
-Explicit steps of fourth order, except with dry friction: its slope where the contact sticks is thousands of times that where
-it slides, so that explicit steps chatter, and these are implicit in the velocities.
+A is the slope of the nominal rates at rest and its part is exact, e^(A h); N is what is left. Without dry friction N is
+integrated by explicit steps of fourth order. With it the slope of a contact that sticks is thousands of times that of one
+that slides, explicit steps would chatter, and the steps are implicit in the velocities.
 """
 
 from __future__ import annotations
@@ -12,79 +13,87 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.model.model import Model
-from ctrlgen.numerics.phi_functions import phis
+from ctrlgen.numerics.phi_functions import phi_matrices
 
-SUBSTEP = 0.8  # step times the fastest nominal eigenvalue; what is not linear is then right to 1e-3 of itself
-FASTEST = 5.0  # eigenvalue times sample time beyond which a lag is over within a sample, and exact
-STIFFENED = 1.2  # times faster where the stage is far out than at home: it touches something
-CONTACT = 0.25  # step times the fastest eigenvalue there: what an impact does is then right to 1 or 2 % of itself
-REVERSING = 0.2  # the same where a reversal takes no time: what friction does is then right to 2 % of itself
-REVERSALS = 4  # steps a sample at least, for the same reason
-MOST_SUBSTEPS = 16
-SOLVING = 2  # iterations for a velocity: from standstill they come from one side and quadratically
-Rest = Callable[[ca.SX, ca.SX], ca.SX]  # y, u -> N, its rows `acting`
+# Step length: time times the fastest rate (magnitude of an eigenvalue of A) per step, and steps a sample
+EXPLICIT_STEP = 0.8  # nonlinear forces are then right to 1e-3 of themselves
+IMPLICIT_STEP = 0.2  # friction whose reversal takes no time is then right to 2 % of itself
+CONTACT_STEP = 0.25  # at the rate of a stop or a stiffening flexure: impacts are then right to 1 or 2 % of themselves
+LAG_OVER = 5.0  # rates above this per sample do not shorten the step: such a lag is over within a sample, and exact
+STIFFER_AWAY = 1.2  # a stage this much faster at the ends of its travel than at home touches something there
+LEAST_IMPLICIT_STEPS = 4  # a sample, so that the moment of a reversal is followed
+MOST_STEPS = 16  # a sample
+VELOCITY_NEWTON_STEPS = 2  # from standstill they converge quadratically, from one side
+NEAR_HOME = (
+    1e-3  # typical displacements off home where slopes are taken: a law with a corner there is on one side of it
+)
+VANISHED = 1e-300  # matrix entries below it are structural zeros that underflowed
+NonlinearRates = Callable[[ca.SX, ca.SX], ca.SX]  # (y, u) -> the rows `acting` of N
 
 
 def integrator_of(model: Model, sample_time: float) -> ExponentialRungeKutta | ImplicitRadau:
-    """The steps that suit the model."""
-    return ImplicitRadau(model, sample_time) if model.set_valued_axes else ExponentialRungeKutta(model, sample_time)
+    """The integrator that suits the model: implicit where dry friction acts on an axis."""
+    kind = ImplicitRadau if model.set_valued_axes else ExponentialRungeKutta
+    return kind(model, sample_time)
 
 
-class Steps:
-    """What both kinds have: `count` a sample, of h [s]; A; the rows `acting` of y that N alone has; E = e^(A h)."""
+class ExponentialIntegrator:
+    """What both integrators have: `count` steps a sample, of h [s] each; A; E = e^(A h); `acting`, the rows of N that are not
+    zero."""
 
-    LEAST = 1
+    LEAST_STEPS = 1
 
     def __init__(self, model: Model, sample_time: float, A: np.ndarray, longest: float) -> None:
-        self.count = max(substeps(A, sample_time, longest), self.LEAST, contact_steps(model, sample_time))
+        self.count = max(substeps(A, sample_time, longest), self.LEAST_STEPS, contact_steps(model, sample_time))
         self.h = sample_time / self.count
         self.A = _sparse(A)
-        rest = self._rest(model)
-        self.acting = [i for i in range(len(A)) if not rest[i].is_zero()]
-        self.phis = phis(A * self.h, 3)
-        self.E = _sparse(self.phis[0])
+        N = self._all_nonlinear_rates(model)
+        self.acting = [i for i in range(len(A)) if not N[i].is_zero()]
+        self.phi = phi_matrices(A * self.h, 3)
+        self.E = _sparse(self.phi[0])
 
-    def rest(self, model: Model) -> ca.SX:
-        """N, its rows `acting`."""
-        return self._rest(model)[self.acting]
+    def nonlinear_rates(self, model: Model) -> ca.SX:
+        """N, its rows `acting`, in the symbols of the model."""
+        return self._all_nonlinear_rates(model)[self.acting]
 
-    def _rest(self, model: Model) -> ca.SX:
+    def _all_nonlinear_rates(self, model: Model) -> ca.SX:
         return ca.vertcat(model.sampled_rates, model.v) - self.A @ ca.vertcat(model.x, model.z)
 
-    def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
+    def points(self, N: NonlinearRates, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and each (y, u) where N was evaluated."""
         raise NotImplementedError
 
-    def step(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
-        """y one step on, the drive going from `u` to `u_end`."""
+    def step(self, N: NonlinearRates, y: ca.SX, u: ca.SX, u_end: ca.SX) -> ca.SX:
+        """y one step on, the drive going linearly from `u` to `u_end`."""
         return self.points(N, y, u, u_end)[0]
 
     def drives(self, u: ca.SX, u_next: ca.SX, linear: bool) -> list[ca.SX]:
-        """The drive at the beginning of each step of a sample, and at its end."""
+        """The drive at the beginning of each step of a sample, and at the sample's end."""
         return [u + k / self.count * (u_next - u) if linear else u for k in range(self.count + 1)]
 
-    def _acting(self, M: np.ndarray) -> ca.DM:
+    def _acting_columns(self, M: np.ndarray) -> ca.DM:
         return _sparse(M[:, self.acting])
 
 
-class ExponentialRungeKutta(Steps):
-    """Explicit steps, N to fourth order.
+class ExponentialRungeKutta(ExponentialIntegrator):
+    """ETD-RK4: explicit steps, N to fourth order.
 
-    S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430, eqs. (26)-(29): a step is from y to E y + sum_i W_i N_i,
-    through the points half y + Q N_1, half y + Q N_2 and E y + R N_1 + 2 Q N_3.
+    A step is from y to E y + sum_i W_i N_i, N_i the values at y, a = half y + Q N_1, b = half y + Q N_2 and
+    c = E y + R N_1 + 2 Q N_3; half = e^(A h/2), Q = h/2 phi_1(A h/2), R = half Q - Q.
+    Source: S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430, eqs. (26)-(29).
     """
 
     def __init__(self, model: Model, sample_time: float) -> None:
-        super().__init__(model, sample_time, home_slope(model), SUBSTEP)
-        h, whole = self.h, self.phis
-        half, phi, *_ = phis(self.A.full() * h / 2, 3)
-        Q = h / 2 * phi
-        self.half, self.Q, self.R = _sparse(half), self._acting(Q), self._acting(half @ Q - Q)
-        middle = h * (2 * whole[2] - 4 * whole[3])
-        ends = h * (whole[1] - 3 * whole[2] + 4 * whole[3]), h * (4 * whole[3] - whole[2])
-        self.W = [self._acting(M) for M in (ends[0], middle, middle, ends[1])]
+        super().__init__(model, sample_time, slope_at_rest(model), EXPLICIT_STEP)
+        h, phi = self.h, self.phi
+        half, half_phi_1, *_ = phi_matrices(self.A.full() * h / 2, 3)
+        Q = h / 2 * half_phi_1
+        self.half, self.Q, self.R = _sparse(half), self._acting_columns(Q), self._acting_columns(half @ Q - Q)
+        middle = h * (2 * phi[2] - 4 * phi[3])
+        ends = h * (phi[1] - 3 * phi[2] + 4 * phi[3]), h * (4 * phi[3] - phi[2])
+        self.W = [self._acting_columns(M) for M in (ends[0], middle, middle, ends[1])]
 
-    def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
+    def points(self, N: NonlinearRates, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the four (y, u) where N was evaluated."""
         middle = (u + u_end) / 2
         half, whole = self.half @ y, self.E @ y
@@ -99,118 +108,121 @@ class ExponentialRungeKutta(Steps):
         return after, [(y, u), (a, middle), (b, middle), (c, u_end)]
 
 
-class ImplicitRadau(Steps):
-    """Steps implicit in the velocities of the axes that stick and in the bristles that hold them; N to second order, also
-    across a reversal that takes no time.
+class ImplicitRadau(ExponentialIntegrator):
+    """Steps implicit in the velocities of the axes with dry friction and in its bristles; N to second order, also across a
+    reversal that takes no time.
 
     With c = 1/3: Y = E_c y + P N(Y) and y+ = E y + W N(Y) + V N(y+), E_c = e^(A c h), P = c h phi_1(A c h); W and V
-    integrate the straight line through N(Y) at c and N(y+) at 1 (the nodes of Radau IIA). What stands stays: N(y+) is
-    whatever keeps it at rest.
+    integrate the straight line through N(Y) at c and N(y+) at 1, the nodes of Radau IIA. An axis at rest stays at rest:
+    N(y+) is whatever holds it.
     """
 
-    NODE, LEAST = 1 / 3, REVERSALS
+    NODE, LEAST_STEPS = 1 / 3, LEAST_IMPLICIT_STEPS
 
     def __init__(self, model: Model, sample_time: float) -> None:
-        stuck, sliding = home_slope(model), home_slope(model, 1.0)
-        A = np.where(np.abs(sliding) < np.abs(stuck), sliding, stuck)
-        self.bristles = list(model.bristles)  # in y
-        A[self.bristles, :] = A[:, self.bristles] = 0.0  # they bend and slip far faster than anything else
-        super().__init__(model, sample_time, A, REVERSING)
-        h, c, (_, phi_1, phi_2, _) = self.h, self.NODE, self.phis
-        E_c, phi_c, *_ = phis(self.A.full() * c * h, 3)
-        self.E_c, self.P = _sparse(E_c), self._acting(c * h * phi_c)
-        self.W = self._acting(h * (phi_1 - phi_2) / (1 - c))
-        self.V = self._acting(h * (phi_2 - c * phi_1) / (1 - c))
+        at_rest, sliding = slope_at_rest(model), slope_at_rest(model, speed=1.0)
+        A = np.where(np.abs(sliding) < np.abs(at_rest), sliding, at_rest)
+        self.bristles = list(model.bristles)  # places in y
+        A[self.bristles, :] = A[:, self.bristles] = 0.0  # they bend and slip far faster than anything else: all in N
+        super().__init__(model, sample_time, A, IMPLICIT_STEP)
+        h, c, (_, phi_1, phi_2, _) = self.h, self.NODE, self.phi
+        E_c, phi_1_c, *_ = phi_matrices(self.A.full() * c * h, 3)
+        self.E_c, self.P = _sparse(E_c), self._acting_columns(c * h * phi_1_c)
+        self.W = self._acting_columns(h * (phi_1 - phi_2) / (1 - c))
+        self.V = self._acting_columns(h * (phi_2 - c * phi_1) / (1 - c))
         first = model.x.numel() - model.v.numel()
-        self.places = [first + i for i in model.set_valued_axes]  # in y
-        self.own = [self.acting.index(i) for i in self.places]  # in N
-        self.bent = [self.acting.index(i) for i in self.bristles]
+        self.velocities = [first + i for i in model.set_valued_axes]  # places in y
+        self.velocity_rows = [self.acting.index(i) for i in self.velocities]  # rows of N
+        self.bristle_rows = [self.acting.index(i) for i in self.bristles]  # rows of N
 
-    def points(self, N: Rest, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
+    def points(self, N: NonlinearRates, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the two (y, u) where N = N(y, u) was solved for."""
         u_c = u + self.NODE * (u_end - u)
         Y, n = self._solved(N, self.E_c @ y, self.P, u_c, N(y, u))
         after, _ = self._solved(N, self.E @ y + self.W @ n, self.V, u_end, n)
         return after, [(Y, u_c), (after, u_end)]
 
-    def _solved(self, N: Rest, base: ca.SX, M: ca.DM, u: ca.SX, n: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def _solved(self, N: NonlinearRates, base: ca.SX, M: ca.DM, u: ca.SX, n: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Y = base + M n and n = N(Y, u), from a guess of n.
 
-        Newton's method for each velocity, from where the guess goes, or from standstill where it does not go the way that
-        a standstill would be left: friction bends toward its full force, so that no iterate from there overshoots. The
-        bristles go exactly where the velocity takes them; what else N depends on follows along.
+        Newton's method in one velocity at a time, and not `ctrlgen.numerics.newton`: friction is nearly a jump at v = 0,
+        across which plain Newton steps alternate for ever. Each velocity therefore starts from where the guess takes it, or
+        from standstill where that has the wrong sign, and keeps the sign with which a standstill would be left: friction
+        saturates, so that no iterate from there overshoots. The bristles are eliminated exactly; what else N depends on
+        follows the velocity.
         """
-        weight = ca.diag(M[self.places, self.own])
+        weight = ca.diag(M[self.velocities, self.velocity_rows])
 
         def at_speed(v: ca.SX, n: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-            """Y with the velocities v, N there, and the slope by them; for a guess of the rest of n."""
+            """Y with the velocities v, N there, and its slope by them; for a guess of the rest of n."""
             n = n[:]
-            n[self.own] += (v - (base + M @ n)[self.places]) / weight
+            n[self.velocity_rows] += (v - (base + M @ n)[self.velocities]) / weight
             Y = ca.densify(base + M @ n)
-            Y[self.places] = v
+            Y[self.velocities] = v
             return self._sloped(N, base, M, Y, u)
 
-        sliding = (base + M @ n)[self.places]
-        _, n, _ = at_speed(ca.SX.zeros(len(self.places)), n)
-        way = ca.sign((base + M @ n)[self.places])
-        v = ca.fmax(way * sliding, 0) * way
-        for _ in range(SOLVING):
+        guessed = (base + M @ n)[self.velocities]
+        _, n, _ = at_speed(ca.SX.zeros(len(self.velocities)), n)
+        direction = ca.sign((base + M @ n)[self.velocities])
+        v = ca.fmax(direction * guessed, 0) * direction
+        for _ in range(VELOCITY_NEWTON_STEPS):
             _, n, slope = at_speed(v, n)
-            off = (base + M @ n)[self.places] - v
-            v = ca.fmax(way * (v + off / (1 - weight * slope)), 0) * way
+            residual = (base + M @ n)[self.velocities] - v
+            v = ca.fmax(direction * (v + residual / (1 - weight * slope)), 0) * direction
         if self.bristles:
             _, n, _ = at_speed(v, n)
-        n[self.own] += (v - (base + M @ n)[self.places]) / weight
+        n[self.velocity_rows] += (v - (base + M @ n)[self.velocities]) / weight
         return base + M @ n, n
 
-    def _sloped(self, N: Rest, base: ca.SX, M: ca.DM, Y: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Y with the bristles where its velocities take them, N there, and how much each sticking row changes with its own
-        velocity, the bristles with it."""
+    def _sloped(self, N: NonlinearRates, base: ca.SX, M: ca.DM, Y: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Y with the bristles where its velocities take them, N there, and the slope of each velocity's row of N by that
+        velocity, through the bristles too."""
         at = ca.SX.sym("Y", Y.numel())
         value = N(at, u)
-        slopes = [ca.jacobian(value[i], at[k]) for i, k in zip(self.own, self.places, strict=True)]
-        bend = ca.SX(0, 1)
-        for i, k in zip(self.bent, self.bristles, strict=True):
+        slopes = [ca.jacobian(value[i], at[k]) for i, k in zip(self.velocity_rows, self.velocities, strict=True)]
+        bristles = ca.SX(0, 1)
+        for i, k in zip(self.bristle_rows, self.bristles, strict=True):
             m = M[k, i]
             stiff = 1 - m * ca.jacobian(value[i], at[k])
-            bend = ca.vertcat(bend, at[k] + (base[k] + m * value[i] - at[k]) / stiff)
-            for j, (own, place) in enumerate(zip(self.own, self.places, strict=True)):
-                slopes[j] += ca.jacobian(value[own], at[k]) * m * ca.jacobian(value[i], at[place]) / stiff
+            bristles = ca.vertcat(bristles, at[k] + (base[k] + m * value[i] - at[k]) / stiff)
+            for j, (row, place) in enumerate(zip(self.velocity_rows, self.velocities, strict=True)):
+                slopes[j] += ca.jacobian(value[row], at[k]) * m * ca.jacobian(value[i], at[place]) / stiff
         slope = ca.vertcat(*slopes)
         if self.bristles:
             Y = Y[:]
-            Y[self.bristles] = ca.substitute(bend, at, Y)
+            Y[self.bristles] = ca.substitute(bristles, at, Y)
         value, slope = ca.substitute([value, slope], [at], [Y])
         return Y, value, slope
 
 
 def _sparse(M: np.ndarray) -> ca.DM:
-    return ca.sparsify(ca.DM(np.where(np.abs(M) < 1e-300, 0.0, M)))
+    return ca.sparsify(ca.DM(np.where(np.abs(M) < VANISHED, 0.0, M)))
 
 
 def contact_steps(model: Model, sample_time: float) -> int:
-    """Steps a sample that follow the nominal stage at either end of its typical travel, if it is stiffer there; an end at
-    which its laws have no value, as a root beyond its range has none, asks for nothing."""
+    """Steps a sample that follow the nominal stage at either end of its typical travel, where it is stiffer there; else 1.
+
+    An end at which the laws have no value, as a root of a negative number has none, asks for nothing.
+    """
     first = model.x.numel() - model.v.numel()
-    slopes = (home_slope(model, away=away)[first:, first:] for away in (1e-3, 1.0, -1.0))
+    slopes = (slope_at_rest(model, displacement=d)[first:, first:] for d in (NEAR_HOME, 1.0, -1.0))
     home, *ends = (np.abs(np.linalg.eigvals(A)).max(initial=0.0) if np.isfinite(A).all() else 0.0 for A in slopes)
     fastest = max(ends)
-    return int(min(np.ceil(sample_time * fastest / CONTACT), MOST_SUBSTEPS)) if fastest > STIFFENED * home else 1
+    return int(min(np.ceil(sample_time * fastest / CONTACT_STEP), MOST_STEPS)) if fastest > STIFFER_AWAY * home else 1
 
 
-def home_slope(model: Model, moving: float = 0.0, away: float = 1e-3) -> np.ndarray:
-    """df/dy of the nominal model near home, the drive held, where a law with a corner at home is on one side of it; at
-    standstill or `moving` at so many typical speeds, `away` by so many typical displacements."""
+def slope_at_rest(model: Model, speed: float = 0.0, displacement: float = NEAR_HOME) -> np.ndarray:
+    """df/dy (n_y, n_y) of the nominal model, the drive held, at `speed` and `displacement` in typical sizes."""
     state = ca.vertcat(model.x, model.z)
-    A = ca.jacobian(ca.vertcat(model.sampled_rates, model.v), state)
-    at = ca.Function("A", [state, model.held, model.u, model.p, model.ambient_symbol], [A])
-    here = np.concatenate([model.rest, away * model.z_scale])
+    slope = ca.jacobian(ca.vertcat(model.sampled_rates, model.v), state)
+    at = ca.Function("A", [state, model.held, model.u, model.p, model.ambient_symbol], [slope])
+    y = np.concatenate([model.rest, displacement * model.z_scale])
     first = model.x.numel() - model.v.numel()
-    here[first : model.x.numel()] += moving * model.x_scale[first:]
-    return at(here, 0, 0, model.p_nominal, 0).full()
+    y[first : model.x.numel()] += speed * model.x_scale[first:]
+    return at(y, 0, 0, model.p_nominal, 0).full()
 
 
 def substeps(A: np.ndarray, sample_time: float, longest: float) -> int:
-    """Steps a sample, each at most `longest` of the time in which the fastest nominal motion changes by itself."""
+    """Steps a sample, each at most `longest` divided by the fastest rate of A."""
     fastest = np.abs(np.linalg.eigvals(A)).max(initial=0.0)
-    return int(np.clip(np.ceil(sample_time * min(fastest, FASTEST / sample_time) / longest), 1, MOST_SUBSTEPS))
+    return int(np.clip(np.ceil(sample_time * min(fastest, LAG_OVER / sample_time) / longest), 1, MOST_STEPS))

@@ -16,7 +16,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.newton import newton_root
 
 CORNERS = frozenset((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_IF_ELSE_ZERO))
 NOISE = 1e-12  # of the largest entry of an equilibrated inverse: what rounding leaves of a zero
@@ -69,7 +71,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
         for i, value in model.stepped.items():
             reached[i] = ca.substitute(value, now, here)
     else:
-        reached = ca.substitute(model.step(sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
+        reached = ca.substitute(held_step(model, sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
         reached = ca.substitute(reached, u, u_1)
         motion = x_1 - reached
         produced = ca.substitute(model.heat_of_drive, ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
@@ -93,7 +95,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
             "settle",
             [x, z, u],
             ["x", "z", "drive"],
-            _newton(ca.substitute(model.balance, model.p, ca.DM(model.p_nominal)), z, z),
+            newton_root(ca.substitute(model.balance, model.p, ca.DM(model.p_nominal)), z, z, NEWTON_STEPS),
         ),
     )
 
@@ -155,7 +157,7 @@ def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
     curvature = ca.jacobian(slope, v)
     if v.numel() == 1 and not ca.depends_on(curvature, v) and not _has_corners(slope):
         return base + _rising_root(known, r, v, base, slope, curvature)
-    return _newton(r, v, ca.SX(known.inside(v)))
+    return newton_root(r, v, ca.SX(known.inside(v)), NEWTON_STEPS)
 
 
 def _inverse(slope: np.ndarray) -> ca.DM:
@@ -171,16 +173,6 @@ def _has_corners(slope: ca.SX) -> bool:
     """Whether a slope jumps, as that of a play or a dead zone: its curvature says nothing then."""
     f = ca.Function("slope", ca.symvar(slope), [slope])
     return any(f.instruction_id(k) in CORNERS for k in range(f.n_instructions()))
-
-
-def _newton(r: ca.SX, v: ca.SX, start: ca.SX) -> ca.SX:
-    """`NEWTON_STEPS` steps on r(v) = 0 from `start`."""
-    slope, root = ca.jacobian(r, v), start
-    diagonal = slope.sparsity().is_diag()
-    for _ in range(NEWTON_STEPS):
-        J, residual = (ca.substitute(e, v, root) for e in (slope, r))
-        root = root - (residual / ca.diag(J) if diagonal else ca.solve(J, residual))
-    return root
 
 
 def _rising_root(known: _Values, r: ca.SX, v: ca.SX, base: ca.DM, slope: ca.SX, curvature: ca.SX) -> ca.SX:

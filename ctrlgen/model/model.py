@@ -7,21 +7,15 @@ z' = v. All SX, SI inside. `ctrlgen.model.assembly` builds it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, log2
 from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices import Device, Limit, Signal
-from ctrlgen.numerics.phi_functions import driven, driven_lags, held_gain
-
-LONGEST_STEP = 1024.0  # times the fastest of coupled states' rates
-LONGEST_RAMP = 2.0**20  # the same where the displacement couples the lags: 20 doublings leave 1e-10 of rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,58 +143,6 @@ class Model:
             ["x", "z", "u", "p"], ["rates", "balance"],
         )  # fmt: skip
 
-    def step(self, sample_time: float, rates: ca.SX | None = None) -> ca.SX:
-        """x after one `sample_time` [s] with u and z held: x + h phi_1(h A) f, A = df/dx, phi_1(M) = M^-1 (e^M - 1).
-
-        Exact for first-order lags. Where states act on one another phi_1 is summed to order 12, enough for
-        |h A| <= 1, and doubled beyond. Raises InputError for a step a thousand times too long.
-        """
-        after = self._lag(sample_time, self.rates if rates is None else rates)
-        for i, value in self.stepped.items():
-            after[i] = value
-        return after
-
-    def ramp(self, sample_time: float, A: ca.SX, rates: Sequence[ca.SX]) -> ca.SX:
-        """x after one `sample_time` h [s] in which the drive goes linearly from u to the next sample's, A = df/dx.
-
-        `rates` f of the present x under the drive at the beginning, the middle and the end of the sample, or, where f is
-        linear in the drive, at the beginning and the end: x + h (phi_1(hA) f_0 + phi_2(hA) f' + phi_3(hA) f''), f' and f''
-        those of the parabola through them. Exact for rates linear in x and quadratic in u. Raises InputError as `step` does.
-        """
-        begin, end = rates[0], rates[-1]
-        values = [begin, end - begin]
-        if len(rates) == 3:
-            values = [begin, 4 * rates[1] - 3 * begin - end, 4 * (begin - 2 * rates[1] + end)]
-        if _alone(A):
-            after = self.x + driven_lags(ca.diag(A), values, sample_time)
-        else:
-            after = self.x + driven(A, values, sample_time, self._doublings(A, sample_time, LONGEST_RAMP))
-        for i, value in self.stepped.items():
-            after[i] = value
-        return after
-
-    def _lag(self, sample_time: float, rates: ca.SX) -> ca.SX:
-        A = ca.jacobian(rates, self.x)
-        h = sample_time
-        if _alone(A):
-            rate = ca.diag(A)
-            gain = ca.vertcat(*(held_gain(rate[i], h) for i in range(self.x.numel())))
-            return self.x + gain * rates
-        return self.x + driven(A, [rates], h, self._doublings(A, h))
-
-    def _doublings(self, A: ca.SX, h: float, longest: float = LONGEST_STEP) -> int:
-        """How often the sample time must be halved before |h A| is at most 1."""
-        norm = float(
-            ca.norm_inf(
-                ca.Function("A", [self.x, self.z, self.u, self.p], [A])(self.rest, 0, 0, self.p_nominal)
-                * (self.x_scale[None, :] / self.x_scale[:, None])
-            )
-        )
-        if h * norm > longest:
-            what = f"{h:g} s is too long for the fastest coupled state; use {longest / norm:.2g} s or less"
-            raise InputError(self.name, [Fault("sample time", what)])
-        return max(0, ceil(log2(h * norm))) if norm else 0
-
     @cached_property
     def x_bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bound of each state: the limits that are that state itself."""
@@ -232,11 +174,6 @@ class Model:
             limit for limit in self.limits
             if not any(_positions(limit, symbol) for symbol in (self.x, self.z, self.u))
         ]  # fmt: skip
-
-
-def _alone(A: ca.SX) -> bool:
-    """Whether no state acts on another."""
-    return (A.sparsity() + ca.Sparsity.diag(A.size1())).is_diag()
 
 
 def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:

@@ -18,7 +18,7 @@ RAMP_ORDER = 18  # of the series of phi_1 to phi_3: what is left out is 1/19!, b
 SERIES = 1.0  # |h rate| below which one lag's phi_k are summed: the closed forms lose digits to cancellation there
 
 
-def phis(M: np.ndarray, count: int) -> list[np.ndarray]:
+def phi_matrices(M: np.ndarray, count: int) -> list[np.ndarray]:
     """[phi_0, ..., phi_count] of the numbers M (n, n): the first row of blocks of one larger exponential; also where M is
     singular."""
     n = len(M)
@@ -37,7 +37,7 @@ def held_gain(rate: ca.SX, h: float) -> ca.SX:
     return h if rate.is_zero() else (ca.exp(rate * h) - 1) / rate
 
 
-def driven(A: ca.SX, values: Sequence[ca.SX], h: float, doublings: int) -> ca.SX:
+def increment(A: ca.SX, values: Sequence[ca.SX], h: float, doublings: int) -> ca.SX:
     """h sum_k phi_k(h A) v_k for v_1, v_2, ... = `values`, at most three, of states that act on one another.
 
     The series for h/2^doublings, where |h A|/2^doublings must not exceed 1, then phi_k(2 M) from phi_j(M).
@@ -76,7 +76,7 @@ def _doubled(phi: list[ca.SX], whole: ca.SX) -> list[ca.SX]:
     return twice
 
 
-def driven_lags(rates: ca.SX, values: Sequence[ca.SX], h: float) -> ca.SX:
+def lag_increment(rates: ca.SX, values: Sequence[ca.SX], h: float) -> ca.SX:
     """The same for lags that do not act on one another: `rates` (n,) is the diagonal of A. To rounding for every h rate."""
     own = [_scalar(h * rate, len(values)) for rate in ca.vertsplit(rates)]
     return h * sum(ca.vertcat(*(row[k] for row in own)) * value for k, value in enumerate(values))

@@ -16,12 +16,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ctrlgen.numerics.newton import newton_solver
 from ctrlgen.physics.screw import Matrix, Scalar, adjoint, rotation_vector, rotation_z
 
 STAGE_OF_STRUT = (0, 1, 1, 2, 2, 0)  # S0 eq. (4): struts 1 and 6 on stage 1, 2 and 3 on stage 2, 4 and 5 on stage 3
 STAGE_OF_ACTUATOR = (0, 1, 1, 2, 2, 0)  # S0 eq. (6)
 TOLERANCE = 1e-15  # [m] of strut length; rounding of eq. (2) in float64 is 1e-16
-ITERATIONS = 20  # Newton needs four within the workspace
+MOST_STEPS = 20  # of Newton's method, which needs four within the workspace
 
 
 def geometry(h: Any) -> tuple[Matrix, Matrix]:
@@ -113,7 +114,7 @@ def pose_from_actuators(
     Raises ValueError where it finds none.
     """
     pose, u, f = _symbols(h, directions, lengths)
-    return _newton(ca.Function("f", [pose, u], [f, ca.jacobian(f, pose)]), np.atleast_2d(U), "pose", "actuator inputs")
+    return _solved(f, pose, u, np.atleast_2d(U), ("pose", "actuator inputs"))
 
 
 def actuators_from_pose(
@@ -124,7 +125,7 @@ def actuators_from_pose(
     The counterpart of `pose_from_actuators`. Raises ValueError where Newton finds none.
     """
     pose, u, f = _symbols(h, directions, lengths)
-    return _newton(ca.Function("f", [u, pose], [f, ca.jacobian(f, u)]), np.atleast_2d(T), "actuator inputs", "pose")
+    return _solved(f, u, pose, np.atleast_2d(T), ("actuator inputs", "pose"))
 
 
 def _symbols(h: Any, directions: Sequence[float], lengths: Matrix | None) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -134,18 +135,16 @@ def _symbols(h: Any, directions: Sequence[float], lengths: Matrix | None) -> tup
     return pose, u, constraint(pose, u, h, directions, L) / (2 * L)
 
 
-def _newton(step: ca.Function, given: np.ndarray, wanted: str, known: str) -> np.ndarray:
-    """x with f(x, y) = 0 to TOLERANCE for every row y of `given`; `step` gives f and df/dx."""
-    found = np.zeros_like(given, dtype=float)
-    for x, y in zip(found, given, strict=True):
-        for _ in range(ITERATIONS):
-            f, slope = (value.full() for value in step(x, y))
-            if not np.isfinite(f).all() or np.abs(f).max() <= TOLERANCE:
-                break
-            try:
-                x -= np.linalg.solve(slope, f).ravel()
-            except np.linalg.LinAlgError:
-                break
-        if not np.abs(f).max() <= TOLERANCE:
-            raise ValueError(f"no {wanted} within {ITERATIONS} Newton steps of home for {known} {np.array2string(y)}")
+def _solved(residual: ca.SX, unknown: ca.SX, known: ca.SX, rows: np.ndarray, names: tuple[str, str]) -> np.ndarray:
+    """The `unknown` (n, 6) with residual = 0 for every row of the `known`, by Newton's method from home; `names` of both."""
+    solver = newton_solver(
+        "struts", residual, unknown, known, residual_below=TOLERANCE, step_below=0.0, most_steps=MOST_STEPS
+    )
+    found = np.zeros(rows.shape)
+    for k, row in enumerate(rows):
+        try:
+            found[k] = solver(0, row).full().ravel()
+        except RuntimeError as error:
+            what = f"no {names[0]} within {MOST_STEPS} Newton steps of home for {names[1]} {np.array2string(row)}"
+            raise ValueError(what) from error
     return found

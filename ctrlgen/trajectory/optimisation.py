@@ -21,6 +21,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
 from ctrlgen.trajectory.scenario import Scenario
@@ -77,7 +78,7 @@ class TrajectoryProgramme:
             values = ca.vertcat(*physical, drive * m.u_scale, ca.DM(m.p_nominal))
             return ca.substitute(expression, ca.vertcat(m.x, m.z, m.u, m.p), values)
 
-        motion = at(m.settling, u) / m.x_scale if h is None else x_1 - (at(m.step(h), u) - m.rest) / m.x_scale
+        motion = at(m.settling, u) / m.x_scale if h is None else x_1 - (at(held_step(m, h), u) - m.rest) / m.x_scale
         equal = [at(self.signal.expr, v) / self.signal.scale - commanded - s, at(m.balance, v) / m.force_scale, motion]
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
         for limit in limits:

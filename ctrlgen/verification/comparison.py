@@ -26,6 +26,7 @@ from ctrlgen.firmware.toolchains import COMPILERS, find_compilers
 from ctrlgen.model.feedforward import SECANT_FRACTION, ControllerStatus
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
+from ctrlgen.numerics.newton import newton_solver
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.host import build_host, run_host
 from ctrlgen.verification.reference import ReferenceAnswers
@@ -240,7 +241,7 @@ def _equilibria(ref: ReferenceAnswers, answers: np.ndarray) -> np.ndarray:
     scaled = ca.vertcat(dynamics[0] / m.x_scale, dynamics[1] / m.force_scale)
     w = ca.MX.sym("w", len(scale))
     at = ca.substitute([scaled], [x, z], [w[: len(m.rest)] * m.x_scale + m.rest, w[len(m.rest) :] * m.z_scale])[0]
-    newton = ca.rootfinder("rest", "newton", {"x": w, "p": u, "g": at}, {"abstol": 1e-14, "max_iter": 60})
+    newton = newton_solver("rest", at, w, u, step_below=1e-12, most_steps=60)
     roots = newton.map(len(drives))(np.ones((len(scale), len(drives))), drives.T).full().T
     states, displacements = roots[:, : len(m.rest)] * m.x_scale + m.rest, roots[:, len(m.rest) :] * m.z_scale
     return trace(m, np.zeros(len(drives)), states, displacements, drives).signals[ref.scenario.file.follow]

@@ -123,7 +123,7 @@ def _rest(q: SampleEquations, free: bool) -> tuple[ca.Function, list[ca.SX], ca.
     """N (y, u, held, ambient, c); symbols y, u, u at the end, held, ambient, c; those of what keeps its value."""
     y, u, _, e, c = q.given
     own = [q.model.held, e, c]
-    N = ca.Function("N", [y, u, *own], [q.integrator.rest(q.model)])
+    N = ca.Function("N", [y, u, *own], [q.integrator.nonlinear_rates(q.model)])
     return N, [y, u, ca.SX.sym("end", u.numel()), *own], ca.vertcat(q.model.held, c) if free else q.model.held
 
 

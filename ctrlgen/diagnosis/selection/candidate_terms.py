@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.hypotheses.hypotheses import DataHints, Hypothesis, nomin
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect, Place
 from ctrlgen.model.effect_terms import channels
-from ctrlgen.numerics.phi_functions import phis
+from ctrlgen.numerics.phi_functions import lag_increment, phi_matrices
 
 Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
 REACHED = ("channel", "travel", "travel/s")
@@ -194,12 +194,9 @@ class CandidateTerms:
         memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)
         A = ca.jacobian(rates, memory)
         if not ca.symvar(A):
-            step = h * ca.DM(phis(h * ca.DM(A).full(), 1)[1]) @ rates
+            step = h * ca.DM(phi_matrices(h * ca.DM(A).full(), 1)[1]) @ rates
         elif A.sparsity().is_diag():
-            own = h * ca.diag(A)
-            step = (
-                h * rates * ca.if_else(ca.fabs(own) > CANDIDATE_TERMS.small_exponent, ca.expm1(own) / own, 1 + own / 2)
-            )
+            step = lag_increment(ca.diag(A), [rates], h)
         else:
             step = h * rates
         return [

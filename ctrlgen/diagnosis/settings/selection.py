@@ -12,8 +12,6 @@ class CandidateTermsSettings:
     highest_frequency: float = 0.49
     """Highest frequency of a candidate, as a share of the sampling rate: beyond one half it looks like a lower one, and
     at one half like nothing or an offset."""
-    small_exponent: float = 1e-6
-    """|x| below which (exp(x) - 1)/x is taken as 1 + x/2: the error x^2/6 is below rounding."""
     settled_time: float = 1e9
     """Sample time [s] of a settled pose: every lag has passed."""
     block: int = 500

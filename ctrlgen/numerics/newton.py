@@ -1,0 +1,35 @@
+"""Newton's method: a fixed number of steps written out as an expression, or iterated until it converges.
+
+Written out it has no branches, can be differentiated, and prints as C whose running time is known. Two solvers of the
+library are no case of it and say why: `ctrlgen.model.inverse` takes the closed form of linear and quadratic equations,
+`ctrlgen.model.integrators.ImplicitRadau` keeps a velocity from passing through zero under dry friction.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+CONVERGED = 1e-14  # residual and step, in units of order one: some tens of roundings
+
+
+def newton_root(residual: ca.SX, unknown: ca.SX, start: ca.SX, steps: int) -> ca.SX:
+    """The `unknown` (n,) after `steps` Newton steps on residual(unknown) = 0 from `start`, as an expression."""
+    slope, root = ca.jacobian(residual, unknown), start
+    for _ in range(steps):
+        root = root - ca.solve(*ca.substitute([slope, residual], [unknown], [root]))  # a diagonal slope: divisions
+    return root
+
+
+def newton_solver(
+    name: str, residual: ca.SX | ca.MX, unknown: ca.SX | ca.MX, parameters: ca.SX | ca.MX,
+    *, residual_below: float = CONVERGED, step_below: float = CONVERGED, most_steps: int,
+) -> ca.Function:  # fmt: skip
+    """(start, parameters) -> the root (n,), iterated until the residual or the step is below its bound.
+
+    `residual` and `unknown` are to be scaled to order one. The function raises RuntimeError where `most_steps` do not
+    suffice.
+    """
+    problem = {"x": unknown, "p": parameters, "g": residual}
+    return ca.rootfinder(
+        name, "newton", problem, {"abstol": residual_below, "abstolStep": step_below, "max_iter": most_steps}
+    )
