@@ -24,12 +24,12 @@ def test_a_device_is_fitted_from_several_starts_where_it_is_a_hundred_times_the_
     starts = []
 
     def fit(structure):
-        starts.append(structure.own)
+        starts.append(structure.nominal_starts)
         return SimpleNamespace(structure=structure, objective=objective, n=N)
 
     fitter = SimpleNamespace(noise=SimpleNamespace(known=np.array([known])), fit=fit)
-    Fitter.described(fitter, AXIS)
-    stated = [u for u in Structure(AXIS).unknowns if u.sd]
+    Fitter.fit_described(fitter, AXIS)
+    stated = [u for u in Structure(AXIS).free_parameters if u.sd]
     both = [{u.path: u.nominal + side * u.sd} for u in stated for side in (-1, 1)]
     assert stated and starts == [{}, *(both if again and known else [])]
 
@@ -45,15 +45,15 @@ def test_a_law_may_be_its_special_case_within_the_interval_of_95_per_cent(sd, ma
     """Friction that breaks away at 1.3 times its force of sliding is Coulomb's where 1.3 cannot be told from 1."""
     start = {"force": 0.1, "breakaway": 1.3, "speed": 1e-3, "reach": 1e-6}
     fit = fitted(Hypothesis("stribeck", "stage:axis", "axis"), start, sd)
-    assert fit.special(0) == ("coulomb" if may else None)
+    assert fit.nested_case(0) == ("coulomb" if may else None)
 
 
 def test_a_number_of_the_device_and_a_law_without_special_cases_are_what_they_are():
     creep = {"gain": 0.1, "tau": 1.0, "slow": 0.1}
-    assert fitted(Hypothesis("creep", "stage:axis", "axis"), creep, 1.0).special(0) is None
-    number = next(u.path for u in Structure(AXIS).unknowns)
+    assert fitted(Hypothesis("creep", "stage:axis", "axis"), creep, 1.0).nested_case(0) is None
+    number = next(u.path for u in Structure(AXIS).free_parameters)
     cause = Hypothesis("parameter", "stage:axis", path=number)
-    assert fitted(cause, {"value": 1.0}, 1.0).special(0) is None
+    assert fitted(cause, {"value": 1.0}, 1.0).nested_case(0) is None
 
 
 @pytest.mark.parametrize("side, noise", [(-1e-6, True), (1e-6, False)])

@@ -66,7 +66,9 @@ def test_a_device_file_that_is_none(tmp_path, text, says):
 
 def test_an_effect_whose_kind_is_no_text(tmp_path):
     (tmp_path / "device.toml").write_text(DEVICE.read_text() + "\n[[effect]]\nkind = []\n")
-    refused(ctrlgen("check", tmp_path / "device.toml"), "effect[0]: kind = [] is not an effect I know: abbe_arm")
+    refused(
+        ctrlgen("check", tmp_path / "device.toml"), "effect[0]: kind = [] is not a known effect; known are: abbe_arm"
+    )
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen.diagnosis.hypotheses.priors import prior_of
 from ctrlgen.effects import Effect
 
-PARAMETERS = [(kind, p) for kind, law in Effect.library.items() for p in law.params]
-every_parameter = pytest.mark.parametrize("kind, p", PARAMETERS, ids=[f"{kind}-{p.name}" for kind, p in PARAMETERS])
+PARAMETERS = [(kind, p, prior_of(law).of(p)) for kind, law in Effect.library.items() for p in law.params]
+every_parameter = pytest.mark.parametrize(
+    "kind, p, prior", PARAMETERS, ids=[f"{kind}-{p.name}" for kind, p, _ in PARAMETERS]
+)
 ONE_WAY = {  # shares of something that there is by itself once, and a metal's resistance, which rises
     "finite_rotation": (-2.0, 4.0), "link_load": (-2.0, 4.0), "low_pass": (-0.5, 1.5), "heater_resistance": (-1e-3, 1e-2),
 }  # fmt: skip
@@ -25,17 +26,15 @@ def test_an_amplitude_goes_as_far_either_way_or_one_way_alone(law):
 
 
 @every_parameter
-def test_what_is_tried_lies_inside_the_bounds_and_rises_or_falls(kind, p):
+def test_what_is_tried_lies_inside_the_bounds_and_rises_or_falls(kind, p, prior):
     low, high = p.bounds
-    tried = prior_of(Effect.library[kind]).of(p).start_values
-    assert low < high and all(low <= value <= high for value in tried)
-    steps = np.sign(np.diff(tried))
+    assert low < high and all(low <= value <= high for value in prior.start_values)
+    steps = np.sign(np.diff(prior.start_values))
     assert len(set(steps)) <= 1
 
 
 @every_parameter
-def test_a_fixed_or_plausible_range_lies_inside_the_bounds_around_one(kind, p):
-    prior = prior_of(Effect.library[kind]).of(p)
+def test_what_is_expected_or_usual_lies_inside_the_bounds_around_its_middle(kind, p, prior):
     for ends in (prior.fixed_range, prior.plausible_range):
         if ends:
             assert p.bounds[0] <= ends[0] < ends[1] <= p.bounds[1]
@@ -43,7 +42,7 @@ def test_a_fixed_or_plausible_range_lies_inside_the_bounds_around_one(kind, p):
 
 
 @every_parameter
-def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_leans_may_be(kind, p):
+def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_leans_may_be(kind, p, prior):
     if p.off is None:
         either = p.name in ("moment", "position", "reference", "phase", "lean", "gap", "level", "taper", "skew")
         assert either or p.bounds[0] >= 0.0

@@ -32,10 +32,13 @@ def record(role: str, n: int = N, n_y: int = 1, observed=None, drive=None) -> Re
 
 
 def weighing(n_fit: int = N, n_held: int = N, known: bool = True, trial=None) -> ModelSelection:
-    noise = Noise(NOISE.sd, NOISE.ar, np.array([known]), NOISE.said, NOISE.count)
+    noise = Noise(NOISE.sd, NOISE.ar, np.array([known]), NOISE.notes, NOISE.count)
     recording = Recording("t", "any", "series", ("reading.axis",), ("um",), (1.0,), (record("fit", 10),), ())
     fitter = SimpleNamespace(
-        noise=noise, to_fit=[record("fit", n_fit)], held=[record("hold_out", n_held)], recording=recording
+        noise=noise,
+        fit_records=[record("fit", n_fit)],
+        held_out_records=[record("hold_out", n_held)],
+        recording=recording,
     )
     return ModelSelection(fitter, trial or (lambda *_, **__: None))
 
@@ -43,8 +46,11 @@ def weighing(n_fit: int = N, n_held: int = N, known: bool = True, trial=None) ->
 class Numbers(SimpleNamespace):
     """Numbers of a device, then those of its causes."""
 
+    def cause_of(self, parameter):
+        return self.causes[parameter.cause]
+
     def plausible_range(self, unknown) -> tuple[float, float] | None:
-        return self.plausible
+        return self.usually
 
 
 def number(cause: int | None = None, low=0.0, high=1.0) -> FreeParameter:
@@ -52,11 +58,11 @@ def number(cause: int | None = None, low=0.0, high=1.0) -> FreeParameter:
 
 
 def trial(
-    gone=0.0, held=0.0, numbers=1, penalty=0.0, price=0.0, causes=(), odds=0.0, theta=None, sd=0.01, n=N, plausible=None
+    gone=0.0, held=0.0, numbers=1, penalty=0.0, price=0.0, causes=(), rarity=0.0, theta=None, sd=0.01, n=N, usual=None
 ):
     """A fit that leaves `gone` squares beyond the noise, `held` beyond it held out."""
     unknowns = tuple(number(None if i == 0 else 0) for i in range(numbers))
-    structure = Numbers(unknowns=unknowns, causes=causes, log_prior_odds=odds, plausible=plausible, device=None)
+    structure = Numbers(free_parameters=unknowns, causes=causes, log_prior_odds=-rarity, usually=usual, device=None)
     objective = n + gone
     fit = SimpleNamespace(
         structure=structure, objective=objective, chi2=objective - penalty, penalty=penalty, n=n,
@@ -161,13 +167,13 @@ def test_what_a_cause_must_show_is_its_size_or_where_the_device_hides_it_its_pri
     assert weighing(10_000).required_z2(trial(penalty=30.0), screened) == 16.0
 
 
-def test_the_price_of_a_structure_is_half_of_bics_logarithm_twice_less_twice_its_prior_odds():
+def test_the_price_of_a_structure_is_half_of_bics_logarithm_twice_and_its_rarity():
     w = weighing()
-    w.fitter.held_out = lambda fit: 1234.0
-    found = w.scored(trial(50.0, numbers=3, odds=-2.3).fit, None)
+    w.fitter.held_out_deviance = lambda fit: 1234.0
+    found = w.scored(trial(50.0, numbers=3, rarity=2.3).fit, None)
     assert found.held_out_deviance == 1234.0 and found.complexity_penalty == pytest.approx(2 * np.log(N) + 2 * 2.3)
     few = weighing(1)
-    few.fitter.held_out = lambda fit: 0.0
+    few.fitter.held_out_deviance = lambda fit: 0.0
     assert few.scored(trial(numbers=2).fit, None).complexity_penalty == pytest.approx(np.log(2))
 
 
@@ -191,14 +197,14 @@ def test_where_either_explains_all_that_was_fitted_a_quarter_of_what_is_held_out
 
 def test_among_equals_the_plainer_is_named():
     w = weighing()
-    best, rare, plain = trial(0.0, N), trial(0.0, N, odds=-2.0), trial(0.0, N + 200, odds=1.0)
+    best, rare, plain = trial(0.0, N), trial(0.0, N, rarity=2.0), trial(0.0, N + 200, rarity=-1.0)
     assert w.most_parsimonious([rare, best]) is best and w.most_parsimonious([best, rare]) is best
     assert w.most_parsimonious([best, plain]) is plain  # 200/2 squares are within a quarter of 1000/2, or not:
     assert (
         w.advantage(best, trial(0.0, N + 300)) > 0
-        and w.most_parsimonious([best, trial(0.0, N + 300, odds=1.0)]) is best
+        and w.most_parsimonious([best, trial(0.0, N + 300, rarity=-1.0)]) is best
     )
-    assert w.most_parsimonious([best, trial(0.0, N + 200, odds=1.0, numbers=2)]) is best  # with more numbers
+    assert w.most_parsimonious([best, trial(0.0, N + 200, rarity=-1.0, numbers=2)]) is best  # with more numbers
 
 
 @pytest.mark.parametrize("value, means", [(0.5, True), (1 - 2e-6, True), (1 - 5e-7, False), (5e-7, True), (1.0, False)])
@@ -210,16 +216,16 @@ def test_an_amplitude_at_its_bound_means_nothing_but_off(value, means):
 
 def test_an_amplitude_at_a_bound_that_is_not_off_means_nothing_either():
     t = trial(numbers=2, causes=(GAIN,), theta=[0.5, -1 + 5e-7])
-    t.fit.structure.unknowns = (number(), number(0, low=-1.0))
+    t.fit.structure.free_parameters = (number(), number(0, low=-1.0))
     assert not weighing().physically_meaningful(t)
     t.fit.theta = np.array([0.5, -1 + 3e-6])
     assert weighing().physically_meaningful(t)
 
 
 @pytest.mark.parametrize("value, means", [(0.79, False), (0.81, True), (1.19, True), (1.21, False)])
-def test_an_amplitude_that_is_not_plausible_is_something_else(value, means):
-    t = trial(numbers=2, causes=(GAIN,), theta=[0.5, value], plausible=(0.8, 1.2))
-    t.fit.structure.unknowns = (number(), number(0, high=2.0))
+def test_an_amplitude_that_is_not_usual_is_something_else(value, means):
+    t = trial(numbers=2, causes=(GAIN,), theta=[0.5, value], usual=(0.8, 1.2))
+    t.fit.structure.free_parameters = (number(), number(0, high=2.0))
     assert weighing().physically_meaningful(t) == means
 
 
@@ -235,8 +241,8 @@ def fitted(
         structure = structure.with_cause(
             cause, {"gain": 0.3, "tau": 1.0, "slow": 0.1} if cause is CREEP else {"gain": 0.3}
         )
-    theta = np.array([u.nominal if u.cause is None else 0.3 for u in structure.unknowns])
-    first = next((i for i, u in enumerate(structure.unknowns) if u.cause == 0 and u.amplitude), None)
+    theta = np.array([u.nominal if u.cause is None else 0.3 for u in structure.free_parameters])
+    first = next((i for i, u in enumerate(structure.free_parameters) if u.cause == 0 and u.amplitude), None)
     deviations = np.full(len(theta), 0.01)
     if first is not None:
         theta[first], deviations[first] = amplitude, sd
@@ -277,10 +283,10 @@ def judged(
     fit = SimpleNamespace(n=n_fit + 3, theta=np.zeros(3), chi2=fitted_ratio**2 * n_fit)
     fitter = SimpleNamespace(
         noise=noise,
-        held=[held],
+        held_out_records=[held],
         recording=recording,
-        as_known=lambda fit, _: (fit, price, 0.0),
-        whitened=lambda fit, r: white,
+        refitted_to_held_out=lambda fit, _: (fit, price, 0.0),
+        whitened_residual=lambda fit, r: white,
     )
     return run_residual_tests(fitter, fit)
 
@@ -400,10 +406,10 @@ def test_tails_at_rest_that_noise_has_not_are_no_noise(tails, moves):
     recording = Recording("t", "any", "series", ("reading.axis",), ("um",), (1.0,), (held, still), ())
     fitter = SimpleNamespace(
         noise=noise,
-        held=[held],
+        held_out_records=[held],
         recording=recording,
-        as_known=lambda fit, _: (fit, 0.0, 0.0),
-        whitened=lambda fit, r: r.observed,
+        refitted_to_held_out=lambda fit, _: (fit, 0.0, 0.0),
+        whitened_residual=lambda fit, r: r.observed,
     )
     found = run_residual_tests(fitter, SimpleNamespace(n=10**6, theta=np.zeros(0), chi2=1e6))
     assert found.restless == (("reading.axis",) if moves else ()) and found.passed == (not moves)

@@ -41,8 +41,10 @@ def number(path: str, nominal=1.0, sd=None, cause=None, unit="1") -> FreeParamet
     return FreeParameter(path, unit, nominal, -np.inf, np.inf, 1e-3, sd, cause, cause is not None)
 
 
-def fitted(objective=float(N), causes=(), theta=(), unknowns=(), penalty=0.0) -> SimpleNamespace:
-    structure = SimpleNamespace(causes=causes, unknowns=unknowns)
+def fitted(objective=float(N), causes=(), theta=(), free_parameters=(), penalty=0.0) -> SimpleNamespace:
+    structure = SimpleNamespace(
+        causes=causes, free_parameters=free_parameters, cause_of=lambda parameter: causes[parameter.cause]
+    )
     return SimpleNamespace(
         objective=objective, n=N, structure=structure, theta=np.array(theta), penalty=penalty, J=np.zeros((0, len(theta))),
         covariance=np.diag(np.full(len(theta), 1e-4)),
@@ -59,7 +61,7 @@ def search(nominal, chosen, bare=(), rivals=()) -> SimpleNamespace:
 
 def fitter(known: bool = True, **squares: float) -> SimpleNamespace:
     noise = SimpleNamespace(known=np.array([known]), usable=lambda valid: valid, floor=np.array([2e-9]))
-    return SimpleNamespace(noise=noise, held=[SimpleNamespace(valid=np.ones((N, 1), bool))], **squares)
+    return SimpleNamespace(noise=noise, held_out_records=[SimpleNamespace(valid=np.ones((N, 1), bool))], **squares)
 
 
 CHANCE = 4 * np.sqrt(2 * N)  # squares by which N of them differ by chance
@@ -90,7 +92,7 @@ def test_the_roughest_law_may_leave_what_it_says_and_any_law_a_twentieth(causes,
 def test_numbers_are_loose_that_foresee_worse_than_none_beyond_four_deviations(side, is_loose):
     squares = {"chosen": 5e4 + CHANCE + side, "nominal": 5e4}
     chosen, nominal = trial(), trial()
-    f = fitter(held_squares=lambda fit: squares["chosen" if fit is chosen.fit else "nominal"])
+    f = fitter(held_out_squares=lambda fit: squares["chosen" if fit is chosen.fit else "nominal"])
     assert poorly_determined(f, search(nominal, chosen)) == is_loose
 
 
@@ -110,7 +112,9 @@ def test_a_cause_that_the_device_would_have_to_pay_for_needs_no_confirmation(hid
 
 def off(*deviations: float) -> SimpleNamespace:
     unknowns = tuple(number(f"p{k}", nominal=2.0, sd=0.1) for k in range(len(deviations)))
-    return fitted(theta=[2.0 + 0.1 * z for z in deviations] + [7.0], unknowns=(*unknowns, number("gain", cause=0)))
+    return fitted(
+        theta=[2.0 + 0.1 * z for z in deviations] + [7.0], free_parameters=(*unknowns, number("gain", cause=0))
+    )
 
 
 def test_numbers_are_excluded_that_chance_puts_so_far_off_once_in_a_million():
@@ -133,9 +137,9 @@ def judged(
 ) -> str:
     nominal = trial(N + 1e6, N + 1e6)
     unknowns, theta = (number("p0", 2.0, 0.1),), (2.0 + 0.1 * apart,)
-    chosen = trial(N + left**2 * 1e6, causes=causes, unknowns=unknowns, theta=theta)
+    chosen = trial(N + left**2 * 1e6, causes=causes, free_parameters=unknowns, theta=theta)
     found = search(nominal, chosen, (trial(N + 500.0, N + confirmed),) * len(causes), rivals[: len(causes)])
-    f = fitter(known, held_squares=lambda fit: worse if fit is chosen.fit else 0.0)
+    f = fitter(known, held_out_squares=lambda fit: worse if fit is chosen.fit else 0.0)
     return verdict(f, found, ResidualTests((1.0,), {}, passed), seen)
 
 
@@ -155,7 +159,7 @@ def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_
     monkeypatch.setattr(
         "ctrlgen.diagnosis.selection.result.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
     )
-    chosen = trial(N, N, causes=(GAIN, REVERSED), unknowns=(number("effect[0].gain", cause=0),), theta=(1.1,))
+    chosen = trial(N, N, causes=(GAIN, REVERSED), free_parameters=(number("effect[0].gain", cause=0),), theta=(1.1,))
     bare = (trial(held=N + 100.0), trial(held=N + 300.0))
     first, second = findings(search(trial(held=1e3), chosen, bare, ((trial(cause=CREEP), trial()), ())))
     assert (first.effect, second.effect) == ("reversed", "drive_gain")
@@ -172,14 +176,14 @@ def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monk
     valid = np.ones((4, 1), bool)
     valid[3] = False
     nominal, chosen = trial(), trial()
-    f = fitter(predicted=lambda fit, r: np.full((4, 1), 1e-6 if fit is nominal.fit else 3e-6))
-    f.held = [SimpleNamespace(valid=valid, observed=np.array([[4e-6], [5e-6], [6e-6], [9.0]]))]
+    f = fitter(predict=lambda fit, r: np.full((4, 1), 1e-6 if fit is nominal.fit else 3e-6))
+    f.held_out_records = [SimpleNamespace(valid=valid, observed=np.array([[4e-6], [5e-6], [6e-6], [9.0]]))]
     f.recording = SimpleNamespace(channels=("reading.axis",), units=("um",))
     found = held_out_errors(f, search(nominal, chosen), np.array([True]))["reading.axis"]
     wanted = (np.sqrt((9 + 16 + 25) / 3), np.sqrt((1 + 4 + 9) / 3), 2e-3, 5e-3)
     assert (found.rms_before, found.rms_after, found.noise_floor, found.uncertainty) == pytest.approx(wanted)
     assert held_out_errors(f, search(nominal, chosen), np.array([False]))["reading.axis"].noise_floor is None
-    f.held = []
+    f.held_out_records = []
     assert np.isnan(held_out_errors(f, search(nominal, chosen), np.array([True]))["reading.axis"].rms_after)
 
 
