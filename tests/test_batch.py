@@ -91,6 +91,9 @@ def test_what_is_there_is_kept_and_what_changed_is_made_again(jobs, tmp_path):
     assert [row.state for row in rows] == ["done before", "done"] and told == [(1, 2), (2, 2)]
     assert {p.parent.name for p, at in times.items() if p.stat().st_mtime_ns != at} == {"table--run1"}
     assert run_batch(load_batch(jobs, seed=1)[:1], out, jobs=0)[0].state == "done"
+    assert run_batch(load_batch(jobs, seed=1)[:1], out, jobs=0)[0].state == "done before"
+    monkeypatch.setattr("ctrlgen.app.batch.code_hash", lambda: "of other code")
+    assert run_batch(load_batch(jobs, seed=1)[:1], out, jobs=0)[0].state == "done"
 
 
 def test_a_list_says_all_its_faults(tmp_path):

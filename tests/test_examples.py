@@ -14,6 +14,7 @@ from command_line import ctrlgen
 from conftest import ROOT, SCENARIOS
 
 from ctrlgen import InputError, load_device, load_scenario
+from ctrlgen._version import program
 from ctrlgen.app.examples import copy_examples, examples
 
 FOLDERS = {path.parent.name for kind in ("scenario", "recording", "run_a") for path in SCENARIOS.glob(f"*/{kind}.toml")}
@@ -85,6 +86,7 @@ def test_a_wheel_in_a_clean_environment_runs_an_example_and_reproduces(tmp_path)
     installed = run(*pip, "--python", scripts / "python", "install", wheel)
     assert installed.returncode == 0, installed.stderr
 
+    assert run(scripts / "ctrlgen", "--version").stdout.strip() == program()  # the commit it was built from
     assert "circle20" in run(scripts / "ctrlgen", "example").stdout
     copied = run(scripts / "ctrlgen", "example", "circle20", "nist_hexapod", "--to", "scenarios")
     assert copied.returncode == 0, copied.stderr

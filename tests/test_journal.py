@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from test_batch import SERVO, servo_poses
 
+from ctrlgen._version import code_hash
 from ctrlgen.diagnosis.estimation import fit
 from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests, unfinished
 
-MADE_FROM = {"version": "1", "seed": 0, "files": {"a": "b"}}
+MADE_FROM = {"code": "1", "seed": 0, "files": {"a": "b"}}
 
 
 @pytest.fixture
@@ -51,6 +52,8 @@ def test_what_is_stopped_goes_on_and_ends_alike(asked, sought, tmp_path):
         diagnose_into(*asked, stopped, progress=stop)
     done, said = len(sought), []
     assert 0 < done < needed and not stopped.exists() and unfinished(stopped).exists()
+    made_from = json.loads(unfinished(stopped).read_text().splitlines()[0])
+    assert made_from == {"code": code_hash(), "seed": 0, "files": digests(*asked)}
     sought.clear()
     diagnose_into(*asked, stopped, progress=said.append)
     assert len(sought) == needed - done
@@ -64,10 +67,11 @@ def test_the_folder_one_stands_in_has_a_name_too(monkeypatch, tmp_path):
     assert unfinished(Path(".")) == tmp_path.with_name(f"{tmp_path.name}.unfinished")
 
 
-def test_another_seed_or_file_begins_anew(tmp_path):
+def test_another_seed_code_or_file_begins_anew(tmp_path):
     path = tmp_path / "kept"
     Checkpoint(path, MADE_FROM).keep("k", np.array([0.1, -1e-300]))
     assert np.array_equal(Checkpoint(path, MADE_FROM).recall("k"), [0.1, -1e-300])
+    assert Checkpoint(path, MADE_FROM | {"code": "another"}).reused == 0
     other = Checkpoint(path, MADE_FROM | {"seed": 1})
     assert other.reused == 0
     other.keep("l", np.zeros(1))

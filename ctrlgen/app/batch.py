@@ -7,7 +7,7 @@
     recordings = ["runs/*", ["a", "b"]]   # a diagnosis for each match; the recordings of an inner list are joined
     name = "stage"                        # optional: what the result folders' names begin with, else the device file's name
 
-A result folder appears whole when its diagnosis is done. A result made before from the same files by the same version is
+A result folder appears whole when its diagnosis is done. A result made before from the same files by the same code is
 kept: a batch that was stopped continues where it was.
 """
 
@@ -25,7 +25,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from ctrlgen._version import __version__
+from ctrlgen._version import code_hash
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
 from ctrlgen.core.parallel import Failure, run_all
@@ -70,7 +70,7 @@ class Task:
         """Everything the result depends on, files as their SHA-256. Raises InputError where a file cannot be read."""
         hashes = digests(Path(self.device), [Path(r) for r in self.recordings])
         laws = None if self.laws is None else list(self.laws)
-        return {"version": __version__, "seed": self.seed, "replicates": self.replicates, "laws": laws, "files": hashes}
+        return {"code": code_hash(), "seed": self.seed, "replicates": self.replicates, "laws": laws, "files": hashes}
 
     def __call__(self) -> dict[str, bytes]:
         """The content of the result folder by file name; it is made in a temporary folder."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ctrlgen._version import __version__
+from ctrlgen._version import code_hash
 from ctrlgen.core.files import read_toml, whole_folder, write_text
 from ctrlgen.core.to_json import plain
 from ctrlgen.devices import Device, load_device
@@ -121,7 +121,7 @@ def _checkpoint(
     """The checkpoint of a diagnosis into `out`, valid for the same program, files, seed and effects."""
     files = digests(Path(device), recordings)
     return Checkpoint(
-        unfinished(out), {"version": __version__, "seed": seed, "laws": laws and sorted(laws), "files": files}
+        unfinished(out), {"code": code_hash(), "seed": seed, "laws": laws and sorted(laws), "files": files}
     )
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen._version import __version__
+from ctrlgen._version import __version__, program
 from ctrlgen.core.errors import CtrlgenError, Fault, InputError, ToolError
 from ctrlgen.core.files import whole_folder, write_bytes
 from ctrlgen.core.units import base_unit, exponents, from_si
@@ -232,7 +232,7 @@ def _write_unit(
     sources = [f"{identifier}.c", f"{unit.core}.c"]
     context = unit.more | {
         "identifier": identifier, "fmi": f"{fmi}.0", "core": unit.core, "title": comment(unit.title), "unit": unit.kind,
-        "digest": scenario.digest, "version": __version__, "sources": sources, "sample_time": repr(plant.sample_time),
+        "digest": scenario.digest, "version": __version__, "program": program(), "sources": sources, "sample_time": repr(plant.sample_time),
         "token": f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}",
         "inputs": unit.inputs, "outputs": unit.outputs, "status": unit.status, "settles": unit.settles,
         "initial_inputs": [v.attributes["start"] for v in unit.inputs], "variables": unit.variables,

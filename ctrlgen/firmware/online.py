@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen._version import __version__
+from ctrlgen._version import __version__, program
 from ctrlgen.core.units import base_unit, show
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
@@ -77,7 +77,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         _middles(low, high, real) for low, high in ((z_low, z_high), (s_low, s_high), (u_low, u_high))
     )
     return {
-        "prefix": prefix, "real": real, "version": __version__, "title": comment(model.device.title),
+        "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(model.device.title),
         "source": comment(model.device.source),
         "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,

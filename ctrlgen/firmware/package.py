@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ctrlgen._version import __version__
+from ctrlgen._version import __version__, commit
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
@@ -50,7 +50,7 @@ def write_package(
         write_text(out / name, text)
         written.append(out / name)
     manifest = {
-        "name": scenario.name, "title": context["title"], "ctrlgen": __version__, "licence": LICENCE,
+        "name": scenario.name, "title": context["title"], "ctrlgen": __version__, "commit": commit(), "licence": LICENCE,
         "inputs": scenario.digest,
         "files": {name: _sha256(out / name) for name in sorted(path.relative_to(out).as_posix() for path in written)},
     }  # fmt: skip

@@ -17,7 +17,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ctrlgen._version import __version__
+from ctrlgen._version import __version__, program
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
@@ -108,7 +108,7 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
     called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
     starts = np.cumsum([0, *(len(signal.channels) for signal in plant.signals)])
     return {
-        "prefix": prefix, "real": real, "version": __version__, "title": comment(m.device.title),
+        "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(m.device.title),
         "source": comment(m.device.source), "digest": scenario.digest, "si": si_text, "drive": m.signals["drive"],
         "rate": f"{1 / plant.sample_time:.17g}", "n": len(m.axes), "nx": m.x.numel(), "nu": m.u.numel(),
         "x_names": [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)],

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ctrlgen._version import program
+
 app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
     help="Describe a flexure nanopositioner once; solve its trajectories, generate its C and prove that the C is right, and "
@@ -14,6 +16,22 @@ app = typer.Typer(
     "Start with:  [bold]ctrlgen example circle20 --to scenarios[/bold]\n\n"
     "then:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
 )  # fmt: skip
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(program())
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print version and commit.")
+    ] = False,
+) -> None:
+    """What stands before a command."""
+
 
 ScenarioPath = Annotated[
     Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)

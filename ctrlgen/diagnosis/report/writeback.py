@@ -16,7 +16,7 @@ import numpy as np
 import tomlkit
 from tomlkit.items import AoT, Item, Table
 
-from ctrlgen._version import __version__
+from ctrlgen._version import program
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
@@ -146,7 +146,7 @@ def _written_sd(sd: float, unit: str) -> str:
 
 def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
     """Comment: what was found, from which recording, and held-out errors before and after."""
-    lines = [f"Diagnosed from {diagnosis.recording.title!r} by ctrlgen {__version__}, verdict {diagnosis.verdict}."]
+    lines = [f"Diagnosed from {diagnosis.recording.title!r} by {program()}, verdict {diagnosis.verdict}."]
     lines.append(sentence(diagnosis))
     lines += [channel_sentence(channel, error) for channel, error in diagnosis.held_out.items()]
     if changed:
