@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 
+import pytest
 from conftest import ROOT
 
 import ctrlgen
@@ -44,8 +45,9 @@ def test_the_python_example_names_what_exists():
 
 
 def test_every_path_in_the_readme_and_the_documentation_exists():
-    pages = [README, *(path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md"))]
-    for path in re.findall(r"`((?:ctrlgen|codegen|tests|scenarios|benchmarks|docs)/[\w/.*]+)`", "\n".join(pages)):
+    named = (ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"))
+    pages = [path.read_text(encoding="utf-8") for path in (*named, *(ROOT / "docs").glob("*.md"))]
+    for path in re.findall(r"`((?:ctrlgen|codegen|tests|scenarios|benchmarks|battery|docs)/[\w/.*]+)`", "\n".join(pages)):
         assert list(ROOT.glob(path)), path
 
 
@@ -60,6 +62,17 @@ def test_every_package_stands_in_the_architecture():
         name = path.parent.relative_to(ROOT / "ctrlgen").as_posix().replace("/", ".")
         if (name.count(".") == 0 and name != "") or name.startswith("diagnosis."):
             assert f"`{name}`" in page, name
+
+
+def test_what_contributing_tells_of_a_law_is_there():
+    text, effects = (ROOT / "CONTRIBUTING.md").read_text(), (ROOT / "ctrlgen" / "effects" / "_effect.py").read_text()
+    recovery = (ROOT / "tests" / "test_recovery.py").read_text()
+    (shown,) = re.findall(r"```python\n(def .*?)\n *y = ", text, re.DOTALL)
+    assert shown.partition("(")[0] in recovery
+    for word in ("ON_AXIS", "ON_HEXAPOD", "within", "def test_no_law_is_left_out"):
+        assert word in recovery and word.removeprefix("def ") in text, word
+    for word in ("place", "source", "params", "states", "active"):
+        assert f"`{word}`" in text and f"    {word}: ClassVar" in effects, word
 
 
 def test_the_two_commands_are_targets_of_the_makefile():
