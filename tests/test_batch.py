@@ -80,7 +80,7 @@ def test_each_recording_gets_its_folder_and_its_line(jobs, tmp_path):
     assert not list(out.glob(".*"))
 
 
-def test_what_is_there_is_kept_and_what_changed_is_made_again(jobs, tmp_path):
+def test_what_is_there_is_kept_and_what_changed_is_made_again(jobs, tmp_path, monkeypatch):
     jobs.write_text('laws = ["sensor_gain", "bow"]\n' + jobs.read_text())
     out = tmp_path / "out"
     run_batch(load_batch(jobs)[:2], out, jobs=0)

@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 
-import pytest
 from conftest import ROOT
 
 import ctrlgen
@@ -47,7 +46,9 @@ def test_the_python_example_names_what_exists():
 def test_every_path_in_the_readme_and_the_documentation_exists():
     named = (ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"))
     pages = [path.read_text(encoding="utf-8") for path in (*named, *(ROOT / "docs").glob("*.md"))]
-    for path in re.findall(r"`((?:ctrlgen|codegen|tests|scenarios|benchmarks|battery|docs)/[\w/.*]+)`", "\n".join(pages)):
+    for path in re.findall(
+        r"`((?:ctrlgen|codegen|tests|scenarios|benchmarks|battery|docs)/[\w/.*]+)`", "\n".join(pages)
+    ):
         assert list(ROOT.glob(path)), path
 
 
