@@ -126,7 +126,7 @@ def test_a_stop_is_placed_at_the_end_of_the_travel_where_it_stands():
 def test_a_clean_record_has_nothing_to_place():
     found = mapped(axis_fitter())[2]
     assert found.by_reading[0].ci95[0] < 0 < found.by_reading[0].ci95[1]
-    assert found.coordinates.located_in == "there is nothing left to place"
+    assert found.coordinates.located_in == "there is no significant excess"
     assert not any("direction" in said for said in found.statements)
 
 
@@ -156,7 +156,7 @@ def test_a_step_is_placed_in_time():
 
 
 @pytest.mark.parametrize(
-    ("law", "word"), [(lambda q: q, "only where it is driven"), (lambda q: q + 40 * q**2, "even"), (lambda q: q + 4e6 * q**3, "odd")]
+    ("law", "word"), [(lambda q: q, "at the excited lines only"), (lambda q: q + 40 * q**2, "even"), (lambda q: q + 4e6 * q**3, "odd")]
 )  # fmt: skip
 def test_the_lines_of_a_periodic_drive_tell_the_class_of_the_nonlinearity(law, word):
     t = np.arange(3000) * H

@@ -18,7 +18,7 @@ from ctrlgen.reporting.result_schemas import SCHEMAS, origin
 
 EMPTY = {
     "excess": 0.1, "by_reading": [], "by_actuator": [],
-    "coordinates": {"participation_ratio": {}, "explained_by_one": {}, "located_in": "one reading cannot tell"},
+    "coordinates": {"participation_ratio": {}, "explained_by_one": {}, "located_in": "cannot be told from one reading"},
     "by_frequency": [], "by_travel": {}, "by_direction": {}, "by_time": [], "by_temperature": [], "spectral_lines": [],
     "statements": [],
 }  # fmt: skip

@@ -1,1 +1,1 @@
-"""Analyses beside the verdict: where the mismatch is, what could have been detected, what to record next."""
+"""Supporting analyses: where the residual is, what was detectable, what to record next, bootstrap intervals."""

@@ -1,10 +1,11 @@
-"""How sure the numbers of a finding are, without trusting the noise's model: a residual block bootstrap.
+"""Confidence intervals that do not rest on the noise model: a residual block bootstrap.
 
-Each replicate is a recording that could have been: what the chosen structure predicts, plus its own residuals in blocks
-drawn with replacement (blocks keep what neighbouring samples and channels have in common), plus stated numbers drawn
-anew within their deviations. The structure is fitted to it again. Intervals are percentiles of the replicates.
+Each replicate is a synthetic recording: the prediction of the chosen model, plus its residuals in blocks drawn with
+replacement. Blocks keep the correlation between neighbouring samples and between channels. Parameters that the device
+file states with a standard deviation get new stated values, drawn within it. The model is refitted to each replicate;
+the intervals are percentiles of the refitted parameters. They are conditional on the model: other causes are not tried.
 
-H. R. Kuensch, Ann. Statist. 17 (1989) 1217. The intervals hold given the structure: they do not ask for another cause.
+Source: H. R. Kuensch, Ann. Statist. 17 (1989) 1217.
 """
 
 from __future__ import annotations
@@ -31,9 +32,14 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Bootstrap:
-    """`values` percentile intervals by path, as in `Diagnosis.values`; `replicates` refitted, `failed` with reasons.
+    """Percentile intervals of a diagnosis.
 
-    `vanished` is the share of replicates, by finding, in which its amplitude stands on a bound or at nothing.
+    replicates: recordings that were refitted.
+    block: length of the blocks [samples] of each record to fit.
+    values: estimate and 95 % interval by parameter path, as in `Diagnosis.values`.
+    vanished: share of the replicates, by finding, whose amplitude lies on a bound or has the other sign.
+    failed: reasons of replicates that could not be refitted, each once.
+    note: how it was done, and whether there are too few replicates.
     """
 
     replicates: int
@@ -46,13 +52,13 @@ class Bootstrap:
 
 @dataclass(frozen=True, eq=False)
 class _Drawn(Structure):
-    """A structure whose stated numbers were stated a little differently."""
+    """A structure whose parameters have other stated values."""
 
     stated: tuple[float, ...] = ()
 
     @cached_property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """As of the structure, with other nominal numbers, where those have a deviation."""
+        """Those of the structure, with the drawn nominal value where a standard deviation is stated."""
         base = Structure(self.device, self.causes, self.starts).free_parameters
         return tuple(
             replace(u, nominal=nominal) if u.sd else u for u, nominal in zip(base, self.stated, strict=True)
@@ -61,7 +67,7 @@ class _Drawn(Structure):
 
 @dataclass(frozen=True, eq=False)
 class Replicate:
-    """One replicate's fit, as a function of its seed; what all have in common travels with it."""
+    """The refit of one replicate as a function of its seed; it can be sent to another process."""
 
     structure: Structure
     theta: np.ndarray
@@ -72,7 +78,7 @@ class Replicate:
     token: str
 
     def __call__(self, seed: list[int]) -> np.ndarray:
-        """The refitted unknowns [SI]."""
+        """The refitted parameters [SI]."""
         rng = np.random.default_rng(seed)
         records = tuple(
             replace(r, observed=y + redrawn(r, y, block, rng))
@@ -91,23 +97,23 @@ class Replicate:
         return fitter.fit(_Drawn(s.device, s.causes, s.starts, stated=stated), self.theta).theta
 
 
-_COMPILED: dict[str, dict] = {}  # of the one bootstrap at hand: every replicate of it integrates the same expressions
+_COMPILED: dict[str, dict] = {}  # by bootstrap, the last one only: all its replicates integrate the same expressions
 
 
 def redrawn(record: Record, predicted: np.ndarray, block: int, rng: np.random.Generator) -> np.ndarray:
-    """Centred residuals (n, n_y) in blocks from anywhere in the record; what is not valid there counts as zero."""
+    """Centred residuals (n, n_y) of `record`, redrawn in blocks of `block` samples; samples that are not valid count as zero."""
     left = np.where(record.valid, record.observed - predicted, np.nan)
     with np.errstate(all="ignore"):
         count = np.maximum(np.isfinite(left).sum(axis=0), 1)
         left = left - np.nansum(left, axis=0) / count
     n = len(left)
     begins = rng.integers(0, n, -(-n // block))
-    rows = ((begins[:, None] + np.arange(block)) % n).ravel()[:n]  # circular, so that every sample is drawn alike
+    rows = ((begins[:, None] + np.arange(block)) % n).ravel()[:n]  # circular, so that every sample is equally likely
     return np.nan_to_num(left[rows])
 
 
 def block_length(record: Record, predicted: np.ndarray) -> int:
-    """Twice the lag beyond which no residual correlates, n^(1/3) at the least; 1 for settled poses."""
+    """Block length [samples]: twice the largest lag with a significant autocorrelation, at least n^(1/3); 1 for settled poses."""
     n = len(record.time)
     if not np.isfinite(record.sample_time):
         return 1
@@ -130,9 +136,10 @@ def bootstrap(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Bootstrap:
-    """Percentile intervals of every fitted number of `diagnosis`; the same for a seed wherever it runs.
+    """Percentile intervals of every fitted parameter of `diagnosis`.
 
-    A device whose functions cannot be sent to another process (lambdas of a user's device) is refitted here.
+    The result depends on `seed` alone, not on where the replicates run (see `ctrlgen.core.parallel`). A device whose
+    functions cannot be sent to another process (lambdas of a user's device) is refitted in this process.
     """
     fit, fitter = diagnosis.search.chosen.fit, diagnosis.fitter
     recording = replace(fitter.recording, records=tuple(fitter.fit_records))
@@ -154,7 +161,7 @@ def bootstrap(
 def _summary(
     structure: Structure, theta: np.ndarray, drawn: np.ndarray, blocks: tuple[int, ...], failed: tuple[str, ...]
 ) -> Bootstrap:
-    """Percentiles by path; the shares in which a finding vanished."""
+    """Percentiles by path, and the share of replicates in which each finding vanished."""
     values, vanished = {}, {}
     for i, unknown in enumerate(structure.free_parameters):
         if not len(drawn):
@@ -173,5 +180,5 @@ def _summary(
         if len(drawn) < BOOTSTRAP.fewest_replicates
         else ""
     )
-    note = f"residual blocks of {', '.join(map(str, sorted(set(blocks))))} samples, the structure held{few}"
+    note = f"residual blocks of {', '.join(map(str, sorted(set(blocks))))} samples, the model unchanged{few}"
     return Bootstrap(len(drawn), blocks, values, vanished, failed, note)

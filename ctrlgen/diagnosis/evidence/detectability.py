@@ -1,7 +1,8 @@
-"""What a recording could have shown: the smallest effect of each kind that would have been seen, and what stays hidden.
+"""Detectability: the smallest amplitude of each effect that a recording would have shown, and effects it cannot show.
 
-An amplitude a gives z = a/sd; it is seen where |z| exceeds the screen's threshold, and named where z^2 also exceeds what
-the search asks for. A law whose slope lies in the span of the free numbers' slopes cannot be seen at any size.
+An amplitude a has the score z = a/sd. It is detectable where |z| exceeds the threshold of the screen, and identifiable
+where z^2 also exceeds what the search requires of a cause. An effect whose sensitivity lies in the span of the free
+parameters' sensitivities is undetectable at any amplitude.
 """
 
 from __future__ import annotations
@@ -17,8 +18,14 @@ from ctrlgen.diagnosis.settings import DETECTABILITY, MODEL_SELECTION
 
 @dataclass(frozen=True)
 class SmallestDetectable:
-    """The smallest amplitude of one kind that would have been seen, `identifiable_from` which it would also have been named,
-    in `unit`, at the place where it shows most; `confusable_with` what it would be taken for there."""
+    """The smallest detectable amplitude of one effect, at the location where it shows most.
+
+    amplitude: name of the amplitude parameter.
+    detectable_from: smallest amplitude that exceeds the screen's threshold [unit].
+    identifiable_from: smallest amplitude that the search would also have accepted [unit].
+    confusable_with: (effect, location) of hypotheses with nearly the same effect on the readings.
+    by_location: detectable_from at every location [unit].
+    """
 
     effect: str
     location: str
@@ -32,7 +39,7 @@ class SmallestDetectable:
 
 @dataclass(frozen=True)
 class Undetectable:
-    """A cause that this recording cannot show, and what it hides behind."""
+    """A cause that this recording cannot show, and what masks it."""
 
     effect: str
     location: str
@@ -41,24 +48,24 @@ class Undetectable:
 
 @dataclass(frozen=True)
 class Detectability:
-    """`smallest` by kind, and the `hidden` causes."""
+    """The smallest detectable amplitudes by effect, and the undetectable causes."""
 
     smallest: dict[str, SmallestDetectable]
     undetectable: tuple[Undetectable, ...]
 
 
 def detectability(fit: Fit, screened: Screened, n: int) -> Detectability:
-    """What would have been seen besides the causes of `fit`, by the screen of its residual over `n` samples.
+    """Detectability of every hypothesis beside the causes of `fit`, from the screen of its residual over `n` samples.
 
-    Where `fit` leaves more than the noise, that counts as noise here.
+    Where the residual exceeds the noise, the residual takes the place of the noise.
     """
-    louder = max(1.0, (fit.chi2 / max(n, 1)) ** 0.5)
+    excess_factor = max(1.0, (fit.chi2 / max(n, 1)) ** 0.5)
     need = max(screened.threshold, MODEL_SELECTION.material_share * n**0.5)
     nominal = {path: number for path, _, number in numbers(fit.structure.device)}
     kinds: dict[str, dict[Hypothesis, tuple[float, float, str]]] = {}
     for suspect in screened.suspects:
         h = suspect.hypothesis
-        sd = louder * screened.amplitude_sd[h.effect, h.location]
+        sd = excess_factor * screened.amplitude_sd[h.effect, h.location]
         if h.effect == PARAMETER:
             unit, weight = written_unit(nominal[h.path].text), 1 / max(abs(nominal[h.path].si), 1e-300)
         else:
@@ -75,7 +82,7 @@ def detectability(fit: Fit, screened: Screened, n: int) -> Detectability:
         if h.path not in free
     )
     too_small = tuple(
-        Undetectable(h.effect, h.location, "the noise: it would show only beyond its bounds") for h in beyond
+        Undetectable(h.effect, h.location, "the noise: only an amplitude beyond its bounds would show") for h in beyond
     )
     return Detectability(smallest, undetectable + too_small)
 
@@ -106,14 +113,14 @@ def _smallest(
 
 
 def _masking_parameter(fit: Fit, column: int) -> str:
-    """The free number in words."""
+    """The free parameter `column` of the fit in words, or why there is none."""
     unknowns = fit.structure.free_parameters
     if column < 0:
-        return "nothing: it does not reach these readings"
+        return "nothing: it does not affect these readings"
     if column >= len(unknowns):
-        return "what the records start with"
+        return "the initial states of the records"
     unknown = unknowns[column]
     if unknown.cause is None:
-        return f"the device's own {unknown.path}"
+        return f"the device's parameter {unknown.path}"
     cause = fit.structure.causes[unknown.cause]
     return f"{cause.effect} at {cause.location}"

@@ -1,6 +1,6 @@
-"""A small family of drives for any device: what a next experiment may be chosen from.
+"""Excitation signals for any device, from which the next experiment is chosen.
 
-Shapes run over -1 ... 1 and are scaled into what the device's limits allow.
+Signals lie within -1 ... 1; `admissible` scales them as far as the limits of the device allow.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ctrlgen.recordings.recording import Record
 
 @dataclass(frozen=True, eq=False)
 class ExcitationSignal:
-    """A drive of order one, (n, n_u), with what it is in words."""
+    """A drive of order one, (n, n_u), and its description."""
 
     kind: str
     description: str
@@ -27,7 +27,7 @@ class ExcitationSignal:
 
 
 def time_series(n: int, n_u: int, rate: float, seed: int) -> Iterator[ExcitationSignal]:
-    """Series of `n` samples for `n_u` actuators; `rate` samples a second."""
+    """Signals of `n` samples for `n_u` actuators at `rate` samples a second; `seed` draws the phases."""
     rng, s = np.random.default_rng(seed), np.arange(n) / n
     for kind, highest in (("slow multisine", 40), ("fast multisine", n // 10)):
         harmonics = np.unique(np.geomspace(1, max(highest, 2), EXCITATION.lines).astype(int) // 2 * 2 + 1)
@@ -36,7 +36,7 @@ def time_series(n: int, n_u: int, rate: float, seed: int) -> Iterator[Excitation
         top = harmonics.max() * rate / n
         yield ExcitationSignal(kind, f"{kind}, odd lines up to {top:.3g} Hz", values / np.abs(values).max())
     triangle = 1 - 2 * np.abs(2 * ((2 * s + 0.25) % 1) - 1)
-    yield ExcitationSignal("slow triangle", "two slow triangles, without rest", _together(triangle, n_u))
+    yield ExcitationSignal("slow triangle", "two slow triangles without pauses", _together(triangle, n_u))
     levels = np.array(EXCITATION.levels)[
         np.minimum((s * len(EXCITATION.levels)).astype(int), len(EXCITATION.levels) - 1)
     ]
@@ -57,7 +57,7 @@ def time_series(n: int, n_u: int, rate: float, seed: int) -> Iterator[Excitation
 
 
 def pose_sets(n: int, n_u: int, seed: int) -> Iterator[ExcitationSignal]:
-    """Sets of `n` settled poses."""
+    """Sets of `n` settled poses for `n_u` actuators."""
     rng = np.random.default_rng(seed)
     turns, steps = np.arange(n) % n_u, np.arange(n) // n_u
     level = np.linspace(-1, 1, max(steps.max() + 1, 2))[steps]
@@ -65,7 +65,7 @@ def pose_sets(n: int, n_u: int, seed: int) -> Iterator[ExcitationSignal]:
         "one axis at a time", "each actuator alone over its range", level[:, None] * np.eye(n_u)[turns]
     )
     yield ExcitationSignal(
-        "all together", "all actuators alike over their range", _together(np.linspace(-1, 1, n), n_u)
+        "all together", "all actuators by the same share of their range", _together(np.linspace(-1, 1, n), n_u)
     )
     yield ExcitationSignal("corners", "every actuator at one of its ends", rng.choice([-1.0, 1.0], (n, n_u)))
     yield ExcitationSignal("anywhere", "poses spread evenly over the range", rng.uniform(-1, 1, (n, n_u)))
@@ -78,8 +78,11 @@ def _together(values: np.ndarray, n_u: int) -> np.ndarray:
 def admissible(
     shape: ExcitationSignal, simulator: Simulator, p: np.ndarray, template: Record, first: float
 ) -> tuple[Record, float] | None:
-    """`shape` as a record from time `first` [s] as strong as every limit of the device allows, and its strength; None
-    where even the weakest breaks one. `template` gives clock, convention and, where the device states none, the range.
+    """`shape` as a record that begins at `first` [s], with the largest strength (share of the drive's range) at which the
+    predicted motion keeps every limit of the device, and that strength; None where the smallest strength breaks a limit.
+
+    `template` gives the sample time, how drives run between samples and, where the device states none, the drive's range.
+    The strength is found by bisection, as if a stronger drive were never nearer to a limit.
     """
     low, high = simulator.model.u_bounds
     low = np.where(np.isfinite(low), low, template.drive.min(axis=0))
@@ -106,7 +109,7 @@ def admissible(
 
 
 def _kept(simulator: Simulator, p: np.ndarray, record: Record) -> bool:
-    """Whether the predicted motion breaks no limit."""
+    """Whether the motion that the simulator predicts with parameters `p` keeps every limit."""
     m = simulator.model
     after = simulate_motion(simulator, record, p, None)[1]
     if not np.all(np.isfinite(after)):

@@ -1,11 +1,13 @@
-"""Step 12: the next experiment, the drive that best separates what this recording leaves open.
+"""Experiment design: the drive that best discriminates between models that this recording cannot tell apart.
 
-T-optimal with refitted rivals (A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57), linearised: with Delta the
-difference of two rivals' whitened readings and J the slopes of the one that is refitted to the other's prediction,
+T-optimality with refitted rivals, linearised. With Delta (N,) the difference of two rivals' whitened readings and
+J (N, k) the sensitivities of the rival that is refitted to the other's prediction,
 
-    separation^2 = min over delta of |Delta - J delta|^2,
+    separation^2 = min over delta of |Delta - J delta|^2
 
-over this recording and the new one together; the smaller of both directions, in standard deviations.
+over this recording and the new one together; of the two directions the smaller, in standard deviations.
+
+Source: A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from ctrlgen.recordings.recording import Record
 
 @dataclass(frozen=True)
 class CandidateExperiment:
-    """One drive and the separation in standard deviations that it promises, with this recording."""
+    """One drive and the separation [standard deviations] that it and this recording together would give."""
 
     kind: str
     description: str
@@ -33,8 +35,12 @@ class CandidateExperiment:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """The best `drive` (a record without readings) between `rivals` (their causes), `separation` now and after it; all
-    `candidates`, best first."""
+    """The best drive to discriminate between two rivals.
+
+    rivals: the two models by their causes. reason: why these two.
+    before, after: separation [standard deviations] by this recording, and with the new one.
+    candidates: all drives considered, the best first. record: the best drive as a record without readings.
+    """
 
     rivals: tuple[str, str]
     reason: str
@@ -45,13 +51,13 @@ class Experiment:
 
     @property
     def settles(self) -> bool:
-        """Whether it would tell them apart."""
+        """Whether the separation with the new recording decides between them."""
         return self.after >= EXPERIMENT.settles
 
 
 def next_experiment(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 0) -> Experiment | None:
-    """The drive that best tells the chosen structure from its rivals or, where the recording stays unexplained, the two
-    most conspicuous suspects from one another; None where nothing is open that a drive of the family could settle."""
+    """The drive that best discriminates between the chosen model and its rivals or, where the recording stays unexplained,
+    between the two models that came closest; None where there is no such pair, or no admissible drive."""
     pairs, reason = _open(fitter, search, explained)
     if not pairs:
         return None
@@ -63,15 +69,15 @@ def next_experiment(fitter: Fitter, search: SearchResult, explained: bool, seed:
 
 
 def _open(fitter: Fitter, search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]], str]:
-    """Pairs of fits between which the recording does not decide."""
+    """Pairs of fits between which the recording does not decide, and why these."""
     rivals = sorted((t for rows in search.rivals for t in rows), key=lambda t: t.criterion)
     chosen = search.chosen.fit
     if rivals:
-        return [(chosen, t.fit) for t in rivals[: EXPERIMENT.most_rivals]], "both explain this recording alike"
+        return [(chosen, t.fit) for t in rivals[: EXPERIMENT.most_rivals]], "both explain this recording equally well"
     if explained or not search.rounds or search.rounds[-1].before.fit is not chosen:
         return [], ""
     tried: dict[str, Fit] = {}
-    for trial in search.rounds[-1].candidates:  # none of them was good enough
+    for trial in search.rounds[-1].candidates:  # none was accepted
         tried.setdefault(trial.cause.effect if trial.cause else "", trial.fit)
     closest = [*list(tried.values())[: EXPERIMENT.suspects], chosen][: EXPERIMENT.suspects]
     pairs = [(closest[0], closest[1])] if len(closest) == EXPERIMENT.suspects else []
@@ -79,7 +85,7 @@ def _open(fitter: Fitter, search: SearchResult, explained: bool) -> tuple[list[t
 
 
 def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:
-    """The drive of the family that best separates two fits."""
+    """The excitation signal that best separates two fits; None where none is admissible. `seed` draws the signals."""
     template = max(fitter.fit_records, key=lambda r: len(r.time))
     settled = not np.isfinite(template.sample_time)
     n, n_u = (
@@ -108,14 +114,14 @@ def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Expe
 
 
 def _named(fit: Fit, other: Fit) -> str:
-    """The causes that the other one does not have."""
+    """The causes that `other` does not have."""
     own = [c for c in fit.structure.causes if c not in other.structure.causes]
     return " and ".join(f"{c.effect} at {c.location}" for c in own) or "the device without it"
 
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """Inner products of J and Delta over some records, what the records start with projected out."""
+    """N = J'J, g = J'Delta, s = |Delta|^2 over some records, initial states projected out."""
 
     N: np.ndarray
     g: np.ndarray
@@ -123,8 +129,8 @@ class _Sums:
 
     @property
     def separation(self) -> float:
-        """Standard deviations that are left when J has taken what it can."""
-        if not (np.isfinite(self.N).all() and np.isfinite(self.g).all()):  # the motion left the numbers
+        """Norm of Delta after the best refit within J [standard deviations]; NaN where the motion diverged."""
+        if not (np.isfinite(self.N).all() and np.isfinite(self.g).all()):
             return float("nan")
         d = np.sqrt(np.maximum(np.diag(self.N), 1e-300))
         taken = (self.g / d) @ np.linalg.pinv(self.N / np.outer(d, d), rcond=1e-12) @ (self.g / d)
@@ -132,14 +138,14 @@ class _Sums:
 
     @classmethod
     def present(cls, fitter: Fitter, truth: Fit, refitted: Fit) -> _Sums:
-        """On the records to fit; the rows of the prior hold the refitted one's numbers."""
+        """Over the records to fit. Prior rows of the refitted model keep its parameters near their stated values."""
         n = sum(r.valid.size for r in fitter.fit_records)
         delta = np.zeros(len(refitted.residual))
         delta[:n] = refitted.residual[:n] - truth.residual[:n]
         return cls._of(-refitted.J, delta, len(refitted.theta))
 
     def plus(self, fitter: Fitter, truth: Fit, refitted: Fit, record: Record) -> _Sums:
-        """With one record more."""
+        """The same with one more record."""
         simulator = refitted.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
         y, slopes = simulator.sensitivities(record, refitted.theta)
         other = truth.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]

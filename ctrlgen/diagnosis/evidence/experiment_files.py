@@ -1,4 +1,4 @@
-"""The next experiment as files: the drive as CSV, a recording.toml to fill in, and a scenario that the solver runs."""
+"""Files of the next experiment: the drive as CSV, a recording.toml to complete, and a scenario for the solver."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ DRIVE, RECORDING, SCENARIO, COMMAND = "drive.csv", "recording.toml", "scenario.t
 
 
 def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
-    """Contents by file name. `device_file` is the device as the diagnosis corrected it, seen from these files.
+    """Contents by file name. `device_file` is the path of the corrected device file, relative to these files.
 
-    A device in which masses move has no scenario: the solver knows devices that stand in balance.
+    A device with inertia gets no scenario: the solver handles devices in quasi-static balance.
     """
     record = chosen.record
     simulator = fit.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
@@ -31,7 +31,7 @@ def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dic
 
 
 def _solved(m: Model) -> bool:
-    """Whether the solver knows the device: it stands in balance and carries something in space."""
+    """Whether the solver handles the device: quasi-static balance, and a platform with several pose channels."""
     return isinstance(m.device.physics(m.device.values()), BalancedPhysics) and len(m.signals["pose"].channels) > 1
 
 
@@ -52,12 +52,12 @@ def _drive(simulator: Simulator, chosen: Experiment) -> str:
 
 
 def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
-    """A recording.toml that names the drive's columns and leaves the readings' to the reader."""
+    """A recording.toml for the experiment; the readings are to be added under the column names that it gives."""
     recording, record, signal = fitter.recording, chosen.record, simulator.model.signals["drive"]
     n = len(record.drive)
     cut = int(EXPERIMENT.fitted_share * n)
     lines = [
-        f"# {chosen.candidates[0].description}. Add the readings as columns of {DRIVE}, under the names below.",
+        f"# {chosen.candidates[0].description}. Add the readings to {DRIVE} as columns with the names below.",
         f"title  = {json.dumps(f'next experiment after: {recording.title}')}",
         f"device = {json.dumps(recording.device)}",
         f"kind   = {json.dumps(recording.kind)}",
@@ -79,7 +79,7 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
 
 
 def _scenario(simulator: Simulator, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
-    """The predicted displacements as a command; the solver finds the drives again."""
+    """A scenario whose command is the predicted displacement; the solver finds the drives from it."""
     m, record = simulator.model, chosen.record
     after = simulate_motion(simulator, record, fit.theta, None)[1]
     f = ca.Function("z", [ca.vertcat(m.x, m.z)], [m.z]).map(len(after))

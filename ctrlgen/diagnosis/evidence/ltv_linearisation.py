@@ -1,10 +1,9 @@
-"""A fitted structure linearised along the motion of one record: how a disturbance at any place and moment reaches the
-readings.
+"""Linear time-varying (LTV) model of a fitted structure along the motion of one record.
 
     D+ = F_S D + F_f f,   y = H_S D + H_f f
 
-f are the probes' disturbances, in the unit of their place, D what they do to the state. What is left of a recording is
-judged in the coordinates of the readings (`residual`, `white`) or, through these slopes, in those of the actuators.
+f are small disturbances at one place, in its unit; D is the change of the state that they cause, y that of the readings.
+The residual of a record can so be expressed as readings or as an equivalent disturbance of the axes.
 """
 
 from __future__ import annotations
@@ -25,11 +24,13 @@ from ctrlgen.recordings.recording import Record
 
 @dataclass(frozen=True, eq=False)
 class LtvModel:
-    """One record along the motion of one fit, SI.
+    """The LTV model of one fit along one record, in SI units.
 
-    `residual` (n, n_y) observed - predicted, zero where not valid; `white` the same as unit white noise, zero where not
-    `usable`; `displacement` and `velocity` (n, n_axes); `F_S`, `F_f`, `H_S`, `H_f` (n, ., .) with one column of f for
-    each axis at `place`; `start_sd` (n_s,) how far the state may start from rest, `state_scale` its typical size.
+    place, axes, units: where the disturbance enters, its channels and their units.
+    residual: observed - predicted (n, n_y), zero where not valid. white: the whitened residual, zero where not `usable`.
+    displacement, velocity: of the axes (n, n_axes).
+    F_S, F_f, H_S, H_f: matrices of the LTV model (n, ., .), with one column of f per axis.
+    start_sd: standard deviation of the initial state (n_s,). state_scale: typical size of the state (n_s,).
     """
 
     record: Record
@@ -51,11 +52,11 @@ class LtvModel:
 
     @property
     def settled(self) -> bool:
-        """Whether the samples are separate poses."""
+        """Whether the samples are settled poses."""
         return not np.isfinite(self.record.sample_time)
 
     def readings(self, f: np.ndarray, axis: np.ndarray) -> np.ndarray:
-        """What disturbances f (n, m), column j at `axis`[j], add to the readings: (n, n_y, m), SI."""
+        """Change of the readings (n, n_y, m) by disturbances f (n, m), of which column j acts on axis `axis`[j], SI."""
         following = f if self.settled else np.vstack([f[1:], f[-1:]])
         into = self.F_f[:, :, axis] * ((f + following) / 2)[:, None, :]
         direct = self.H_f[:, :, axis] * f[:, None, :]
@@ -67,24 +68,24 @@ class LtvModel:
         return self.H_S @ states + direct
 
     def steady(self) -> np.ndarray:
-        """Readings per lasting unit disturbance (n_y, n_axes), SI, where the motion is typical (its middle sample)."""
+        """Static gain (n_y, n_axes) from disturbances to readings at the middle sample of the record, SI."""
         k = len(self.F_S) // 2
         held = np.linalg.lstsq(np.eye(self.F_S.shape[1]) - self.F_S[k], self.F_f[k], rcond=1e-10)[0]
         return self.H_S[k] @ held + self.H_f[k]
 
     def direction(self) -> np.ndarray:
-        """Sign of the motion of each axis, (n, n_axes), 0 where it stands."""
+        """Sign of the velocity of each axis (n, n_axes), 0 at standstill."""
         fastest = np.abs(self.velocity).max(axis=0)
         return np.where(np.abs(self.velocity) > LTV_MODEL.standing * fastest, np.sign(self.velocity), 0.0)
 
 
 def unknown_input_place(physics: DevicePhysics) -> Place:
-    """Where unknown physics is sought: a force, where one moves a mass or is read; else a displacement."""
+    """Place of the unknown input: a force for devices with inertia or with measured force, else a displacement."""
     return Place.DISPLACEMENT if isinstance(physics, BalancedPhysics) else Place.FORCE
 
 
 def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
-    """The linearisation of `fit` along `record`."""
+    """The LTV model of `fit` along `record`."""
     physics = nominal_physics(fit.structure.device)
     place = unknown_input_place(physics)
     simulator, p, chosen = _probed(fitter, fit, record, place)
@@ -112,7 +113,7 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
 
 
 def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Simulator, np.ndarray, list[int]]:
-    """The response with probes, its parameters, and which of them are the probes at `place`."""
+    """A simulator with disturbance inputs, its parameters, and the positions of the inputs at `place` among them."""
     known = [unknown.path for unknown in fit.structure.free_parameters]
     device, probes = with_disturbance_inputs(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
@@ -126,7 +127,7 @@ def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Sim
 
 
 def _start(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray | None:
-    """What a record to fit was found to start with; others are linearised along the motion from rest."""
+    """The fitted initial state of a record to fit; None for others, which are linearised along the motion from rest."""
     places = [k for k, r in enumerate(fitter.fit_records) if r is record]
     return fit.initial_states[places[0]] if places and fit.initial_states else None
 
@@ -134,7 +135,7 @@ def _start(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray | None:
 def simulate_motion(
     r: Simulator, record: Record, p: np.ndarray, start: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """S before and after each sample, (n, n_s), and the readings (n, n_y)."""
+    """State before and after each sample (n, n_s), and the readings (n, n_y)."""
     after, y = r.simulate_states(record, p, start)
     return np.vstack([r._start(record, p, start), after[:-1]]), after, y
 
@@ -152,7 +153,7 @@ def _linearised(
 
 
 def _velocity(r: Simulator, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Of the axes, (n, n_axes) [SI]; between settled poses the step from the pose before."""
+    """Velocity of the axes (n, n_axes) [SI]; for settled poses the step from the previous pose."""
     n_v = r.model.v.numel()
     if n_v:
         return at[:, r.n_x - n_v : r.n_x]

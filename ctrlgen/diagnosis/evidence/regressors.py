@@ -1,4 +1,4 @@
-"""What an unknown force might depend on: dimensionless features of position, speed, history and drive."""
+"""Regressors for an unknown force: dimensionless features of position, velocity, history and drive."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ctrlgen.diagnosis.settings import REGRESSORS
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """What features are counted in: the largest `travel` and `speed` [SI] of an axis, the largest `drives` (n_u,), the
-    longest `time` [s]; `lags` [s] the relaxation times."""
+    """Scales of the features: largest displacement and speed of an axis [SI], largest drives (n_u,), largest time [s], and
+    the time constants of the low-pass features [s]."""
 
     travel: float
     speed: float
@@ -24,7 +24,7 @@ class Scales:
 
 
 def scales_of(to_fit: list[LtvModel], axis: int) -> Scales:
-    """Of the records to fit."""
+    """Scales of the records to fit for one axis."""
     travel, speed = (
         max(float(np.abs(getattr(a, k)[:, axis]).max()) for a in to_fit) for k in ("displacement", "velocity")
     )
@@ -35,35 +35,35 @@ def scales_of(to_fit: list[LtvModel], axis: int) -> Scales:
     return Scales(travel or 1.0, speed or 1.0, np.where(drives > 0, drives, 1.0), time or 1.0, lags)
 
 
-def features(left: LtvModel, axis: int, size: Scales) -> dict[str, np.ndarray]:
-    """Features (n,) by their formula, of order one. Separate poses have neither speed nor history."""
-    d = left.displacement[:, axis] / size.travel
-    found = {"1": np.ones_like(d), "d": d, "d^2": d**2, "d^3": d**3, "d^4": d**4, "d^5": d**5, "|d|": np.abs(d)}
-    found |= {f"max(d - {x:g}, 0)": np.maximum(d - x, 0) for x in REGRESSORS.stops}
-    found |= {f"min(d + {x:g}, 0)": np.minimum(d + x, 0) for x in REGRESSORS.stops}
-    for k, u in enumerate((left.record.drive / size.drives).T):
-        found |= {f"u{k + 1}": u, f"u{k + 1}^2": u**2, f"u{k + 1}^3": u**3}
-    for k, other in enumerate(left.displacement.T / size.travel):
+def features(model: LtvModel, axis: int, size: Scales) -> dict[str, np.ndarray]:
+    """Features (n,) of order one by their formula; settled poses have no velocity and no history."""
+    d = model.displacement[:, axis] / size.travel
+    columns = {"1": np.ones_like(d), "d": d, "d^2": d**2, "d^3": d**3, "d^4": d**4, "d^5": d**5, "|d|": np.abs(d)}
+    columns |= {f"max(d - {x:g}, 0)": np.maximum(d - x, 0) for x in REGRESSORS.stops}
+    columns |= {f"min(d + {x:g}, 0)": np.minimum(d + x, 0) for x in REGRESSORS.stops}
+    for k, u in enumerate((model.record.drive / size.drives).T):
+        columns |= {f"u{k + 1}": u, f"u{k + 1}^2": u**2, f"u{k + 1}^3": u**3}
+    for k, other in enumerate(model.displacement.T / size.travel):
         if k != axis:
-            found |= {f"d({left.axes[k]})": other, f"d d({left.axes[k]})": d * other}
-    if left.settled:
-        return found
-    v = left.velocity[:, axis] / size.speed
-    found |= {"v": v, "v|v|": v * np.abs(v), "v^3": v**3, "d v": d * v, "d^2 v": d**2 * v, "|v|": np.abs(v)}
-    found["sign(v)"] = np.tanh(v / REGRESSORS.soft_sign)
-    found["|d| sign(v)"] = np.abs(d) * found["sign(v)"]
+            columns |= {f"d({model.axes[k]})": other, f"d d({model.axes[k]})": d * other}
+    if model.settled:
+        return columns
+    v = model.velocity[:, axis] / size.speed
+    columns |= {"v": v, "v|v|": v * np.abs(v), "v^3": v**3, "d v": d * v, "d^2 v": d**2 * v, "|v|": np.abs(v)}
+    columns["sign(v)"] = np.tanh(v / REGRESSORS.soft_sign)
+    columns["|d| sign(v)"] = np.abs(d) * columns["sign(v)"]
     plays = play(d, np.array(REGRESSORS.plays))
-    found |= {f"play(d, {r:g})": d - p for r, p in zip(REGRESSORS.plays, plays.T, strict=True)}
+    columns |= {f"play(d, {r:g})": d - p for r, p in zip(REGRESSORS.plays, plays.T, strict=True)}
     for tau in size.lags:
-        a = np.exp(-left.record.sample_time / tau)
-        for name, x in (("d", d), ("d^2", d**2), ("u1^2", found["u1^2"])):
-            found[f"lag({name}, {tau:.3g} s)"] = lfilter([0.0, 1 - a], [1.0, -a], x)
-    found["t"] = left.record.time / size.time
-    return found
+        a = np.exp(-model.record.sample_time / tau)
+        for name, x in (("d", d), ("d^2", d**2), ("u1^2", columns["u1^2"])):
+            columns[f"lag({name}, {tau:.3g} s)"] = lfilter([0.0, 1 - a], [1.0, -a], x)
+    columns["t"] = model.record.time / size.time
+    return columns
 
 
 def play(d: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """p = max(d - r, min(d + r, p)), (n, len(r)): what follows d with the slack r."""
+    """Play operators p = max(d - r, min(d + r, p)) of half widths r: (n, len(r))."""
     p, out = np.full(len(r), d[0]), np.empty((len(d), len(r)))
     low, high = d[:, None] - r, d[:, None] + r
     for k in range(len(d)):

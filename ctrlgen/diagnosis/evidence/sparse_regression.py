@@ -1,7 +1,8 @@
-"""An empirical term for what no law explains: a sparse sum of the features of `memory`.
+"""Sparse regression: an empirical term for a residual that no known effect explains.
 
-Each feature is sent through the linearised device and fitted jointly with the free numbers, r = W(S a + J delta); terms
-are added while BIC and the excess gain. It is a description, not a cause, and never gets a physical name.
+Each regressor is propagated through the LTV model of the device to whitened readings S (N, m), and fitted jointly with
+the free parameters, r = S a + J delta. Regressors are added by forward selection while the gain exceeds BIC's penalty and
+a share of the excess. The term describes the residual; it is not a cause and gets no physical name.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from ctrlgen.diagnosis.settings import SPARSE_REGRESSION
 
 @dataclass(frozen=True)
 class EmpiricalTerm:
-    """sum of `terms` (coefficient [`unit`] by feature) at `axis`; d is counted in `travel`, v in `speed`, u in `drives`
-    (SI). `held_out_gain` is the share of the squares left over the noise on the held-out records that goes with it."""
+    """A sum of features at one axis.
+
+    terms: coefficient [unit] by feature; d, v, u stand for position, speed and drives over `travel`, `speed`, `drives` (SI).
+    held_out_gain: share of the held-out excess that the term explains.
+    """
 
     label: str
     axis: str
@@ -32,15 +36,15 @@ class EmpiricalTerm:
     held_out_gain: float
 
 
-def fit_empirical_term(fitter: Fitter, fit: Fit, left: list[LtvModel], i: int) -> EmpiricalTerm | None:
-    """The term at axis `i` for what `fit` leaves, None where the held-out records do not gain by it."""
-    to_fit = [a for a in left if a.record.role == "fit"]
+def fit_empirical_term(fitter: Fitter, fit: Fit, models: list[LtvModel], i: int) -> EmpiricalTerm | None:
+    """The term at axis `i` for the residual of `fit`; None where none is selected or the held-out excess does not fall."""
+    to_fit = [a for a in models if a.record.role == "fit"]
     size = scales_of(to_fit, i)
     parts = [_slopes(fitter, a, i, size) for a in to_fit]
     names, S = parts[0][1], np.vstack([values for values, _ in parts])
     scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
-    J, n = fit.J / scale, len(S)  # below the n readings stands the prior, which knows no feature
+    J, n = fit.J / scale, len(S)  # the rows below the n readings are the prior, in which no regressor appears
     into = np.linalg.pinv(J.T @ J, rcond=1e-12) @ (J[:n].T @ S)
     G = S.T @ S - (J[:n].T @ S).T @ into
     c = S.T @ fit.residual[:n] - into.T @ (J.T @ fit.residual)
@@ -48,28 +52,31 @@ def fit_empirical_term(fitter: Fitter, fit: Fit, left: list[LtvModel], i: int) -
     if not np.any(a):
         return None
     delta = (into @ a / scale)[: len(fit.theta)]
-    held = [_held(fitter, fit, h, _slopes(fitter, h, i, size)[0] @ a, delta) for h in left if h.record.role != "fit"]
+    held = [_held(fitter, fit, h, _slopes(fitter, h, i, size)[0] @ a, delta) for h in models if h.record.role != "fit"]
     before, after = (sum(part) for part in zip(*held, strict=True))
     if not (before > 0 and 1 - after / before > SPARSE_REGRESSION.least_share):
         return None
-    unit = left[0].units[i]
+    unit = models[0].units[i]
     terms = {name: float(difference(value, unit)) for name, value in zip(names, a, strict=True) if value}
     drives = tuple(float(u) for u in size.drives)
     return EmpiricalTerm(
-        "empirical", left[0].axes[i], terms, unit, size.travel, size.speed, drives, float(1 - after / before)
+        "empirical", models[0].axes[i], terms, unit, size.travel, size.speed, drives, float(1 - after / before)
     )
 
 
 def _slopes(fitter: Fitter, a: LtvModel, i: int, size: Scales) -> tuple[np.ndarray, list[str]]:
-    """Whitened readings per unit [SI] of each feature, (n * n_y, features)."""
+    """Whitened readings per unit [SI] of each regressor (n * n_y, m), and the regressors' names."""
     given = features(a, i, size)
     y = a.readings(np.column_stack(list(given.values())), np.full(len(given), i))
     return np.nan_to_num(fitter.noise.whiten(y, a.record.valid).reshape(-1, len(given))), list(given)
 
 
 def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n: int) -> np.ndarray:
-    """Coefficients by forward selection, zero where a feature was not chosen; `G`, `c` the inner products of projected
-    slopes with one another and with the residual, `squares` of the slopes before projection."""
+    """Coefficients (m,) by forward selection, zero where a regressor was not chosen.
+
+    G (m, m), c (m,): inner products of the regressors, projected off the free parameters, with one another and with the
+    residual; squares (m,): of the regressors before projection; n: usable samples.
+    """
     size = np.sqrt(np.where(squares > 0, squares, 1.0))
     G, c = G / np.outer(size, size), c / size
     chosen: list[int] = []
@@ -92,14 +99,14 @@ def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n:
 
 
 def _held(fitter: Fitter, fit: Fit, held: LtvModel, term: np.ndarray, delta: np.ndarray) -> tuple[float, float]:
-    """Excess squares of one held-out record without the term and with it, the start fitted anew."""
+    """Excess squares of one held-out record without the term and with it; the initial state is refitted."""
     simulator = fit.structure.simulators(fitter.recording, fitter.cache)[held.record.sample_time, held.record.linear]
     slopes = simulator.sensitivities(held.record, fit.theta)[1]
     Y = np.nan_to_num(fitter.noise.whiten(slopes, held.record.valid)).reshape(
         held.record.valid.size, -1 if slopes.size else 0
     )
     r = held.white.ravel()
-    # fit.J is the residual's slope, hence + : the numbers move back by what the term takes over
+    # fit.J is the derivative of the residual, so the parameters move by +delta where the term takes over their part
     changed = r - term - Y[:, : len(delta)] @ delta
     starts = Y[:, len(delta) :] * held.start_sd[held.start_sd > 0][None, : Y.shape[1] - len(delta)]
     with_prior = np.vstack([starts, np.eye(starts.shape[1])])

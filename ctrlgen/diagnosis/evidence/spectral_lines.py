@@ -1,8 +1,9 @@
-"""The class of a nonlinearity from a periodic drive, without any model.
+"""Odd and even nonlinearity from the response to a periodic drive, without a model.
 
-A linear system answers at the lines it is excited at; an even nonlinearity at even harmonics of the period, an odd one
-at odd ones; the noise is what differs from period to period. R. Pintelon, J. Schoukens, System Identification: A
-Frequency Domain Approach, 2nd ed. (2012), chapter 4.
+A linear system responds at the excited lines only; an even nonlinearity also at even harmonics of the period, an odd one
+at odd harmonics. The noise is estimated from the variation between periods.
+
+Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. (2012), chapter 4.
 """
 
 from __future__ import annotations
@@ -20,8 +21,11 @@ from ctrlgen.recordings.recording import Record
 
 @dataclass(frozen=True)
 class SpectralLines:
-    """Root mean square per kind of line, in `unit`: at excited lines, at odd and even ones that are not excited, and
-    of the noise in as many lines; None where there is no such line."""
+    """Response of one reading by kind of spectral line, root mean square [unit].
+
+    excited: at the lines of the drive. odd, even: at harmonics that are not excited, None without such lines.
+    noise: of the noise in as many lines. p_odd, p_even: p-values of these lines under noise alone.
+    """
 
     record: str
     channel: str
@@ -37,7 +41,7 @@ class SpectralLines:
 
 
 def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralLines | None:
-    """The lines of reading `i`; None where the drive does not repeat three times or readings are missing."""
+    """Spectral lines of reading `i`; None where the drive has fewer than three periods or readings are missing."""
     P = drive_period(record.drive)
     if P is None or len(record.time) < 3 * P:
         return None
@@ -45,7 +49,9 @@ def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralL
     if not record.valid[P : whole * P, i].all():
         return None
     drive = np.abs(np.fft.rfft(record.drive[:P], axis=0))[1:] / P
-    spectra = np.fft.rfft(record.observed[P : whole * P, i].reshape(-1, P), axis=1)[:, 1:] / P  # the first settles
+    spectra = (
+        np.fft.rfft(record.observed[P : whole * P, i].reshape(-1, P), axis=1)[:, 1:] / P
+    )  # without the first period, in which the device settles
     m = len(spectra)
     if m < 2:
         return None
@@ -55,7 +61,7 @@ def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralL
     if not excited.any():
         return None
     mean = spectra.mean(axis=0)
-    noise = np.sum(np.abs(spectra - mean) ** 2, axis=0) / (m - 1) / m  # variance of the mean, per line
+    noise = np.sum(np.abs(spectra - mean) ** 2, axis=0) / (m - 1) / m  # variance of the mean over periods, by line
     near = harmonics <= SPECTRAL_LINES.highest * harmonics[excited].max()
     kinds = {"odd": harmonics % 2 == 1, "even": harmonics % 2 == 0}
     levels, p = {}, {}
@@ -71,12 +77,12 @@ def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralL
 
 
 def _rms(squares: np.ndarray, unit: str) -> float:
-    """Of the time signal that these lines make up: sum of 2|Y_k|^2."""
+    """Root mean square of the signal with these lines, from |Y_k|^2 [unit]."""
     return float(difference(np.sqrt(2 * np.sum(squares)), unit))
 
 
 def _p(mean: np.ndarray, noise: np.ndarray, m: int) -> float:
-    """Chance that lines of noise alone are this high: F test of squares of the mean over their variance."""
+    """p-value of lines as large as these under noise alone: F test of the mean's squares against their variance."""
     f = float(np.sum(np.abs(mean) ** 2) / max(np.sum(noise), 1e-300))
     return float(stats.f.sf(f, 2 * len(mean), 2 * len(mean) * (m - 1)))
 
@@ -86,11 +92,13 @@ def _statement(p: dict[str, float | None], both: bool) -> str:
         (p[kind] or 0.0) < SPECTRAL_LINES.answer_p if p[kind] is not None else False for kind in ("odd", "even")
     )
     if not odd and not even:
-        return "answers only where it is driven: what is missing is linear and fixed in time, or below the noise"
+        return (
+            "response at the excited lines only: what the model lacks is linear and time-invariant, or below the noise"
+        )
     if both:
-        return "a nonlinearity: odd or even cannot be told, for the drive holds lines of both kinds"
+        return "a nonlinearity; whether odd or even cannot be told, because the drive has lines of both kinds"
     if odd and even:
-        return "a nonlinearity with an odd part (cubic, friction, hysteresis) and an even one (bias, square, one-sided)"
+        return "a nonlinearity with an odd part (cubic, friction, hysteresis) and an even part (bias, square, one-sided stop)"
     return (
         "an odd nonlinearity (cubic, friction, hysteresis, saturation)"
         if odd

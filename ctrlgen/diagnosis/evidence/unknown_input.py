@@ -1,8 +1,10 @@
-"""The free force (or displacement) that would explain what a fit leaves, sample by sample.
+"""Unknown-input estimation: the force (or displacement) at each sample that would explain the residual of a fit.
 
-State (D, f) with D+ = F_S D + F_f f, f+ = f + w (separate poses: f+ = w), y = H_S D + H_f f + e. Kalman filter and the
-smoother of A. E. Bryson, M. Frazier, TDR-63-119 (1963), which inverts no covariance. How fast f may change is what makes
-the recording most likely; e is the noise.
+The input f is a random walk, f+ = f + w; for settled poses it is independent from pose to pose, f+ = w. With the LTV model
+D+ = F_S D + F_f f, y = H_S D + H_f f + e, a Kalman filter and the smoother of Bryson and Frazier, which inverts no state
+covariance, give its conditional mean and standard deviation. The variance of w maximises the likelihood; e is the noise.
+
+Source: A. E. Bryson, M. Frazier, Smoothing for linear and nonlinear dynamic systems, TDR-63-119 (1963).
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from ctrlgen.diagnosis.settings import UNKNOWN_INPUT
 
 @dataclass(frozen=True, eq=False)
 class UnknownInput:
-    """Along one record: `f` (n, n_axes) [SI] with its standard deviation `sd`, and the `speed` chosen."""
+    """Input of one record: `f` (n, n_axes) [SI], its standard deviation `sd`, and the variance of its random walk, relative."""
 
     model: LtvModel
     f: np.ndarray
@@ -26,47 +28,51 @@ class UnknownInput:
     speed: float
 
 
-def estimate_unknown_input(left: LtvModel, noise: Noise, size: np.ndarray) -> UnknownInput:
-    """The most likely disturbance of typical `size` (n_axes,) [SI] along one record."""
-    problem = _Problem(left, noise, size)
-    speeds = UNKNOWN_INPUT.pose_random_walks if left.settled else UNKNOWN_INPUT.random_walks
+def estimate_unknown_input(model: LtvModel, noise: Noise, size: np.ndarray) -> UnknownInput:
+    """The unknown input along one record; `size` (n_axes,) [SI] is its typical size, in which the random walk is counted."""
+    problem = _Problem(model, noise, size)
+    speeds = UNKNOWN_INPUT.pose_random_walks if model.settled else UNKNOWN_INPUT.random_walks
     start = max(
         0,
-        int(np.argmax(np.convolve(np.sum(left.white**2, axis=1), np.ones(UNKNOWN_INPUT.tried_samples))[: problem.n]))
+        int(np.argmax(np.convolve(np.sum(model.white**2, axis=1), np.ones(UNKNOWN_INPUT.tried_samples))[: problem.n]))
         - UNKNOWN_INPUT.tried_samples,
     )
     likely = problem.likelihood(np.array(speeds), start, min(start + UNKNOWN_INPUT.tried_samples, problem.n))
     speed = speeds[int(np.argmax(likely))]
     f, sd = problem.smoothed(speed)
-    return UnknownInput(left, f, sd, float(speed))
+    return UnknownInput(model, f, sd, float(speed))
 
 
 class _Problem:
-    """The augmented linear system of one record, in numbers of order one."""
+    """The augmented system (D, f) of one record, scaled to order one."""
 
-    def __init__(self, left: LtvModel, noise: Noise, size: np.ndarray) -> None:
-        self.n = min(len(left.white), UNKNOWN_INPUT.most_samples)
-        self.m, self.k = left.F_S.shape[1], left.F_f.shape[2]
-        self.left, self.size = left, size
-        density = noise.sd / np.array([1 - min(np.sum(a), 0.99) for a in noise.ar])  # coloured noise counts as white of
-        self.sd = np.maximum(density, noise.floor)  # its density at rest, so that slow noise is no force
-        self.residual = left.residual / self.sd
-        scale = np.concatenate([np.where(left.start_sd > 0, left.start_sd, left.state_scale), size])
+    def __init__(self, model: LtvModel, noise: Noise, size: np.ndarray) -> None:
+        self.n = min(len(model.white), UNKNOWN_INPUT.most_samples)
+        self.m, self.k = model.F_S.shape[1], model.F_f.shape[2]
+        self.model, self.size = model, size
+        density = noise.sd / np.array(
+            [1 - min(np.sum(a), 0.99) for a in noise.ar]
+        )  # coloured noise is taken as white noise
+        self.sd = np.maximum(
+            density, noise.floor
+        )  # of its density at zero frequency, so that slow noise does not appear as a force
+        self.residual = model.residual / self.sd
+        scale = np.concatenate([np.where(model.start_sd > 0, model.start_sd, model.state_scale), size])
         self.up, self.down = scale, 1 / scale
-        self.P_0 = np.diag(np.concatenate([left.start_sd > 0, np.ones(self.k)]).astype(float))
+        self.P_0 = np.diag(np.concatenate([model.start_sd > 0, np.ones(self.k)]).astype(float))
 
     def _step(self, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """A from sample k to k + 1, and H at k."""
+        """Transition matrix from sample k to k + 1, and output matrix at k."""
         m, total = self.m, self.m + self.k
         A = np.zeros((total, total))
-        if not self.left.settled:
-            A[:m, :m], A[:m, m:] = self.left.F_S[k], self.left.F_f[k]
+        if not self.model.settled:
+            A[:m, :m], A[:m, m:] = self.model.F_S[k], self.model.F_f[k]
             A[m:, m:] = np.eye(self.k)
-        H = np.hstack([self.left.H_S[k], self.left.H_f[k]])
+        H = np.hstack([self.model.H_S[k], self.model.H_f[k]])
         return self.down[:, None] * A * self.up, H * self.up / self.sd[:, None]
 
     def _noise(self, k: int) -> np.ndarray:
-        return np.where(self.left.record.valid[k], 1.0, UNKNOWN_INPUT.missing_variance)
+        return np.where(self.model.record.valid[k], 1.0, UNKNOWN_INPUT.missing_variance)
 
     def _change(self, speed: float | np.ndarray) -> np.ndarray:
         Q = np.zeros((*np.shape(speed), self.m + self.k, self.m + self.k))
@@ -75,7 +81,7 @@ class _Problem:
         return Q
 
     def _update(self, k: int, x: np.ndarray, P: np.ndarray, H: np.ndarray) -> tuple[np.ndarray, ...]:
-        """v, S^-1, S, I - K H and x, P after the reading (Joseph's form), for one filter or several."""
+        """Innovation v, S^-1, S, I - K H, and x, P after the measurement update (Joseph form), for one filter or several."""
         R = self._noise(k)
         S = H @ P @ H.T + np.diag(R)
         inverse = np.linalg.inv(S)
@@ -86,9 +92,9 @@ class _Problem:
         return v, inverse, S, C, x + (K @ v[..., None])[..., 0], P
 
     def likelihood(self, speeds: np.ndarray, first: int, last: int) -> np.ndarray:
-        """Log likelihood of each speed on samples `first` ... `last`, all filters side by side."""
+        """Log likelihood of each random-walk variance on samples `first` ... `last`; all filters run side by side."""
         Q = self._change(speeds)
-        P = Q if self.left.settled else np.broadcast_to(self.P_0, Q.shape)
+        P = Q if self.model.settled else np.broadcast_to(self.P_0, Q.shape)
         x, total = np.zeros((len(speeds), len(self.up))), np.zeros(len(speeds))
         for k in range(first, last):
             A, H = self._step(k)
@@ -98,9 +104,9 @@ class _Problem:
         return total
 
     def smoothed(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """f (n, n_axes) and its standard deviation [SI], given the whole record."""
+        """Smoothed f (n, n_axes) and its standard deviation [SI], given the whole record."""
         n, m, total, Q = self.n, self.m, len(self.up), self._change(speed)
-        x, P = np.zeros(total), Q if self.left.settled else self.P_0
+        x, P = np.zeros(total), Q if self.model.settled else self.P_0
         xs, Ps, kept = np.empty((n, total)), np.empty((n, total, total)), []
         for k in range(n):
             A, H = self._step(k)

@@ -1,7 +1,7 @@
-"""Step 10: physics that no law of the library is. Its force, sample by sample, as maps; and an empirical term for it.
+"""Unmodelled dynamics: the unknown input that would explain the residual, what it depends on, and an empirical term for it.
 
-The maps show the free force of `free` against position, speed, time and, apart for forward and backward motion,
-position again.
+Dependence maps show the estimated input against position, velocity, time and temperature, and against position for
+forward and backward motion apart.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ from ctrlgen.diagnosis.settings import MAPS, STATISTICS
 
 @dataclass(frozen=True)
 class DependenceMap:
-    """The mean disturbance in bins of one coordinate, with 95 % intervals; `variance_share` of its variance that goes with it."""
+    """Mean of the unknown input [value_unit] in bins of one coordinate [unit], with 95 % intervals.
+
+    variance_share: share of the input's variance that the bin means explain.
+    """
 
     coordinate: str
     unit: str
@@ -35,7 +38,7 @@ class DependenceMap:
 
 @dataclass(frozen=True, eq=False)
 class UnmodelledForce:
-    """The free disturbance of each axis (`quantity`, `unit`), root mean square, its maps, and the empirical term."""
+    """The unknown input of each axis: kind, rms [unit], dependence maps, empirical term, statements, estimates by record."""
 
     quantity: str
     rms: dict[str, float]
@@ -46,52 +49,56 @@ class UnmodelledForce:
     estimates: tuple[UnknownInput, ...]
 
 
-def describe_unmodelled_force(fitter: Fitter, fit: Fit, left: list[LtvModel]) -> UnmodelledForce:
-    """What would explain the rest of `fit`; `left` its linearisations, the records to fit first."""
-    to_fit = [a for a in left if a.record.role == "fit"]
+def describe_unmodelled_force(fitter: Fitter, fit: Fit, models: list[LtvModel]) -> UnmodelledForce:
+    """The unknown input for the residual of `fit`; `models` are its LTV models, the records to fit first."""
+    to_fit = [a for a in models if a.record.role == "fit"]
     size = np.sqrt(np.mean(np.concatenate([equivalent_inputs(a)[0] for a in to_fit]) ** 2, axis=0))
-    found = [
+    estimates = [
         estimate_unknown_input(a, fitter.noise, np.maximum(size, 1e-12 * size.max(initial=1e-300))) for a in to_fit
     ]
-    axes, units = left[0].axes, left[0].units
-    rms = {axis: float(difference(_rms(found, i), units[i])) for i, axis in enumerate(axes)}
-    maps = {axis: _maps(found, i) for i, axis in enumerate(axes)}
-    loudest = sorted(range(len(axes)), key=lambda i: -_rms(found, i) / max(_sd(found, i), 1e-300))[: MAPS.most_axes]
-    terms = [e for i in loudest if (e := fit_empirical_term(fitter, fit, left, i)) is not None]
+    axes, units = models[0].axes, models[0].units
+    rms = {axis: float(difference(_rms(estimates, i), units[i])) for i, axis in enumerate(axes)}
+    maps = {axis: _maps(estimates, i) for i, axis in enumerate(axes)}
+    loudest = sorted(range(len(axes)), key=lambda i: -_rms(estimates, i) / max(_sd(estimates, i), 1e-300))[
+        : MAPS.most_axes
+    ]
+    terms = [e for i in loudest if (e := fit_empirical_term(fitter, fit, models, i)) is not None]
     best = max(terms, key=lambda e: e.held_out_gain, default=None)
-    said = [_statement(axis, maps[axis]) for axis in (axes[i] for i in loudest)]
+    statements = [_statement(axis, maps[axis]) for axis in (axes[i] for i in loudest)]
     if best is None:
-        said.append("no empirical term of position, speed, history and drive helps on the held-out records")
-    return UnmodelledForce(left[0].place.value, rms, units[0], maps, best, tuple(s for s in said if s), tuple(found))
+        statements.append("no empirical term of position, velocity, history and drive reduces the held-out error")
+    return UnmodelledForce(
+        models[0].place.value, rms, units[0], maps, best, tuple(s for s in statements if s), tuple(estimates)
+    )
 
 
-def _rms(found: list[UnknownInput], i: int) -> float:
-    return float(np.sqrt(np.mean(np.concatenate([e.f[:, i] for e in found]) ** 2)))
+def _rms(estimates: list[UnknownInput], i: int) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([e.f[:, i] for e in estimates]) ** 2)))
 
 
-def _sd(found: list[UnknownInput], i: int) -> float:
-    return float(np.mean(np.concatenate([e.sd[:, i] for e in found])))
+def _sd(estimates: list[UnknownInput], i: int) -> float:
+    return float(np.mean(np.concatenate([e.sd[:, i] for e in estimates])))
 
 
-def _maps(found: list[UnknownInput], i: int) -> tuple[DependenceMap, ...]:
-    """Maps of the disturbance of axis `i`."""
-    f, sd = np.concatenate([e.f[:, i] for e in found]), np.concatenate([e.sd[:, i] for e in found])
+def _maps(estimates: list[UnknownInput], i: int) -> tuple[DependenceMap, ...]:
+    """Dependence maps of the input of axis `i`."""
+    f, sd = np.concatenate([e.f[:, i] for e in estimates]), np.concatenate([e.sd[:, i] for e in estimates])
 
     def joined(name: str) -> np.ndarray:
-        return np.concatenate([getattr(e.model, name)[: len(e.f), i] for e in found])
+        return np.concatenate([getattr(e.model, name)[: len(e.f), i] for e in estimates])
 
-    unit, travel, settled = found[0].model.units[i], found[0].model.travel_unit, found[0].model.settled
+    unit, travel, settled = estimates[0].model.units[i], estimates[0].model.travel_unit, estimates[0].model.settled
     d, everywhere = joined("displacement"), np.ones(len(f), bool)
     rows = [("position", travel, d, everywhere)]
     if not settled:
-        direction = np.concatenate([e.model.direction()[: len(e.f), i] for e in found])
+        direction = np.concatenate([e.model.direction()[: len(e.f), i] for e in estimates])
         rows += [
             ("position, forward", travel, d, direction > 0), ("position, backward", travel, d, direction < 0),
             ("velocity", f"{travel}/s", joined("velocity"), everywhere),
-            ("time", "s", np.concatenate([e.model.record.time[: len(e.f)] for e in found]), everywhere),
+            ("time", "s", np.concatenate([e.model.record.time[: len(e.f)] for e in estimates]), everywhere),
         ]  # fmt: skip
-    ambient = [a[: len(e.f)] for e in found if (a := e.model.record.ambient) is not None]
-    if len(ambient) == len(found):
+    ambient = [a[: len(e.f)] for e in estimates if (a := e.model.record.ambient) is not None]
+    if len(ambient) == len(estimates):
         T = np.concatenate(ambient)
         rows += [("temperature", "K", T, everywhere)] if np.ptp(T) > 0 else []
     return tuple(_map(name, u, x[mask], f[mask], sd[mask], unit) for name, u, x, mask in rows if mask.sum() > MAPS.bins)
@@ -110,7 +117,10 @@ def _map(name: str, unit: str, x: np.ndarray, f: np.ndarray, sd: np.ndarray, val
         within += float(np.sum((f[inside] - f[inside].mean()) ** 2)) if inside.any() else 0.0
         if inside.sum() < min(MAPS.fewest_samples, max(len(x) // MAPS.bins, 1)):
             continue
-        m, s = float(f[inside].mean()), float(sd[inside].mean())  # neighbours' errors go together: no root of n
+        m, s = (
+            float(f[inside].mean()),
+            float(sd[inside].mean()),
+        )  # neighbouring errors are correlated: averaging does not reduce them
         at.append(float(difference(x[inside].mean(), unit)))
         for values, value in ((mean, m), (low, m - STATISTICS.z_95 * s), (high, m + STATISTICS.z_95 * s)):
             values.append(float(difference(value, value_unit)))
@@ -124,7 +134,7 @@ def _statement(axis: str, maps: tuple[DependenceMap, ...]) -> str:
     if not single:
         return ""
     best = max(single, key=lambda m: m.variance_share)
-    text = f"{axis}: {best.variance_share:.0%} of the free disturbance goes with {best.coordinate}"
+    text = f"{axis}: {best.coordinate} explains {best.variance_share:.0%} of the unknown input's variance"
     sides = {m.coordinate: m for m in maps if "," in m.coordinate}
     if len(sides) == 2:
         forward, backward = sides["position, forward"], sides["position, backward"]
