@@ -1,12 +1,11 @@
 """C text of the elementary functions, so that the generated C calls no library.
 
-Each argument is brought into a short range (halves of ln 2, quarter turns, the reciprocal, the root), where a polynomial
-does. A polynomial is what interpolates the function's Taylor series in Chebyshev's points, of the lowest degree that errs
-by a small part of a rounding; all of it in integers of many bits, so that the printed digits are the same on every machine.
+Each argument is reduced to a short range (by halves of ln 2, quarter turns, the reciprocal or the root), on which a polynomial
+is evaluated. The polynomial interpolates the function's Taylor series at Chebyshev points and has the lowest degree whose error
+is a small fraction of a rounding. It is computed in integers of many bits, so that every machine prints the same digits.
 
-Not a number gives not a number (but 0 for `root`), every finite argument a finite number. Subnormal numbers have no root to
-rely on (but a finite one), and infinity has none. What each function gives
-where C's own would be infinite or undefined stands above it in the C.
+NaN gives NaN (0 for `root`), every finite argument a finite number. The root of a subnormal number is finite but inaccurate,
+that of infinity is not defined. The comment above each C function says what it returns where C's own would be infinite or undefined.
 """
 
 from __future__ import annotations
@@ -25,12 +24,18 @@ from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.templates import render
 
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899")
-SHARE = 64  # of a rounding a polynomial's error is at most one over this
-BITS, TERMS = 200, 100  # of the series: far beyond both arithmetics
-TURNS = {Real.DOUBLE: 1e5, Real.FLOAT: 1e4}  # angles up to which sine, cosine and tangent are right to the last digits
-TURN_END = {Real.DOUBLE: 2.0**31, Real.FLOAT: 2.0**20}  # beyond, the digits do not tell the angle
-ASIN_NEAR, TANH_NEAR, SINH_NEAR = 0.5625, 0.625, 1.0  # up to where the series itself is used
-NEEDS = {  # of each function, what it calls
+ERROR_SHARE = 64  # a polynomial's error is at most one rounding divided by this
+BITS, TERMS = 200, 100  # of the series: far more than double needs
+TURNS = {
+    Real.DOUBLE: 1e5,
+    Real.FLOAT: 1e4,
+}  # angle [rad] up to which sine, cosine and tangent are accurate to the last digits
+TURN_END = {
+    Real.DOUBLE: 2.0**31,
+    Real.FLOAT: 2.0**20,
+}  # rad; beyond, quarter turns overflow 32 bits (double) or rounding is too coarse (float)
+ASIN_NEAR, TANH_NEAR, SINH_NEAR = 0.5625, 0.625, 1.0  # argument up to which the series itself is used
+NEEDS = {  # function -> the functions that it calls
     "sine": ("quarters",), "cosine": ("quarters",), "tangent": ("quarters",), "arctangent2": ("arctangent",),
     "arcsine": ("root", "small_arcsine"), "arccosine": ("root", "small_arcsine"),
     "hyperbolic_tangent": ("exponential",), "hyperbolic_sine": ("exponential",), "hyperbolic_cosine": ("exponential",),
@@ -107,7 +112,7 @@ def _odd(sign: int) -> Callable[[int], Fraction]:
     return lambda k: Fraction(sign ** (k + 1), math.factorial(2 * k + 3))
 
 
-_WIDER = 1.001  # than the reduced range, whose ends are met up to rounding
+_WIDER = 1.001  # than the reduced range: arguments may leave it by rounding
 _HALF = math.log(2) / 2 * _WIDER
 _EIGHTH = (math.pi / 4 * _WIDER) ** 2
 _ATAN = (math.sqrt(2) - 1) ** 2 * _WIDER
@@ -131,10 +136,10 @@ SERIES = {
 @lru_cache
 def polynomial(name: str, real: Real) -> tuple[float, ...]:
     """Coefficients, lowest first, of the polynomial of least degree through a series of `SERIES` in the Chebyshev points of
-    its range whose error is at most one over `SHARE` of a rounding. In fixed point of `BITS` bits."""
+    its range whose error is at most one over `ERROR_SHARE` of a rounding. In fixed point of `BITS` bits."""
     one = SERIES[name]
     terms = _terms(name)
-    tolerance = round(real.epsilon / 2 / SHARE / one.weight * 2.0**100) << (BITS - 100)
+    tolerance = round(real.epsilon / 2 / ERROR_SHARE / one.weight * 2.0**100) << (BITS - 100)
     for degree in range(1, len(terms)):
         points = [_chebyshev(k + 0.5, degree + 1, one.low, one.high) for k in range(degree + 1)]
         found = _through(points, [_sum(terms, x) for x in points])

@@ -1,4 +1,4 @@
-"""What the template of the online controller needs: kernels printed from the controller's symbolic functions, and tables."""
+"""The context of the feedforward controller's template: C functions printed from the symbolic kernels, and tables."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from ctrlgen.firmware.templates import comment
 from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
 from ctrlgen.trajectory.scenario import Scenario
 
-FLOAT_SLACK = 4e-6  # as SLACK of the controller, for float: 0.4 mK, which four roundings of a temperature amount to
+FLOAT_SLACK = 4e-6  # as SLACK of the controller, in float: four roundings of a temperature, 0.4 mK
 
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
-    """Everything the templates of one online controller need."""
+    """The context of online.c.j2 and online.h.j2."""
     model = controller.nominal
     n = len(model.axes)
-    kernels: dict[str, Kernel] = {}  # by body: what settling and stepping share is printed once
+    kernels: dict[str, Kernel] = {}  # by body, so that a function shared by settle and step is printed once
 
     (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
     s_low, s_high = x_low[: model.n_states], x_high[: model.n_states]
-    ranges = {  # of what kernels are called with; a target can be anything
+    ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
     }  # fmt: skip
 
     def printed(function: Any, *names: str) -> Kernel:
-        """Under the first of `names` that no other body has."""
+        """`function` as C, named by the first of `names` that no other body has."""
         taken = {kernel.name for kernel in kernels.values()}
         kernel = print_function(function, names[0], real, ranges)
         body = kernel.text.partition("(")[2]
@@ -45,13 +45,15 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         ("step", controller.moving, "state->z"),
     ):
         if inverse is not None:
-            parts = {
-                part: printed(getattr(inverse, part), f"wanted_{part}", f"{name}_{part}")
-                for part in ("displacement", "state", "drive", "advance")
-                if getattr(inverse, part).size1_out(0)
+            named = {
+                kernel: printed(getattr(inverse, kernel), f"wanted_{kernel}", f"{name}_{kernel}")
+                for kernel in ("displacement", "state", "drive", "advance")
+                if getattr(inverse, kernel).size1_out(0)
             }
-            uses_state = any({"x", "z"} & set(parts[part].arguments) for part in ("state", "drive") if part in parts)
-            modes.append({"name": name, "z": z, "uses_state": uses_state, **parts})
+            uses_state = any(
+                {"x", "z"} & set(named[kernel].arguments) for kernel in ("state", "drive") if kernel in named
+            )
+            modes.append({"name": name, "z": z, "uses_state": uses_state, **named})
     balance = printed(controller.static.settle, "balance_displacement")
     ratio = printed(controller.composite_ratio, "composite_ratio") if controller.guarded_limits else None
     nearest = printed(controller.nearest, "nearest_displacement")
@@ -61,9 +63,11 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
     last = modes[-1]
     advance = [] if model.x.numel() == model.n_states else ["advance"]
-    step_cost = sum(last[part].operations for part in ("displacement", "state", "drive", *advance) if part in last)
+    step_cost = sum(
+        last[kernel].operations for kernel in ("displacement", "state", "drive", *advance) if kernel in last
+    )
     step_cost += bound.operations if bound else 0
-    once_more = sum(last[part].operations for part in ("state", "drive") if part in last)
+    once_more = sum(last[kernel].operations for kernel in ("state", "drive") if kernel in last)
     worst_cost = (
         step_cost
         + nearest.operations
@@ -100,7 +104,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
 
 
 def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and half width of ranges, the width smaller by some roundings: what is inside by it is inside."""
+    """Middle and half width of ranges; the width is four roundings smaller, so that the test with it is on the safe side."""
     centre, half = (low + high) / 2, (high - low) / 2
     return centre, np.maximum(half - 4 * real.epsilon * (np.abs(centre) + half), 0.0)
 

@@ -1,4 +1,4 @@
-"""What the template of the player needs: the solved trajectory as `compression` holds it."""
+"""The context of the player's template: the solved drives in the form that `compression` chose."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ctrlgen.trajectory.solution import Solution
 
 
 def player_context(solution: Solution, compression: Compression, prefix: str) -> dict[str, Any]:
-    """Everything the templates of one player need."""
+    """The context of player.c.j2 and player.h.j2."""
     curve = compression.curve
     pieces = curve.pieces if isinstance(curve, Spline) else ()
     limited = {

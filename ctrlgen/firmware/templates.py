@@ -1,4 +1,4 @@
-"""The templates of `codegen/`, filled in."""
+"""Renders the templates in `codegen/templates/`."""
 
 from __future__ import annotations
 

@@ -1839,7 +1839,11 @@ static int limit_composite(const circle20_online_f32_state *state, float wanted[
         composite_ratio(wanted, worst);
         if (worst[0] > 1.0f) {
             int i;
-            hit = (worst[0] > 1.000004f) ? 2 : 1;
+            if (worst[0] > 1.000004f) {
+                hit = 2;
+            } else {
+                hit = 1;
+            }
             for (i = 0; i < 6; i++) {
                 wanted[i] = wanted[i] / worst[0];
             }
