@@ -86,7 +86,7 @@ def test_what_cannot_be_sent_is_refused_with_what_to_do():
 
 def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
     pytest.importorskip("distributed", reason="dask[distributed] is not installed: no scheduler to ask")
-    monkeypatch.setattr("ctrlgen.core.parallel.PATIENCE", "1 s")
+    monkeypatch.setattr("ctrlgen.core.parallel.SCHEDULER_TIMEOUT", "1 s")
     with pytest.raises(InputError, match="does not answer"):
         list(run_all(square, ITEMS, scheduler="tcp://127.0.0.1:9"))
 

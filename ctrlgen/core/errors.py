@@ -1,9 +1,9 @@
-"""Everything ctrlgen raises on purpose. Each message says what, where, and what to do.
+"""The exceptions that ctrlgen raises on purpose. Each message says what is wrong, where, and what to do.
 
 CtrlgenError
 ├── InputError        a file or an argument is wrong; lists every fault found
 ├── Unreachable       the device cannot follow the trajectory; carries the nearest one
-├── SolverError       IPOPT stopped without a solution
+├── SolverError       IPOPT or a simulation ended without a solution
 └── ToolError         a compiler is missing or refuses the generated C
 """
 
@@ -16,12 +16,12 @@ import numpy as np
 
 
 class CtrlgenError(Exception):
-    """Base of every error a user can meet; the command line prints it and exits with status 1."""
+    """Base of every error that a user can cause; the command line prints it and exits with status 1."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with an input: `where` (a dotted key, a line), `what`, and what to do."""
+    """One thing that is wrong with an input: `where` (a dotted key, a line) and `what`, with what to do."""
 
     where: str
     what: str
@@ -42,7 +42,8 @@ class InputError(CtrlgenError):
 
 @dataclass(frozen=True)
 class Infeasibility:
-    """What keeps a trajectory from being followed: samples, and the nearest admissible trajectory."""
+    """Where a trajectory cannot be followed: `samples` at which a limit is active, the `worst` of them, the `command`
+    (n, channels) and the `nearest` trajectory (n, channels) that can be followed, SI."""
 
     samples: tuple[int, ...]
     worst: int
@@ -59,7 +60,7 @@ class Unreachable(CtrlgenError):
 
 
 class SolverError(CtrlgenError):
-    """IPOPT ended without a solution, for a reason that is not unreachability."""
+    """A solver ended without a solution, although the target is not known to be unreachable."""
 
 
 class ToolError(CtrlgenError):

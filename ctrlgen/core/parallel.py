@@ -1,9 +1,9 @@
-"""Many independent pieces of work: on this computer's processes, or on a dask.distributed scheduler.
+"""Independent items of work, in processes of this computer or on a dask.distributed scheduler.
 
     for index, result in run_all(function, items, scheduler=None, jobs=None): ...
 
-One interface, one promise: results depend on the item alone, not on their order, the number of workers or where they
-ran; an item that fails is a `Failure` of its own; a worker that dies loses nothing, its items are run again.
+A result depends on its item alone, not on the order, the number of workers or the computer. An item that raises gives a
+`Failure`; the items of a worker that dies are run again.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from typing import Any
 
 from ctrlgen.core.errors import Fault, InputError
 
-_ONE = threading.Lock()
-DEATHS = 3  # of its worker, after which an item is given up
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-DASK = "dask[distributed] is not installed; pip install 'ctrlgen[dask]', or leave --scheduler out"
-PATIENCE = "10 s"  # for a scheduler to answer
+_ONE_ITEM = threading.Lock()  # one item at a time in a process: the caches of a diagnosis are not shared
+MOST_DEATHS = 3  # of the worker that runs an item, before the item is given up
+THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+NO_DASK = "dask[distributed] is not installed; pip install 'ctrlgen[dask]', or leave --scheduler out"
+SCHEDULER_TIMEOUT = "10 s"  # for its first answer
 
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Why an item has no result: `what` in one line, `details` with its place in the code."""
+    """Why an item has no result: `what` in one line, `details` with the traceback."""
 
     what: str
     details: str = ""
@@ -47,21 +47,22 @@ def run_all(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[tuple[int, Any]]:
-    """(index, function(item)) of every item as each is done; a `Failure` in its place where it raised or was lost.
+    """Yields (index, function(item)) as each item is finished; a `Failure` instead of the result where it raised or was lost.
 
-    `scheduler` is the address of a dask.distributed one, whose workers must have ctrlgen and see the same files;
-    otherwise `jobs` processes of this computer, one a core by default, or none, here, for 0. `progress` is called with
-    the number done and of all. Raises InputError where the scheduler does not answer or the work cannot be sent.
+    `scheduler` is the address of a dask.distributed scheduler, whose workers need ctrlgen installed and see the same
+    files. Without it `jobs` processes of this computer run the items, one per core unless given; 0 runs them in this
+    process. `progress` is called with the number of finished items and of all. Raises InputError where the scheduler
+    does not answer or the function cannot be sent to another process.
     """
     items = list(items)
     if scheduler is not None:
-        found = _on_dask(function, items, scheduler)
+        results = _on_dask(function, items, scheduler)
     elif jobs == 0:
-        found = ((k, guarded(function, item)) for k, item in enumerate(items))
+        results = ((k, guarded(function, item)) for k, item in enumerate(items))
     else:
         _check_sendable(function, items)
-        found = _on_processes(function, items, max(1, min(jobs or os.cpu_count() or 1, len(items))))
-    for done, pair in enumerate(found, 1):
+        results = _on_processes(function, items, max(1, min(jobs or os.cpu_count() or 1, len(items))))
+    for done, pair in enumerate(results, 1):
         if progress is not None:
             progress(done, len(items))
         yield pair
@@ -72,15 +73,14 @@ def guarded(function: Callable[[Any], Any], item: Any) -> Any:
     from threadpoolctl import threadpool_limits
 
     try:
-        with _ONE, threadpool_limits(1):  # one item at a time in a process: the caches of a diagnosis are not shared
+        with _ONE_ITEM, threadpool_limits(1):
             return function(item)
     except Exception as error:  # whatever one item raises must not end the others
-        said = str(error) or type(error).__name__
-        return Failure(said, traceback.format_exc())
+        return Failure(str(error) or type(error).__name__, traceback.format_exc())
 
 
 def sendable(*things: Any) -> bool:
-    """Whether these can go to another process: functions written in a script's own lines cannot."""
+    """Whether these can be sent to another process; functions defined in a notebook or inside a function cannot."""
     try:
         pickle.dumps(things)
     except Exception:  # pickle raises what the object's own code raises
@@ -97,21 +97,21 @@ def _check_sendable(function: Callable[[Any], Any], items: list[Any]) -> None:
 
 
 def _begin_worker() -> None:
-    """One thread for BLAS; Ctrl-C is the parent's to deal with."""
+    """One BLAS thread a process; Ctrl-C is left to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in THREADS:
+    for name in THREAD_VARIABLES:
         os.environ[name] = "1"
 
 
 class _Pool:
-    """Worker processes that are begun anew when one of them dies."""
+    """Worker processes, all of them replaced when one dies."""
 
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
         self.begin()
 
     def begin(self) -> None:
-        """Fresh processes."""
+        """Starts new processes."""
         self.processes = ProcessPoolExecutor(self.jobs, get_context("spawn"), _begin_worker)
 
     def end(self) -> None:
@@ -125,19 +125,20 @@ class _Pool:
 
 
 def _on_processes(function: Callable[[Any], Any], items: list[Any], jobs: int) -> Iterator[tuple[int, Any]]:
-    """Only as many items are handed out as there are processes, so that those lost with a process are known.
+    """Runs the items with only as many submitted as there are processes, so that those lost with a process are known.
 
-    An item that was running when a process died runs again, alone until it is known which of them it was.
+    An item that was running when a process died runs again with no other item beside it, so that the one that kills its
+    process is found.
     """
-    left, alone = deque(range(len(items))), deque[int]()
+    waiting, alone = deque(range(len(items))), deque[int]()
     deaths: Counter[int] = Counter()
     running: dict[Future, int] = {}
     pool = _Pool(jobs)
     try:
-        while left or alone or running:
-            room = 1 if alone else jobs
-            while (alone or left) and len(running) < room:
-                k = alone.popleft() if alone else left.popleft()
+        while waiting or alone or running:
+            most = 1 if alone else jobs
+            while (alone or waiting) and len(running) < most:
+                k = alone.popleft() if alone else waiting.popleft()
                 try:
                     running[pool.processes.submit(guarded, function, items[k])] = k
                 except BrokenProcessPool as error:  # a process died while it had nothing to do
@@ -145,58 +146,63 @@ def _on_processes(function: Callable[[Any], Any], items: list[Any], jobs: int) -
                     stillborn.set_exception(error)
                     running[stillborn] = k
                     break
-            lost = _lost(pool, running)
-            if isinstance(lost, list):
-                yield from lost
+            finished, lost = _wait(running)
+            yield from finished
+            if finished:
                 continue
             pool.end()
             pool.begin()
             for k in lost:
                 deaths[k] += 1
-                if deaths[k] < DEATHS:
+                if deaths[k] < MOST_DEATHS:
                     alone.append(k)
                 else:
-                    yield k, Failure(f"its process died {DEATHS} times; is there memory enough?")
+                    yield (
+                        k,
+                        Failure(
+                            f"its process died {MOST_DEATHS} times; check that there is enough memory, or use fewer jobs"
+                        ),
+                    )
     finally:
         pool.end()
 
 
-def _lost(pool: _Pool, running: dict[Future, int]) -> list[tuple[int, Any]] | set[int]:
-    """Waits: a list of what was finished; or, where a process died, the set of items that were lost with it."""
+def _wait(running: dict[Future, int]) -> tuple[list[tuple[int, Any]], set[int]]:
+    """Waits for an item: (index, result) of those that finished; or, where a process died, the items lost with it."""
     if not running:
-        return set()
+        return [], set()
     done, _ = wait(running, return_when=FIRST_COMPLETED)
-    found = []
+    finished = []
     for future in done:
         error = future.exception()
         if isinstance(error, BrokenProcessPool):
             continue
         k = running.pop(future)
-        found.append((k, Failure(f"its result cannot be sent: {error}") if error else future.result()))
-    if found:
-        return found
+        finished.append((k, Failure(f"its result cannot be sent back: {error}") if error else future.result()))
+    if finished:
+        return finished, set()
     lost = set(running.values())
     running.clear()
-    return lost
+    return [], lost
 
 
-def _same(thing: Any) -> Any:
+def _identity(thing: Any) -> Any:
     return thing
 
 
 def _on_dask(function: Callable[[Any], Any], items: list[Any], address: str) -> Iterator[tuple[int, Any]]:
-    """The scheduler runs again what a dead worker had; the results of finished items are fetched as they come."""
+    """The results of the items as they are finished; the scheduler runs those of a dead worker again."""
     try:
         from distributed import Client, as_completed
     except ImportError:
-        raise InputError("--scheduler", [Fault(address, DASK)]) from None
+        raise InputError("--scheduler", [Fault(address, NO_DASK)]) from None
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        said = str(error).strip().splitlines() or ["no answer"]
-        raise InputError("--scheduler", [Fault(address, f"does not answer ({said[0]})")]) from None
+        lines = str(error).strip().splitlines() or ["no answer"]
+        raise InputError("--scheduler", [Fault(address, f"does not answer ({lines[0]})")]) from None
     with client:
-        shared = client.submit(_same, function, pure=False)  # kept once, and made again where a worker dies with it
+        shared = client.submit(_identity, function, pure=False)  # sent once; sent again where its worker dies
         futures = {
             client.submit(guarded, shared, item, pure=False, retries=0, key=f"ctrlgen-{os.urandom(6).hex()}-{k}"): k
             for k, item in enumerate(items)

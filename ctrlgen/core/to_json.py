@@ -1,4 +1,4 @@
-"""Results as what JSON knows: for diagnosis.json, the page and the figures."""
+"""Results in the types of JSON, for diagnosis.json, the HTML page and the figures."""
 
 from __future__ import annotations
 

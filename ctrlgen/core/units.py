@@ -1,7 +1,6 @@
-"""Text with units at the border, SI numbers inside.
+"""Numbers with units in files and reports, SI numbers in the program; pint converts.
 
-A `Quantity` keeps what was written, so that a file can be written back and a report can
-show the reader's own unit. Conversion is pint's.
+A `Quantity` keeps the text of the file, so that a file can be written back and a report shows the unit its author used.
 """
 
 from __future__ import annotations
@@ -26,8 +25,10 @@ def _registry() -> pint.UnitRegistry:
     registry: pint.UnitRegistry = pint.UnitRegistry(
         autoconvert_offset_to_baseunit=True, cache_folder=None, on_redefinition="ignore"
     )
-    registry.define("radian = [angle] = rad")  # so that 60 rpm is no 60 Hz and 5 is no angle
-    registry._build_cache()  # degrees and milliradians were resolved to the old radian
+    registry.define(
+        "radian = [angle] = rad"
+    )  # a dimension of its own: rpm is not Hz, and a plain number is not an angle
+    registry._build_cache()  # degrees and milliradians still refer to the radian that was replaced
     return registry
 
 
@@ -42,7 +43,7 @@ def _unit(text: str) -> pint.Unit:
 
 @cache
 def _affine(unit: str) -> tuple[float, float]:
-    """(scale, offset) with SI = scale * value + offset, pint's own conversion at two points."""
+    """(scale, offset) with SI = scale * value + offset, from pint's conversion of 0 and 1."""
     base = _unit(unit)
     zero, one = (float(_registry().Quantity(value, base).to_base_units().magnitude) for value in (0.0, 1.0))
     return one - zero, zero
@@ -61,12 +62,12 @@ def from_si(value: Any, unit: str) -> Any:
 
 
 def difference(value: Any, unit: str) -> Any:
-    """An SI difference in `unit`: of temperatures without the zero."""
+    """An SI difference expressed in `unit`; the offset of a temperature scale does not count."""
     return value / _affine(unit)[0]
 
 
 def base_unit(unit: str) -> str:
-    """The SI unit of numbers that a reader sees in `unit`: 'um' -> 'm', 'degC' -> 'K', 'W' -> 'W'."""
+    """The SI unit of a quantity given in `unit`: 'um' -> 'm', 'degC' -> 'K', 'W' -> 'W'."""
     for plain in ("m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"):
         if same_dimension(unit, plain):
             return plain
@@ -93,7 +94,7 @@ def same_dimension(unit: str, other: str) -> bool:
 class Quantity:
     """A number with its unit: `si` in SI, `text` as written, `source` where it comes from.
 
-    `sd` is the standard deviation in SI, None where nobody stated one. `whole` marks a count.
+    `sd` is the standard deviation in SI, None where the file states none. `whole` marks a count.
     """
 
     si: float
@@ -104,9 +105,9 @@ class Quantity:
 
 
 def parse(text: object, unit: str) -> float:
-    """'130 GPa' with unit 'Pa' gives 1.3e11. Raises ValueError saying what to write instead.
+    """The SI number of a text: '130 GPa' for the unit 'Pa' gives 1.3e11. Raises ValueError that says what to write instead.
 
-    Angles count as a dimension of their own: a plain number is no angle, and rpm is no Hz.
+    Angles are a dimension of their own: a plain number is not an angle, and rpm is not Hz.
     """
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
         raise ValueError(f'write a number with its unit, such as "1 {unit}", not {text!r}')
@@ -153,7 +154,7 @@ def _reader(
         si = parse(table["value"], unit)
         if (low is not None and (si < low or (low_open and si == low))) or (high is not None and si > high):
             raise ValueError(
-                f"{table['value']!r} is impossible here; it must be {_bounds_text(unit, low, high, low_open)}"
+                f"{table['value']!r} is out of bounds; it must be {_bounds_text(unit, low, high, low_open)}"
             )
         if whole and si != round(si):
             raise ValueError(f"{table['value']!r} is not a whole number, and this is a count")
@@ -171,7 +172,7 @@ def _reader(
 
 
 def written_unit(text: str) -> str:
-    """The unit in a written quantity: 'um' of '3 um', '1' of '0.5'."""
+    """The unit in the text of a quantity: 'um' of '3 um', '1' of '0.5'."""
     match = _NUMBER.match(text)
     return (match[2] if match else "") or "1"
 
@@ -188,7 +189,7 @@ def split_unit(unit: str, words: tuple[str, ...]) -> tuple[dict[str, float], str
 
 
 def read_quantity(unit: str | None, given: Any) -> Quantity:
-    """A quantity of a file, in `unit` or, where that is None, in whatever unit it is written in."""
+    """A quantity of a file, in `unit`, or in the unit it is written in where `unit` is None. Raises ValueError."""
     if unit is None:
         value = given.get("value") if isinstance(given, dict) else given
         unit = written_unit(str(value))
@@ -222,5 +223,5 @@ class In(GroupedMetadata):
 
 
 def show(si: float, unit: str, digits: int = 4) -> str:
-    """An SI number in the reader's unit, such as '31.53 um'."""
+    """The text of an SI number in `unit`, such as '31.53 um'."""
     return f"{from_si(si, unit):.{digits}g} {unit if unit != '1' else ''}".strip()

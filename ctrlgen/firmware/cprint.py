@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import CtrlgenError
-from ctrlgen.numerics.interval_arithmetic import EVERYTHING, Interval, intervals, product_of, quotient_of
+from ctrlgen.numerics.interval_arithmetic import UNBOUNDED, Interval, intervals, product_of, quotient_of
 
 
 class Real(Enum):
@@ -239,17 +239,17 @@ class _Printer:
         """base^exponent by squaring, with one root where the exponent is not whole."""
         factors, square, left, step = list[str](), base.text, int(abs(exponent)), 0
         if abs(exponent) % 1.0:
-            factors.append(self._named(f"{k}_r", self._root_call(base.text), EVERYTHING).text)
+            factors.append(self._named(f"{k}_r", self._root_call(base.text), UNBOUNDED).text)
         while left:
             if left % 2:
                 factors.append(square)
             left //= 2
             if left:
                 step += 1
-                square = self._named(f"{k}_{step}", f"{square} * {square}", EVERYTHING).text
+                square = self._named(f"{k}_{step}", f"{square} * {square}", UNBOUNDED).text
         while len(factors) > 1:
             step += 1
-            factors = [self._named(f"{k}_{step}", f"{factors[0]} * {factors[1]}", EVERYTHING).text, *factors[2:]]
+            factors = [self._named(f"{k}_{step}", f"{factors[0]} * {factors[1]}", UNBOUNDED).text, *factors[2:]]
         one = self._literal(1.0)
         result = (factors or [one])[0]
         return self._named(k, f"{one} / {result}" if exponent < 0 else result, self.between[k])

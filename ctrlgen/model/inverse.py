@@ -1,12 +1,12 @@
-"""The model backwards, symbolically: wanted signal -> displacement -> state -> drive.
+"""The inverse of a model, symbolically: target of a signal -> displacement -> actuator state -> drive.
 
-Nothing here knows a device. The equations of `ctrlgen.model.model` at the end of a sample,
+It is derived from the equations of any `Model` at the end of a sample,
 
-    followed(x+, z+, u) = target,  g(x+, z+, u) = 0,  x+ = step(x, z, u)  (static: rates = 0),
+    followed(x+, z+, u) = target,  g(x+, z+, u) = 0,  x+ = held_step(x, z, u)  (static: rates = 0).
 
-are sorted into blocks by block triangular form (I. S. Duff, J. K. Reid, ACM TOMS 4 (1978) 137), and
-each block is solved in the cheapest exact way: linear in closed form, one quadratic equation by
-its root, anything else by a fixed number of Newton steps. The operation count is therefore fixed.
+They are sorted into blocks by block triangular form (I. S. Duff, J. K. Reid, ACM TOMS 4 (1978) 137), and each block is
+solved in the cheapest exact way: a linear one in closed form, one quadratic equation by its root, anything else by a fixed
+number of Newton steps. The operation count is therefore fixed.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_root
 
+# Operations at which an expression is not differentiable:
 CORNERS = frozenset((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_IF_ELSE_ZERO))
-NOISE = 1e-12  # of the largest entry of an equilibrated inverse: what rounding leaves of a zero
-NEWTON_STEPS = 6  # from a guess inside the range; quadratic convergence leaves rounding only
+ROUNDED_ZERO = 1e-12  # of the largest entry of an equilibrated inverse: entries below it are zeros that were rounded
+NEWTON_STEPS = 6  # from a typical size away; quadratic convergence leaves rounding only
 
 
 @dataclass(frozen=True)
 class Inverse:
     """Kernels, SX functions in SI, that a controller calls in this order.
 
-    `displacement` (x, z, target) -> z wanted; `state` (x, z, z_wanted) -> actuator states wanted (none for
-    actuators without memory); `drive` (x, z, z_wanted, s_wanted) -> u; `memory` (x, z, z_wanted) -> the effects'
-    memories then; `advance` (x, z, u) -> x at the next sample; `settle` (x, z, u) -> the displacement that balances
-    the actuators' forces, by Newton from z. x, z are those of the present sample. A static inverse reads
-    neither, except that its `advance` takes the new z.
+    `displacement` (x, z, target) -> z at the next sample; `state` (x, z, z_wanted) -> actuator states (n_states,) that hold
+    it, none for actuators without memory; `drive` (x, z, z_wanted, state_wanted) -> u; `memory` (x, z, z_wanted) -> the
+    effects' states then; `advance` (x, z, u) -> x at the next sample; `settle` (x, z, u) -> the displacement that balances
+    the forces at x, by Newton's method from z. x, z are those of the present sample. A static inverse does not depend on
+    them, except that its `advance` takes the new z.
     """
 
     displacement: ca.Function
@@ -45,9 +46,9 @@ class Inverse:
 
 
 def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
-    """The inverse of `model` for the signal `follow`; static where `sample_time` is None.
+    """The inverse of `model` for the signal named `follow`, over one `sample_time` [s]; static where that is None.
 
-    Free parameters stand at their nominal values.
+    Free parameters take their nominal values.
     """
     x, z, u, n, n_s = model.x, model.z, model.u, len(model.axes), model.n_states
     x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
@@ -64,12 +65,12 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     )
     if sample_time is None:
         motion = rates[:]
-        for i in (*model.stepped, *model.clocks):  # nothing rests there: an equilibrium starts its record anew
+        for i in (*model.stepped, *model.clocks):  # these have no equilibrium: they start anew, at zero
             motion[i] = x_1[i]
-        reached = ca.substitute(_solve(known, motion, x_1), z_1, z)  # the equilibrium that belongs to the z it is given
-        here = ca.vertcat(reached, z, u_1, ca.DM(model.p_nominal))
+        reached = ca.substitute(_solve(known, motion, x_1), z_1, z)  # the equilibrium states at the given z
+        at_rest = ca.vertcat(reached, z, u_1, ca.DM(model.p_nominal))
         for i, value in model.stepped.items():
-            reached[i] = ca.substitute(value, now, here)
+            reached[i] = ca.substitute(value, now, at_rest)
     else:
         reached = ca.substitute(held_step(model, sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
         reached = ca.substitute(reached, u, u_1)
@@ -79,7 +80,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion, heating), ca.vertcat(z_1, x_1, u_1, heat))[
         :n
     ]
-    # The later kernels take the earlier results as given, because the controller has limited them meanwhile.
+    # The later kernels take the earlier results as arguments, because the controller limits them in between.
     later = _solve(known, ca.vertcat(balance, motion, heating), ca.vertcat(x_1, u_1, heat))
     wanted_state, memory = later[:n_s], later[n_s : x.numel()]
     drive_of_state = ca.substitute(ca.vertcat(motion[:n_s], heating), x_1[n_s:], memory)
@@ -106,7 +107,7 @@ def _kernel(name: str, arguments: list[ca.SX], names: list[str], result: ca.SX) 
 
 @dataclass(frozen=True)
 class _Values:
-    """Symbols with the value to expand about (`base`) and a typical distance from it (`scale`)."""
+    """Symbols with the point about which equations are expanded (`base`) and a typical distance from it (`scale`), SI."""
 
     symbols: ca.SX
     base: np.ndarray
@@ -114,7 +115,7 @@ class _Values:
 
     @classmethod
     def of(cls, *rows: tuple[ca.SX, np.ndarray, np.ndarray]) -> _Values:
-        """From (symbol, base, scale) for each vector of unknowns or knowns."""
+        """From (symbol, base, scale) of each vector."""
         symbols, bases, scales = zip(*rows, strict=True)
         return cls(ca.vertcat(*symbols), np.concatenate(bases), np.concatenate(scales))
 
@@ -123,26 +124,27 @@ class _Values:
         return ca.Function("f", [self.symbols], [expression])(self.base + fraction * self.scale).full()
 
     def base_of(self, unknowns: ca.SX) -> ca.DM:
+        """The base of some of the symbols."""
         return ca.Function("f", [self.symbols], [unknowns])(self.base)
 
-    def inside(self, unknowns: ca.SX) -> ca.DM:
+    def typical(self, unknowns: ca.SX) -> ca.DM:
+        """A value of some of the symbols at which the device operates: base + scale."""
         return ca.Function("f", [self.symbols], [unknowns])(self.base + self.scale)
 
 
 def _solve(known: _Values, equations: ca.SX, unknowns: ca.SX) -> ca.SX:
-    """`unknowns` (n,) as expressions in the other symbols, such that equations (n,) = 0, block by block."""
+    """The `unknowns` (n,) as expressions in the other symbols, such that equations (n,) = 0; block by block."""
     count, rows, columns, row_starts, column_starts, *_ = ca.jacobian(equations, unknowns).sparsity().btf()
     solution = [ca.SX(0)] * unknowns.numel()
-    done = ca.SX(0, 1)
-    values = ca.SX(0, 1)
+    solved = values = ca.SX(0, 1)
     for block in range(count):
         own = columns[column_starts[block] : column_starts[block + 1]]
-        which = rows[row_starts[block] : row_starts[block + 1]]
+        own_equations = equations[rows[row_starts[block] : row_starts[block + 1]]]
         v = unknowns[own]
-        root = _solve_block(known, ca.substitute(equations[which], done, values), v)
+        root = _solve_block(known, ca.substitute(own_equations, solved, values), v)
         for k, i in enumerate(own):
             solution[i] = root[k]
-        done, values = ca.vertcat(done, v), ca.vertcat(values, root)
+        solved, values = ca.vertcat(solved, v), ca.vertcat(values, root)
     return ca.vertcat(*solution)
 
 
@@ -150,36 +152,38 @@ def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
     """One block, r(v) = 0: linear, quadratic in one unknown, or `NEWTON_STEPS` Newton steps."""
     base = known.base_of(v)
     slope = ca.jacobian(r, v)
-    if not ca.symvar(slope):  # numbers only: invert them here, once
+    if not ca.symvar(slope):  # numbers only: inverted once, when the kernel is built
         return base - ca.mtimes(_inverse(ca.evalf(slope).full()), ca.substitute(r, v, base))
     if not ca.depends_on(slope, v):
         return base - ca.solve(slope, ca.substitute(r, v, base))
     curvature = ca.jacobian(slope, v)
     if v.numel() == 1 and not ca.depends_on(curvature, v) and not _has_corners(slope):
         return base + _rising_root(known, r, v, base, slope, curvature)
-    return newton_root(r, v, ca.SX(known.inside(v)), NEWTON_STEPS)
+    return newton_root(r, v, ca.SX(known.typical(v)), NEWTON_STEPS)
 
 
 def _inverse(slope: np.ndarray) -> ca.DM:
-    """The inverse of a matrix of numbers, scaled to rows and columns of order one; entries that are rounding are zero."""
+    """The inverse (n, n) of a matrix, computed with rows and columns scaled to order one; entries that are only rounding are
+    set to zero."""
     rows = 1 / np.abs(slope).max(axis=1)
     columns = 1 / np.abs(rows[:, None] * slope).max(axis=0)
     scaled = np.linalg.inv(rows[:, None] * slope * columns)
-    scaled[np.abs(scaled) < NOISE * np.abs(scaled).max()] = 0.0
+    scaled[np.abs(scaled) < ROUNDED_ZERO * np.abs(scaled).max()] = 0.0
     return ca.sparsify(ca.DM(columns[:, None] * scaled * rows))
 
 
 def _has_corners(slope: ca.SX) -> bool:
-    """Whether a slope jumps, as that of a play or a dead zone: its curvature says nothing then."""
+    """Whether a slope jumps, as that of a play or a dead zone does: then r is not quadratic although its curvature is constant."""
     f = ca.Function("slope", ca.symvar(slope), [slope])
     return any(f.instruction_id(k) in CORNERS for k in range(f.n_instructions()))
 
 
 def _rising_root(known: _Values, r: ca.SX, v: ca.SX, base: ca.DM, slope: ca.SX, curvature: ca.SX) -> ca.SX:
-    """The root of a quadratic on the side of `base` on which operation takes place, free of cancellation.
+    """The root of a quadratic on the side of `base` on which the device operates, free of cancellation.
 
-    With r(base + w) = C + B w + A w^2 and the sign chosen so that r rises: w = -2 C / (B + sqrt(B^2 - 4 A C)).
-    Where B is zero, w = sqrt(-C/A) with the sign of -C/A, so that a wish on the far side stays visible.
+    r(base + w) = C + B w + A w^2, its sign chosen so that r rises there: w = -2 C / (B + sqrt(B^2 - 4 A C)).
+    Where B is zero, w = sqrt(-C/A) with the sign of -C/A: a target on the side that cannot be reached gives a value
+    outside the limits, which the controller reports, and not a valid one.
     """
     sign = float(np.sign(known.at(slope, 1.0)[0, 0]))
     A, B, C = sign * curvature / 2, sign * ca.substitute(slope, v, base), sign * ca.substitute(r, v, base)

@@ -12,7 +12,7 @@ from ctrlgen.model.model import Model
 
 
 def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(x, z, u) at rest at `pose` (6,), SI. Raises InputError when a limit forbids it."""
+    """(x, z, u) at rest at `pose` (n_components,), SI. Raises InputError where a limit of the device does not allow it."""
     controller = Controller(model, "pose", None)
     step = controller.step(controller.rest(), pose)
     if step.status:
@@ -22,7 +22,7 @@ def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray,
             [
                 Fault(
                     "at",
-                    f"is not an admissible equilibrium (limits: {broken}); choose a reachable pose, such as delta_z=20um",
+                    f"is not an equilibrium within the device's limits ({broken}); choose a reachable pose, such as delta_z=20um",
                 )
             ],
         )
@@ -30,11 +30,11 @@ def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 
 def linearise(model: Model, pose: np.ndarray) -> control.StateSpace:
-    """dx' = A x + B u, pose = C x + D u around the equilibrium at `pose` (6,), all SI.
+    """The state space dx' = A dx + B du, dpose = C dx + D du about the equilibrium at `pose` (n_components,), all SI.
 
-    The force balance g(x, z, u) = 0 is eliminated: dz = -g_z^-1 (g_x dx + g_u du). Inputs are the drives,
-    states the temperatures (and effects' memories), outputs the pose components, by name.
-    Raises InputError when the pose is not an admissible equilibrium.
+    The force balance g(x, z, u) = 0 is eliminated: dz = -g_z^-1 (g_x dx + g_u du). Inputs are the drives, states the
+    temperatures and the effects' states, outputs the pose components, each by its name. Raises InputError where `pose` is
+    no equilibrium within the device's limits.
     """
     x, z, u = equilibrium(model, pose)
     outputs = model.signals["pose"]

@@ -80,7 +80,8 @@ class Model:
 
     @cached_property
     def settling(self) -> ca.SX:
-        """What is zero (n_x,) at an equilibrium: the rates; of memories by samples and clocks, which never rest, themselves."""
+        """(n_x,) zero at an equilibrium: the rates; for states that change once a sample and clocks, which have no equilibrium,
+        the states themselves."""
         rows = self.rates[:]
         for i in (*self.stepped, *self.clocks):
             rows[i] = self.x[i]
@@ -88,11 +89,11 @@ class Model:
 
     @property
     def ambient_symbol(self) -> ca.SX:
-        """`ambient` as an argument of a function: the symbol, or one that nothing depends on."""
+        """`ambient` as an argument of a function: its symbol, or where it is zero a symbol that nothing depends on."""
         return self.ambient if self.ambient.is_symbolic() else ca.SX.sym("ambient")
 
     def closed(self, expr: ca.SX) -> ca.SX:
-        """An effect's expression without the symbols of acceleration, heat and a held drive."""
+        """`expr` with the symbols of acceleration, heat and a held drive replaced by their values."""
         if self.inertial:
             expr = ca.substitute(ca.SX(expr), self.acceleration, self.rates_of_heat[-self.v.numel() :])
         return ca.substitute(ca.substitute(ca.SX(expr), self.heat, self.heat_of_drive), self.held, self.held_value)
@@ -100,12 +101,12 @@ class Model:
     @cached_property
     def moved_by(self) -> frozenset[str]:
         """Names of all symbols in the equations of motion and the readings."""
-        moving = ca.veccat(self.rates, self.balance, self.signals["reading"].expr, *self.stepped.values())
-        return frozenset(symbol.name() for symbol in ca.symvar(moving))
+        equations = ca.veccat(self.rates, self.balance, self.signals["reading"].expr, *self.stepped.values())
+        return frozenset(symbol.name() for symbol in ca.symvar(equations))
 
     @property
     def inertial(self) -> bool:
-        """Whether the displacement accelerates, rather than standing in balance."""
+        """Whether the stage has mass: it accelerates, instead of standing where its forces balance."""
         return self.v.numel() > 0
 
     @property
@@ -145,17 +146,17 @@ class Model:
 
     @cached_property
     def x_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bound of each state: the limits that are that state itself."""
+        """Lower and upper bounds (n_x,) of the states, from the limits on a state itself; infinite where there is none."""
         return self._bounds(self.x)
 
     @cached_property
     def z_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bound of each displacement."""
+        """Lower and upper bounds (n_axes,) of the displacements."""
         return self._bounds(self.z)
 
     @cached_property
     def u_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bound of each drive."""
+        """Lower and upper bounds (n_u,) of the drives."""
         return self._bounds(self.u)
 
     def _bounds(self, symbol: ca.SX) -> tuple[np.ndarray, np.ndarray]:
@@ -169,7 +170,7 @@ class Model:
         return low, high
 
     def composite_limits(self) -> list[Limit]:
-        """Limits on expressions rather than on one variable."""
+        """Limits on an expression, such as a stress, and not on a state, displacement or drive itself."""
         return [
             limit for limit in self.limits
             if not any(_positions(limit, symbol) for symbol in (self.x, self.z, self.u))
@@ -178,6 +179,6 @@ class Model:
 
 def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:
     """Pairs (k, i) where component k of the limit is component i of `symbol` itself."""
-    place = {symbol[i].element_hash(): i for i in range(symbol.numel())}
+    index_of = {symbol[i].element_hash(): i for i in range(symbol.numel())}
     pairs = ((k, limit.expr[k].element_hash()) for k in range(limit.expr.numel()) if limit.expr[k].is_symbolic())
-    return [(k, place[key]) for k, key in pairs if key in place]
+    return [(k, index_of[key]) for k, key in pairs if key in index_of]

@@ -17,7 +17,7 @@ MOST_NEWTON_STEPS = 50  # from a displacement far off; the sample before needs t
 
 @dataclass(frozen=True)
 class Trace:
-    """Signals of a model at sample times, SI. `time` (n,) [s]; `signals` role -> (n, channels); `x` (n, n_x)."""
+    """Signals of a model at sample times, SI: `time` (n,) [s]; `signals` name -> (n, channels); `x` (n, n_x); `z` (n, n_axes)."""
 
     time: np.ndarray
     signals: dict[str, np.ndarray]
@@ -26,13 +26,13 @@ class Trace:
 
 
 def trace(model: Model, time: np.ndarray, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> Trace:
-    """Every signal at given states (n, n_x), displacements and drives (n, n_axes), all SI."""
+    """Every signal at given states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u), SI."""
     values = model.evaluate.map(len(time))(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(time))))
     return Trace(time, {role: v.full().T for role, v in zip(model.signals, values, strict=True)}, x, z)
 
 
 def balance_solver(model: Model) -> ca.Function:
-    """Newton's method for the displacement: (z_guess, x, u, p) -> z with balance(x, z, u, p) = 0."""
+    """(z_guess, x, u, p) -> z with balance(x, z, u, p) = 0, by Newton's method; RuntimeError where it finds none."""
     scaled = ca.substitute(model.balance, model.z, model.z * model.z_scale) / model.force_scale
     given = ca.vertcat(model.x, model.u, model.p)
     newton = newton_solver(f"{model.name}_balance", scaled, model.z, given, most_steps=MOST_NEWTON_STEPS)
@@ -44,11 +44,12 @@ def balance_solver(model: Model) -> ca.Function:
 def simulate(
     model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | None = None, z_0: np.ndarray | None = None
 ) -> Trace:
-    """The model driven by `u` (n, n_axes), each row held for one `sample_time` [s]; from rest unless `x_0` is given; at the displacement
-    that balances the first drive unless `z_0` is given, which matters for actuators without memory.
+    """The model driven by `u` (n, n_u) [SI], each row held for one `sample_time` [s].
 
-    Sample k of the result is the state at k sample_time, before row k of `u` acts; there are n + 1
-    samples, the last with the last drive. Raises SolverError where no displacement balances the force.
+    It starts at rest unless `x_0` (n_x,) is given, and at the displacement that balances the first drive, with inertia
+    at home, unless `z_0` (n_axes,) is given. Sample k of the result is the state at k sample_time, before row k of `u`
+    acts; there are n + 1 samples, the last with the last drive. Raises SolverError where no displacement balances the
+    force, or where the motion grows beyond all numbers.
     """
     if model.inertial:
         return _simulate_inertial(model, u, sample_time, x_0, z_0)
@@ -69,7 +70,7 @@ def simulate(
             "no stage displacement balances the actuator force; check the drive and the stiffness"
         ) from error
     if not np.all(np.isfinite(states)):
-        raise SolverError("the simulated state is not a number; check the drive against the device's limits")
+        raise SolverError("the simulated states are not finite; check the drive against the device's limits")
     states = np.hstack([ca.vertcat(start_x, start_z).full(), states]).T
     drives = np.vstack([u, u[-1:]])
     n = model.x.numel()
@@ -79,7 +80,7 @@ def simulate(
 def _simulate_inertial(
     model: Model, u: np.ndarray, sample_time: float, x_0: np.ndarray | None, z_0: np.ndarray | None
 ) -> Trace:
-    """The same for a stage with inertia, from standstill at home."""
+    """`simulate` for a stage with inertia, from standstill at home."""
     n = model.x.numel()
     start = np.concatenate([model.rest if x_0 is None else x_0, 0 * model.z_scale if z_0 is None else z_0])
     after = one_step_map(model, sample_time)
@@ -87,6 +88,6 @@ def _simulate_inertial(
     one = ca.Function("one", [state, model.u, model.p], [ca.vertcat(after.x, after.z)])
     states = one.mapaccum(len(u))(start, u.T, np.tile(model.p_nominal[:, None], (1, len(u)))).full()
     if not np.all(np.isfinite(states)):
-        raise SolverError("the simulated motion is not a number; check the drive, and damping of the device")
+        raise SolverError("the simulated motion is not finite; check the drive, and the device's damping")
     states = np.hstack([start[:, None], states]).T
     return trace(model, sample_time * np.arange(len(u) + 1), states[:, :n], states[:, n:], np.vstack([u, u[-1:]]))

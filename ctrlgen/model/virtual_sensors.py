@@ -1,4 +1,4 @@
-"""What the sensors of a device record of a simulated motion: model -> readings -> measuring chain -> volts."""
+"""Virtual sensors: what the sensors of a device record of a simulated motion, pose -> sensor, amplifier, ADC -> volts."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from ctrlgen.model.simulation import Trace
 class SensorReadings:
     """One sensor's recording: `time` (n,) [s] at its ADC's rate, `volts` (n,), and `value` (n,) of `channel` in SI.
 
-    `value` is what a user makes of the volts with the sensitivity and the place of pose 0, not knowing the room's
-    temperature; None for an interferometer, whose fringes are to be counted.
+    `value` is computed from the volts with the sensitivity and the position of pose 0 at calibration temperature, as a
+    user does; None for an interferometer, whose fringes have to be counted.
     """
 
     channel: str
@@ -30,14 +30,14 @@ class SensorReadings:
 def simulate_sensors(
     model: Model, trace: Trace, seed: int = 0, temperature: float | None = None, filtered: bool = False
 ) -> tuple[SensorReadings, ...]:
-    """Every sensor's recording of the trace's readings, which are joined by straight lines between its samples.
+    """Every sensor's recording of the trace's readings, which are interpolated linearly between its samples.
 
-    `temperature` [K] of the room, by default that of the calibration. `filtered`: behind the digital low-pass. The
-    sensor's bandwidth colours its noise and leaves the motion alone. The same `seed` gives the same noise.
-    Raises InputError where the device has no sensor, or a reading leaves a sensor's range.
+    `temperature` [K] of the room is that of the calibration unless given. `filtered`: after the digital low-pass. The
+    sensor's bandwidth filters its noise, not the motion. The same `seed` gives the same noise. Raises InputError where
+    the device has no sensor, or a reading leaves a sensor's range.
     """
     if not model.device.sensor:
-        raise InputError(model.name, [Fault("sensor", "there is none; add a [[sensor]] table to the device file")])
+        raise InputError(model.name, [Fault("sensor", "the device has none; add a [[sensor]] table to its file")])
     signal, records, faults = model.signals["reading"], [], []
     for k, sensor in enumerate(model.device.sensor):
         channel = signal.channels.index(sensor.at)
@@ -54,10 +54,13 @@ def simulate_sensors(
         d = reading * sensor.lever + start
         if d.min() < 0 or d.max() > s.usable_range(temperature):
             unit, ends = signal.units[channel], (0.0 - start, s.usable_range(temperature) - start)
-            went = " to ".join(show(value, unit) for value in (reading.min(), reading.max()))
-            held = " to ".join(show(value / sensor.lever, unit) for value in ends)
+            reached = " to ".join(show(value, unit) for value in (reading.min(), reading.max()))
+            allowed = " to ".join(show(value / sensor.lever, unit) for value in ends)
             faults.append(
-                Fault(f"sensor[{k}], {sensor.at}", f"goes from {went}, the sensor's range is {held}; change home")
+                Fault(
+                    f"sensor[{k}], {sensor.at}",
+                    f"the reading goes from {reached}, but the sensor's range is {allowed}; change home, or the motion",
+                )
             )
             continue
         try:
@@ -65,8 +68,10 @@ def simulate_sensors(
         except ValueError as fault:
             faults.append(Fault(f"sensor[{k}], {sensor.at}", str(fault)))
             continue
-        near = s.low if s.sensitivity > 0 else s.high
-        records.append(SensorReadings(sensor.at, time, volts, ((volts - near) * s.sensitivity - start) / sensor.lever))
+        start_volts = s.low if s.sensitivity > 0 else s.high
+        records.append(
+            SensorReadings(sensor.at, time, volts, ((volts - start_volts) * s.sensitivity - start) / sensor.lever)
+        )
     if faults:
         raise InputError(model.name, faults)
     return tuple(records)

@@ -1,7 +1,7 @@
-"""What each operation of a CasADi graph can amount to, by interval arithmetic (R. E. Moore, Interval Analysis, 1966).
+"""Bounds of every operation of a CasADi function over ranges of its arguments, by interval arithmetic.
 
-The bounds are rigorous up to rounding, and as wide as naive interval arithmetic makes them: an unknown operation, a
-division by something that may be zero or a function without a rule gives (-inf, inf).
+They are rigorous up to rounding, and as wide as naive interval arithmetic makes them; an operation without a rule and a
+division by an interval that contains zero give (-inf, inf). Source: R. E. Moore, Interval Analysis (1966).
 """
 
 from __future__ import annotations
@@ -13,17 +13,18 @@ import casadi as ca
 import numpy as np
 
 Interval = tuple[float, float]
-EVERYTHING: Interval = (-np.inf, np.inf)
+UNBOUNDED: Interval = (-np.inf, np.inf)
+LARGEST_EXPONENT = 700.0  # exp of more overflows in double precision
 
 
 def _hull(values: list[float]) -> Interval:
-    """0 * inf counts as 0: a bound of what is multiplied, not a number that occurs."""
-    known = [0.0 if np.isnan(v) else v for v in values]
-    return min(known), max(known)
+    """The smallest interval that holds `values`; 0 * inf counts as 0, for an infinite bound is never attained."""
+    numbers = [0.0 if np.isnan(v) else v for v in values]
+    return min(numbers), max(numbers)
 
 
 def product_of(a: Interval, b: Interval) -> Interval:
-    """Of a times b."""
+    """The interval of x y for x in a, y in b."""
     return _hull([x * y for x, y in product(a, b)])
 
 
@@ -33,8 +34,8 @@ def _square(a: Interval) -> Interval:
 
 
 def quotient_of(a: Interval, b: Interval) -> Interval:
-    """Of a over b; anything where b may be zero."""
-    return EVERYTHING if b[0] <= 0.0 <= b[1] else product_of(a, (1.0 / b[1], 1.0 / b[0]))
+    """The interval of x / y for x in a, y in b; unbounded where b contains zero."""
+    return UNBOUNDED if b[0] <= 0.0 <= b[1] else product_of(a, (1.0 / b[1], 1.0 / b[0]))
 
 
 def _magnitude(a: Interval) -> Interval:
@@ -56,7 +57,7 @@ _RULES: dict[int, Callable[..., Interval]] = {
     ca.OP_FABS: _magnitude,
     ca.OP_FMIN: lambda a, b: (min(a[0], b[0]), min(a[1], b[1])),
     ca.OP_FMAX: lambda a, b: (max(a[0], b[0]), max(a[1], b[1])),
-    ca.OP_EXP: lambda a: (float(np.exp(min(a[0], 700.0))), float(np.exp(min(a[1], 700.0)))),
+    ca.OP_EXP: lambda a: (float(np.exp(min(a[0], LARGEST_EXPONENT))), float(np.exp(min(a[1], LARGEST_EXPONENT)))),
     ca.OP_TANH: lambda a: (float(np.tanh(a[0])), float(np.tanh(a[1]))),
     ca.OP_SIN: lambda a: (-1.0, 1.0),
     ca.OP_COS: lambda a: (-1.0, 1.0),
@@ -68,24 +69,27 @@ _RULES: dict[int, Callable[..., Interval]] = {
 
 
 def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> list[Interval]:
-    """Of the value of every instruction of an SX function, arguments (dense columns) in `ranges` by name, others anything."""
-    at: dict[int, Interval] = {}  # by work slot
+    """The interval of every instruction of an SX `function`, in their order.
+
+    `ranges`: argument (a dense column) by its name -> lower and upper bounds; arguments that are not named are unbounded.
+    """
+    at: dict[int, Interval] = {}  # by slot of CasADi's work vector
     found = []
     for k in range(function.n_instructions()):
         op, inputs, outputs = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
         if op == ca.OP_INPUT:
             given = ranges.get(function.name_in(inputs[0]))
             row = function.sparsity_in(inputs[0]).row()[inputs[1]]
-            value = EVERYTHING if given is None else (float(given[0][row]), float(given[1][row]))
+            value = UNBOUNDED if given is None else (float(given[0][row]), float(given[1][row]))
         elif op == ca.OP_OUTPUT:
             value = at[inputs[0]]
         elif op == ca.OP_CONST:
             value = (function.instruction_constant(k),) * 2
         else:
-            rule = _RULES.get(op, lambda *_: EVERYTHING)
+            rule = _RULES.get(op, lambda *_: UNBOUNDED)
             with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
                 value = rule(*(at[i] for i in inputs))
-            value = EVERYTHING if np.isnan(value).any() else value
+            value = UNBOUNDED if np.isnan(value).any() else value
         found.append(value)
         if op != ca.OP_OUTPUT:
             at[outputs[0]] = value
@@ -93,7 +97,7 @@ def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.n
 
 
 def bounds(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """Low and high (n,) of the one result of `function`."""
+    """Lower and upper bounds (n,) of the only result of `function`; `ranges` as for `intervals`."""
     low = high = np.zeros(function.size1_out(0))
     low, high = low.copy(), high.copy()
     for k, value in enumerate(intervals(function, ranges)):

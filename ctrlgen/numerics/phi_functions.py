@@ -13,34 +13,39 @@ import casadi as ca
 import numpy as np
 import scipy
 
-HELD_ORDER = 12  # of the series of phi_1: what is left out is 1/13! for |hA| = 1
-RAMP_ORDER = 18  # of the series of phi_1 to phi_3: what is left out is 1/19!, below the rounding
-SERIES = 1.0  # |h rate| below which one lag's phi_k are summed: the closed forms lose digits to cancellation there
+HELD_ORDER = 12  # of the series of phi_1 for a held drive: its remainder is 1/13! for |hA| = 1
+RAMP_ORDER = 18  # of the series of phi_1 to phi_3 for a linear drive: its remainder is 1/19!, below rounding
+SERIES_BELOW = (
+    1.0  # |h rate| below which phi_k of one lag is summed: its closed form loses digits to cancellation there
+)
 
 
 def phi_matrices(M: np.ndarray, count: int) -> list[np.ndarray]:
-    """[phi_0, ..., phi_count] of the numbers M (n, n): the first row of blocks of one larger exponential; also where M is
-    singular."""
+    """[phi_0, ..., phi_count] of a matrix M (n, n), each (n, n); M may be singular.
+
+    They are the first row of blocks of the exponential of one larger matrix, eq. (2.11).
+    """
     n = len(M)
     large = np.zeros(((count + 1) * n, (count + 1) * n))
     large[:n, :n] = M
     for k in range(count):
         large[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
-    found = np.split(scipy.linalg.expm(large)[:n], count + 1, axis=1)
+    phi = np.split(scipy.linalg.expm(large)[:n], count + 1, axis=1)
     if n == 1 and M[0, 0]:
-        found[1] = np.expm1(M) / M  # to rounding also for lags that are over within a sample
-    return found
+        phi[1] = np.expm1(M) / M  # to rounding, also for lags that are over within a sample
+    return phi
 
 
 def held_gain(rate: ca.SX, h: float) -> ca.SX:
-    """h phi_1(h rate) of one lag, or h where the rate is identically zero."""
+    """h phi_1(h rate) of one lag, h where the rate is identically zero: one exponential, since generated C computes it in
+    every sample. Its relative error is the rounding divided by |h rate|."""
     return h if rate.is_zero() else (ca.exp(rate * h) - 1) / rate
 
 
 def increment(A: ca.SX, values: Sequence[ca.SX], h: float, doublings: int) -> ca.SX:
-    """h sum_k phi_k(h A) v_k for v_1, v_2, ... = `values`, at most three, of states that act on one another.
+    """h sum_k phi_k(h A) v_k (n,) for `values` v_1, v_2, ... (at most three), A (n, n) coupling the states.
 
-    The series for h/2^doublings, where |h A|/2^doublings must not exceed 1, then phi_k(2 M) from phi_j(M).
+    The series for h/2^doublings, where |h A|/2^doublings must not exceed 1, then phi_k(2 M) from phi_j(M), j <= k.
     """
     order = HELD_ORDER if len(values) == 1 else RAMP_ORDER
     if not doublings:
@@ -60,38 +65,38 @@ def increment(A: ca.SX, values: Sequence[ca.SX], h: float, doublings: int) -> ca
             term = ca.mtimes(M, term) / j
             total += term
         phi.append(total)
-    whole = one + ca.mtimes(M, phi[0])
+    exponential = one + ca.mtimes(M, phi[0])
     for _ in range(doublings):
-        phi, whole = _doubled(phi, whole), ca.mtimes(whole, whole)
+        phi, exponential = _doubled(phi, exponential), ca.mtimes(exponential, exponential)
     return h * sum(ca.mtimes(p, value) for p, value in zip(phi, values, strict=True))
 
 
-def _doubled(phi: list[ca.SX], whole: ca.SX) -> list[ca.SX]:
-    """phi_1(2 M), phi_2(2 M), phi_3(2 M), as far as `phi` goes, from those of M and e^M = `whole`."""
-    twice = [(phi[0] + ca.mtimes(whole, phi[0])) / 2]
+def _doubled(phi: list[ca.SX], exponential: ca.SX) -> list[ca.SX]:
+    """phi_1(2 M), phi_2(2 M), phi_3(2 M), as many as `phi` holds, from those of M and e^M."""
+    doubled = [(phi[0] + ca.mtimes(exponential, phi[0])) / 2]
     if len(phi) > 1:
-        twice.append((ca.mtimes(phi[0], phi[0]) + 2 * phi[1]) / 4)
+        doubled.append((ca.mtimes(phi[0], phi[0]) + 2 * phi[1]) / 4)
     if len(phi) > 2:
-        twice.append((ca.mtimes(phi[0], phi[1]) + 2 * phi[2] + phi[1]) / 8)
-    return twice
+        doubled.append((ca.mtimes(phi[0], phi[1]) + 2 * phi[2] + phi[1]) / 8)
+    return doubled
 
 
 def lag_increment(rates: ca.SX, values: Sequence[ca.SX], h: float) -> ca.SX:
-    """The same for lags that do not act on one another: `rates` (n,) is the diagonal of A. To rounding for every h rate."""
-    own = [_scalar(h * rate, len(values)) for rate in ca.vertsplit(rates)]
-    return h * sum(ca.vertcat(*(row[k] for row in own)) * value for k, value in enumerate(values))
+    """`increment` for uncoupled lags: `rates` (n,) is the diagonal of A. Exact to rounding for every h rate."""
+    phi = [_scalar_phi(h * rate, len(values)) for rate in ca.vertsplit(rates)]
+    return h * sum(ca.vertcat(*(of_lag[k] for of_lag in phi)) * value for k, value in enumerate(values))
 
 
-def _scalar(a: ca.SX, count: int) -> list[ca.SX]:
-    """phi_1(a), ..., phi_count(a) of one number."""
-    small = ca.fabs(a) < SERIES
-    far = ca.if_else(small, 1.0, a)  # keeps 0/0 out of the branch that is not taken
-    closed, found = ca.expm1(far) / far, []
+def _scalar_phi(a: ca.SX, count: int) -> list[ca.SX]:
+    """[phi_1(a), ..., phi_count(a)] of one number: the series near zero, the closed form elsewhere."""
+    small = ca.fabs(a) < SERIES_BELOW
+    safe = ca.if_else(small, 1.0, a)  # keeps 0/0 out of the branch that is not taken
+    closed, phi = ca.expm1(safe) / safe, []
     for k in range(1, count + 1):
         term = total = ca.SX(1 / factorial(k))
         for j in range(k + 1, RAMP_ORDER + k):
             term = term * a / j
             total += term
-        found.append(ca.if_else(small, total, closed))
-        closed = (closed - 1 / factorial(k)) / far
-    return found
+        phi.append(ca.if_else(small, total, closed))
+        closed = (closed - 1 / factorial(k)) / safe
+    return phi
