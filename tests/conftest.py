@@ -13,7 +13,8 @@ from ctrlgen.reporting.plots import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
-DEVICE = SCENARIOS / "devices" / "mems_hexapod.toml"
+DEVICES = SCENARIOS / "devices"
+DEVICE, AXIS_FILE, MESO_FILE = (DEVICES / f"{name}.toml" for name in ("mems_hexapod", "flexure_axis", "meso_hexapod"))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

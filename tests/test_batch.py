@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
-from test_diagnosis_report import axis_recording
+from conftest import AXIS_FILE
+from recording_folders import SERVO, axis_recording, servo_poses
 
 import ctrlgen
 from ctrlgen.app.batch import load_batch, run_batch
@@ -24,25 +24,6 @@ from ctrlgen.app.cli import execute
 from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.evidence.bootstrap import block_length, bootstrap, redrawn
 from ctrlgen.recordings.recording import Record
-
-SERVO = 'kind = "servo"\nname = "table"\ntitle = "a table"\nsource = "an example"\ntravel = "90 deg"\n'
-RECORD = '[[record]]\nfile = "poses.csv"\nrole = "{}"\nrows = [{}, {}]\n'
-HEAD = (
-    'title = "{}"\ndevice = "table"\nkind = "poses"\n[columns]\n"drive.axis" = {{ column = "r", unit = "deg" }}\n'
-    '"reading.axis" = {{ column = "y", unit = "deg", noise = "0.001 deg" }}\n'
-)
-
-
-def servo_poses(folder: Path, gain: float, seed: int) -> Path:
-    """90 settled poses of a table whose reading is off by a share `gain`."""
-    rng = np.random.default_rng(seed)
-    folder.mkdir(parents=True)
-    r = rng.uniform(-80, 80, 90)
-    table = np.column_stack([r, (1 + gain) * r + 1e-3 * rng.standard_normal(90)])
-    np.savetxt(folder / "poses.csv", table, delimiter=",", header="r,y", comments="")
-    parts = RECORD.format("fit", 0, 60) + RECORD.format("hold_out", 60, 90)
-    (folder / "recording.toml").write_text(HEAD.format(folder.name) + parts)
-    return folder
 
 
 @pytest.fixture
@@ -176,7 +157,7 @@ def test_a_cluster_gives_the_same_though_a_worker_is_killed(jobs, tmp_path):
 @pytest.fixture(scope="module")
 def creeping(tmp_path_factory):
     """A diagnosis of an axis that creeps."""
-    axis = SCENARIOS / "devices" / "flexure_axis.toml"
+    axis = AXIS_FILE
     creep = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0"\n'
     folder = axis_recording(tmp_path_factory.mktemp("axis"), axis.read_text() + creep)
     return ctrlgen.diagnose(axis, folder, laws=("creep", "drive_gain", "stiffening"))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_batch import SERVO, servo_poses
+from recording_folders import SERVO, servo_poses
 
 from ctrlgen._version import code_hash
 from ctrlgen.diagnosis.estimation import fit

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from command_line import ctrlgen
-from conftest import DEVICE, SCENARIOS
+from conftest import DEVICE, DEVICES, SCENARIOS
 
 COMMANDS = (
     "run",
@@ -222,7 +222,7 @@ def test_a_compiler_that_says_nothing_is_reported_with_its_command(scenario, tmp
 
 
 def test_a_device_without_dynamics_has_no_frequency_response(tmp_path):
-    devices = SCENARIOS / "devices"
+    devices = DEVICES
     refused(
         ctrlgen("bode", devices / "meso_hexapod.toml", "--out", tmp_path / "b.svg", "--at", "delta_x=1um"),
         "dynamics: has none",
@@ -238,7 +238,7 @@ def test_a_device_without_dynamics_has_no_frequency_response(tmp_path):
 )  # fmt: skip
 def test_the_workspace_of_any_device_is_mapped_by_one_command(tmp_path, name, across, says):
     out = tmp_path / "w"
-    done = ctrlgen("workspace", SCENARIOS / "devices" / f"{name}.toml", "--out", out)
+    done = ctrlgen("workspace", DEVICES / f"{name}.toml", "--out", out)
     assert done.returncode == 0, done.stderr
     assert says in done.stdout and across in done.stdout and "anywhere" in done.stdout
     drawn = (out / "workspace.svg").read_text()
@@ -248,7 +248,7 @@ def test_the_workspace_of_any_device_is_mapped_by_one_command(tmp_path, name, ac
 
 @pytest.mark.long
 def test_a_workspace_is_sliced_where_it_is_asked_for(tmp_path):
-    rrr = SCENARIOS / "devices" / "rrr_case2.toml"
+    rrr = DEVICES / "rrr_case2.toml"
     out = tmp_path / "w"
     done = ctrlgen("workspace", rrr, "--out", out, "--at", "theta_z=-2mrad,delta_x=1um")
     assert done.returncode == 0 and "delta_x 1 um, theta_z -2000 urad" in done.stdout

@@ -6,10 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from axis_records import (
+    AXIS,
+    BACKLASH,
+    FINE,
+    LATE,
+    LIMIT,
+    NOISE,
+    SETTLING,
+    H,
+    drives,
+    fine,
+    fitter_of,
+    move,
+    played,
+    record,
+)
 from scipy.signal import lfilter
-from test_diagnosis_evidence import AXIS, KF, NOISE, SETTLING, C, H, M, move, record
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.isolated_outliers import isolated_outliers
 from ctrlgen.diagnosis.estimation.noise import estimate_noise, stationary_deviation
 from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
@@ -31,50 +46,7 @@ from ctrlgen.effects import Place
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
 
-FINE = 10
-BACKLASH = Hypothesis("backlash", "stage:axis", "axis")
-LATE = Hypothesis("log_creep", "stage:axis", "axis")
-LIMIT = Hypothesis("saturation", "actuator:axis", "axis")
 FADING = Hypothesis("degradation", "actuator:axis", "axis")
-
-
-def drives(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """One that turns every six samples, and one that rests, steps and turns."""
-    t = np.arange(n) * H
-    fit = 0.5 * np.sin(2 * np.pi * 83 * t) + 0.4 * np.sin(2 * np.pi * 23 * t)
-    return fit, np.where(t < 0.1, 0.0, 0.6 * np.sin(2 * np.pi * 61 * t) + 0.3 * np.sign(np.sin(2 * np.pi * 3.1 * t)))
-
-
-def fitter_of(change=lambda u: move(u), after=lambda y: y, n=1500, seed=4) -> Fitter:
-    """A rest, a record to fit and one to hold out; `change` (u -> position), `after` (noisy reading -> reading)."""
-    rng = np.random.default_rng(seed)
-    parts = [record(np.zeros(600), after(NOISE * rng.standard_normal(600)), "rest")]
-    for u, role in zip(drives(n), ("fit", "hold_out"), strict=True):
-        parts.append(record(u, after(change(u) + NOISE * rng.standard_normal(n)), role))
-    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
-    return Fitter(recording, estimate_noise(recording, SETTLING))
-
-
-def fine(u: np.ndarray, push: np.ndarray | float = 0.0) -> np.ndarray:
-    """The position ten times a sample, under a drive held and another force `push` [N]."""
-    from scipy.signal import cont2discrete
-
-    A, B = np.array([[0, 1], [-2e5 / M, -C / M]]), np.array([[0], [1 / M]])
-    Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / FINE)
-    x, out = np.zeros(2), []
-    for force in KF * np.repeat(u, FINE) + push:
-        out.append(x[0])
-        x = Ad @ x + Bd[:, 0] * force
-    return np.array(out)
-
-
-def played(u: np.ndarray, gap: float = 6e-8) -> np.ndarray:
-    """The position behind a play, dragged along between the samples too."""
-    w, out = 0.0, []
-    for q in fine(u):
-        w = max(min(w, q + gap / 2), q - gap / 2)
-        out.append(w)
-    return np.array(out[::FINE])
 
 
 def test_play_is_followed_through_reversals_between_samples():

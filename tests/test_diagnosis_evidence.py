@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
-from scipy.signal import cont2discrete, lfilter
+from axis_records import AXIS, CACHE, KF, NOISE, SETTLING, C, H, K, M, N, axis_fitter, drive, move, record
+from conftest import MESO_FILE
+from scipy.signal import lfilter
 
 from ctrlgen import build_model, load_device, load_scenario
 from ctrlgen.core.to_json import plain
@@ -34,59 +35,11 @@ from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 
-H, N, NOISE = 1e-3, 2500, 5e-9
-SETTLING = 0.5  # s, some dozen time constants of the stage
-M, C, K, KF = 0.5, 30.0, 2e5, 10.0
-AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
 CREEP, DRIFT, CUBIC = (
     Hypothesis("creep", "stage:axis", "axis"),
     Hypothesis("drift", "sensor:axis", "axis"),
     Hypothesis("stiffening", "stage:axis", "axis"),
 )
-CACHE: dict = {}  # compiled responses of the axis, the same in every test
-
-
-def move(u, force=None, fine=10, numbers=(M, C, K, KF)):
-    """Position [m] of the axis under `u` [V], held, plus force(t, q, v, memory) -> (N, memory)."""
-    m, c, stiffness, k_f = numbers
-    A, B = np.array([[0, 1], [-stiffness / m, -c / m]]), np.array([[0], [1 / m]])
-    Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / fine)
-    x, memory, out = np.zeros(2), 0.0, np.zeros(len(u))
-    for k, volts in enumerate(u):
-        out[k] = x[0]
-        for j in range(fine):
-            extra, memory = (0.0, 0.0) if force is None else force((k + j / fine) * H, x[0], x[1], memory)
-            x = Ad @ x + Bd[:, 0] * (k_f * volts + extra)
-    return out
-
-
-def drive(n=N, slow=1.5, fast=0.3):
-    t = np.arange(n) * H
-    return (
-        slow * np.sin(2 * np.pi * 2.3 * t) + fast * np.sin(2 * np.pi * 13.1 * t + 1) + 0.2 * np.sin(2 * np.pi * 41 * t)
-    )
-
-
-def record(u, y, role, first=0.0, h=H):
-    n = len(u)
-    u, y = (np.reshape(v, (n, -1)) for v in (u, y))
-    time = first + np.arange(n) * (h if np.isfinite(h) else 1.0)
-    return Record(role, role, time, h, u, y, False, None, np.ones(y.shape, bool))
-
-
-def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=None, numbers=(M, C, K, KF)):
-    """A record to fit and one to hold out, of another drive, with white noise or what `white` makes of it."""
-    rng = np.random.default_rng(seed)
-    fit_u, held_u = (drive(n), 1.2 * np.sin(2 * np.pi * 1.7 * np.arange(n) * H)) if u is None else (u, u)
-    n, parts = len(fit_u), []
-    for role, given in (("fit", fit_u), ("hold_out", held_u)):
-        e = rng.standard_normal(n)
-        y = change(move(given, force, numbers=numbers), given) + NOISE * (e if white is None else white(e))
-        parts.append(record(given, y, role, first=0.0 if role == "fit" else n * H))
-    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
-    fitter = Fitter(recording, estimate_noise(recording, SETTLING))
-    fitter.cache = CACHE
-    return fitter
 
 
 def mapped(fitter, structure=None):
@@ -168,7 +121,7 @@ def test_the_lines_of_a_periodic_drive_tell_the_class_of_the_nonlinearity(law, w
 
 @pytest.fixture(scope="module")
 def meso():
-    device = load_device(SCENARIOS / "devices" / "meso_hexapod.toml")
+    device = load_device(MESO_FILE)
     channels = tuple(f"reading.{c}" for c in build_model(device).signals["reading"].channels)
     return device, channels, Simulator(device, (), channels, np.inf, False)
 
@@ -357,9 +310,7 @@ def test_the_proposal_for_a_hexapod_is_a_scenario(meso, tmp_path):
         fitter.fit(bare.structure.with_cause(Hypothesis("drive_gain", f"actuator:{at}", at), {"gain": 1e-3}))
         for at in ("2y", "3x")
     ]
-    for name, text in files(
-        fitter, bare, separate(fitter, *pair, ""), str(SCENARIOS / "devices/meso_hexapod.toml")
-    ).items():
+    for name, text in files(fitter, bare, separate(fitter, *pair, ""), str(MESO_FILE)).items():
         (tmp_path / name).write_text(text)
     scenario = load_scenario(tmp_path)
     assert scenario.command(build_model(device)).shape[1] == 6

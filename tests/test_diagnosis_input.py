@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_batch import SERVO, servo_poses
-from test_diagnosis_report import AXIS, MESO, axis_recording, poses_recording
+from conftest import AXIS_FILE, MESO_FILE
+from recording_folders import SERVO, axis_recording, poses_recording, servo_poses
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
@@ -29,7 +29,7 @@ LAWS = (
 @pytest.fixture
 def clean(tmp_path) -> Path:
     """A recording of the axis as its file describes it."""
-    return axis_recording(tmp_path / "clean", AXIS.read_text())
+    return axis_recording(tmp_path / "clean", AXIS_FILE.read_text())
 
 
 def altered(folder: Path, role: str, change) -> None:
@@ -54,7 +54,7 @@ def test_a_cause_without_a_number_is_reported_like_any(tmp_path):
 def test_a_column_of_another_unit_is_no_agreement(clean, unit, named):
     path = clean / "recording.toml"
     path.write_text(path.read_text().replace('"nm"', f'"{unit}"').replace('"5 nm"', f'"5 {unit}"'))
-    found = ctrlgen.diagnose(AXIS, clean, laws=LAWS)
+    found = ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS)
     assert found.verdict == UNEXPLAINED and named in sentence(found) and "excludes" in sentence(found)
     assert "units" in " ".join(next_steps(found))
 
@@ -64,36 +64,36 @@ def test_a_reading_that_counts_backwards_is_a_sign_and_no_lag(clean):
     """The device's own numbers bend to the edge of what they may be first, and hide the sign there."""
     for role in ("fit", "hold_out"):
         altered(clean, role, lambda y: -y)
-    found = ctrlgen.diagnose(AXIS, clean, laws=LAWS)
+    found = ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS)
     assert [f.effect for f in found.findings] == ["reversed"]
 
 
 def test_numbers_as_uncertain_as_they_are_stated_are_no_contradiction(clean):
-    assert ctrlgen.diagnose(AXIS, clean, laws=LAWS).verdict == CONSISTENT
+    assert ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS).verdict == CONSISTENT
 
 
 @pytest.mark.parametrize("kept", [0, 1, 19])
 def test_a_channel_of_few_numbers_is_refused(clean, kept):
     altered(clean, "hold_out", lambda y: np.where(np.arange(len(y)) < kept, y, np.nan))
     with pytest.raises(InputError, match=f"has {kept} numbers in 600 rows of hold_out.csv"):
-        ctrlgen.diagnose(AXIS, clean, laws=LAWS)
+        ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS)
 
 
 def test_a_dead_channel_alone_is_refused(clean):
     for role in ("fit", "hold_out"):
         altered(clean, role, lambda y: np.full(len(y), 5.0))
     with pytest.raises(InputError, match="reads 5 nm in all records"):
-        ctrlgen.diagnose(AXIS, clean, laws=LAWS)
+        ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS)
 
 
 def test_a_dead_channel_beside_live_ones_is_named_and_left_out(tmp_path):
-    folder = poses_recording(tmp_path, ctrlgen.load_device(MESO))
+    folder = poses_recording(tmp_path, ctrlgen.load_device(MESO_FILE))
     with (folder / "poses.csv").open() as file:
         names = file.readline().strip().split(",")
     rows = np.loadtxt(folder / "poses.csv", delimiter=",", skiprows=1)
     rows[:, names.index("reading.delta_y")] = 12.5
     np.savetxt(folder / "poses.csv", rows, delimiter=",", header=",".join(names), comments="")
-    found = ctrlgen.diagnose(MESO, folder, laws=LAWS)
+    found = ctrlgen.diagnose(MESO_FILE, folder, laws=LAWS)
     assert [(f.effect, f.location) for f in found.findings] == [("stuck", "sensor:delta_y")]
     level = found.findings[0].parameters["level"]
     assert (level.value, level.unit) == (pytest.approx(12.5), "um") and "reading.delta_y" not in found.held_out
@@ -107,7 +107,7 @@ def test_a_rest_that_reads_one_number_does_not_tell_the_noise(clean):
     record = '[[record]]\nfile = "rest.csv"\nrole = "rest"\ntime = { column = "t", unit = "s" }\n'
     path = clean / "recording.toml"
     path.write_text(path.read_text() + record)
-    found = ctrlgen.diagnose(AXIS, clean, laws=LAWS)
+    found = ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS)
     assert found.verdict == CONSISTENT and found.held_out["reading.axis"].noise_floor == pytest.approx(5.0)
 
 
@@ -147,8 +147,8 @@ def test_agreement_without_a_known_noise_says_how_far_it_goes(tmp_path):
 def test_only_the_effects_asked_for_are_considered_and_the_answer_says_so(tmp_path):
     """A creeping axis, diagnosed without creep among the hypotheses."""
     creep = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
-    folder = axis_recording(tmp_path / "creeping", AXIS.read_text() + creep)
-    found = ctrlgen.diagnose(AXIS, folder, laws=("stiffening", "home_offset"))
+    folder = axis_recording(tmp_path / "creeping", AXIS_FILE.read_text() + creep)
+    found = ctrlgen.diagnose(AXIS_FILE, folder, laws=("stiffening", "home_offset"))
     tried = {c.hypothesis.effect for round_ in found.search.rounds for c in round_.screened.suspects}
     assert tried <= {"stiffening", "home_offset", "parameter"} and "stiffening" in tried
     assert found.notes[-1].endswith("home_offset, stiffening") and found.verdict != EXPLAINED
@@ -157,4 +157,4 @@ def test_only_the_effects_asked_for_are_considered_and_the_answer_says_so(tmp_pa
 
 def test_an_effect_that_does_not_exist_is_refused_with_those_that_do(clean):
     with pytest.raises(InputError, match=r"creeep: is not a known effect; known are: .*creep"):
-        ctrlgen.diagnose(AXIS, clean, laws=("creeep",))
+        ctrlgen.diagnose(AXIS_FILE, clean, laws=("creeep",))

@@ -12,13 +12,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import AXIS_FILE, MESO_FILE, SCENARIOS
+from recording_folders import axis_recording, poses_recording
 from result_files import faults
 
 import ctrlgen
 from ctrlgen.app.cli import execute
 from ctrlgen.core.to_json import plain
-from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, Profile
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
@@ -31,81 +31,26 @@ from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.selection.result import Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED
 
-AXIS, MESO = SCENARIOS / "devices" / "flexure_axis.toml", SCENARIOS / "devices" / "meso_hexapod.toml"
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
-STEP = 1e-3
 LAWS = (
     "creep",
     "drive_gain",
     "home_offset",
     "stiffening",
 )  # four effects instead of all: the report is the same, and quick
-RECORD = '[[record]]\nfile = "{0}.csv"\nrole = "{0}"\ntime = {{ column = "t", unit = "s" }}\n'
-
-
-def axis_recording(folder: Path, true: str, title: str = "creeping axis") -> Path:
-    """Two records of the axis described by the text `true`, with 5 nm of noise; the nominal model is AXIS."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "true.toml").write_text(true)
-    model, rng = ctrlgen.build_model(ctrlgen.load_device(folder / "true.toml")), np.random.default_rng(3)
-    t = STEP * np.arange(1200)
-    drives = {
-        "fit": sum(np.sin(2 * np.pi * f * t + f) for f in (0.8, 1.7, 3.1, 7, 19, 47, 95)) / 4,
-        "hold_out": np.repeat(rng.uniform(-1, 1, 6), 100),
-    }
-    for role, u in drives.items():
-        trace = ctrlgen.simulate(model, u[:, None], STEP)
-        y = from_si(trace.signals["reading"][:-1, 0], "nm") + 5 * rng.standard_normal(len(u))
-        rows = np.column_stack([STEP * np.arange(len(u)), u, y])
-        np.savetxt(folder / f"{role}.csv", rows, delimiter=",", header="t,u,y", comments="")
-    (folder / "recording.toml").write_text(
-        f'title = "{title}"\ndevice = "flexure_axis"\nkind = "series"\n[columns]\n'
-        '"drive.axis" = { column = "u", unit = "V" }\n"reading.axis" = { column = "y", unit = "nm", noise = "5 nm" }\n'
-        + "".join(RECORD.format(role) for role in drives)
-    )
-    return folder
-
-
-def poses_recording(folder: Path, device) -> Path:
-    """Settled poses of a meso-scale hexapod with a noise of 10 nm and 10 nrad."""
-    rng, n = np.random.default_rng(5), 40
-    model = ctrlgen.build_model(device)
-    channels = tuple(f"reading.{c}" for c in model.signals["pose"].channels)
-    units = model.signals["pose"].units
-    drives = rng.uniform(-400e-6, 400e-6, (n, 6))
-    from ctrlgen.recordings.recording import Record
-
-    none = np.zeros((n, 6))
-    record = Record("", "fit", np.arange(n), np.inf, drives, none, False, None, none == 0)
-    pose = Simulator(device, (), channels, np.inf, False).simulate(record, np.zeros(0)) + 1e-8 * rng.standard_normal(
-        (n, 6)
-    )
-    axes = model.signals["drive"].channels
-    columns = [from_si(drives, "um"), *(from_si(pose[:, [i]], unit) for i, unit in enumerate(units))]
-    header = ",".join((*axes, *channels))
-    np.savetxt(folder / "poses.csv", np.hstack(columns), delimiter=",", header=header, comments="")
-    lines = [f'"drive.{a}" = {{ column = "{a}", unit = "um" }}' for a in axes]
-    for channel, unit in zip(channels, units, strict=True):
-        noise = from_si(1e-8, unit)
-        lines.append(f'"{channel}" = {{ column = "{channel}", unit = "{unit}", noise = "{noise:.9g} {unit}" }}')
-    records = [f'[[record]]\nfile = "poses.csv"\nrole = "{r}"\nrows = {rows}\n' for r, rows in PARTS.items()]
-    head = 'title = "turned strut"\ndevice = "meso_hexapod"\nkind = "poses"\n[columns]\n'
-    (folder / "recording.toml").write_text(head + "\n".join(lines) + "\n" + "".join(records))
-    return folder
 
 
 MADE_FROM = Provenance({"flexure_axis.toml": "0" * 64}, 3)
-PARTS = {"fit": [0, 25], "hold_out": [25, 40]}
 
 
 @pytest.fixture(scope="module")
 def creeping(tmp_path_factory) -> Path:
-    return axis_recording(tmp_path_factory.mktemp("creeping"), AXIS.read_text() + CREEP)
+    return axis_recording(tmp_path_factory.mktemp("creeping"), AXIS_FILE.read_text() + CREEP)
 
 
 @pytest.fixture(scope="module")
 def found(creeping):
-    return ctrlgen.diagnose(AXIS, creeping, laws=LAWS)
+    return ctrlgen.diagnose(AXIS_FILE, creeping, laws=LAWS)
 
 
 def same_prediction(diagnosis, text: str, folder: Path) -> None:
@@ -166,8 +111,8 @@ def test_numbers_that_are_none_are_null():
 
 
 def test_the_next_device_keeps_the_authors_text_and_predicts_what_the_fit_predicts(found, tmp_path):
-    text = next_text(found, AXIS.read_text())
-    kept = [line for line in AXIS.read_text().splitlines() if "sd =" not in line]
+    text = next_text(found, AXIS_FILE.read_text())
+    kept = [line for line in AXIS_FILE.read_text().splitlines() if "sd =" not in line]
     assert [line for line in text.splitlines() if line in kept and line] == [line for line in kept if line]
     assert 'was 0.5 kg"' in text and "refitted to creeping axis" in text
     assert "# Diagnosed from 'creeping axis'" in text and "Held-out error of axis" in text
@@ -176,7 +121,7 @@ def test_the_next_device_keeps_the_authors_text_and_predicts_what_the_fit_predic
 
 
 def test_the_next_device_states_the_deviations_of_the_fit(found, tmp_path):
-    (tmp_path / "next.toml").write_text(next_text(found, AXIS.read_text()))
+    (tmp_path / "next.toml").write_text(next_text(found, AXIS_FILE.read_text()))
     device, fit = ctrlgen.load_device(tmp_path / "next.toml"), found.search.chosen.fit
     stated = dict(device.quantities())
     for unknown, variance in zip(fit.structure.free_parameters, np.diag(fit.covariance), strict=True):
@@ -196,7 +141,7 @@ def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(foun
         findings=(*found.findings, read),
         search=replace(found.search, chosen=replace(trial, fit=fit)),
     )
-    (tmp_path / "next.toml").write_text(next_text(told, AXIS.read_text()))
+    (tmp_path / "next.toml").write_text(next_text(told, AXIS_FILE.read_text()))
     device = ctrlgen.load_device(tmp_path / "next.toml")
     assert [e.kind for e in device.effect] == ["creep", "saturation", "quantisation"]
     assert device.effect[1].values["share"].si == 1.0 and device.effect[1].values["level"].si == pytest.approx(2.0)
@@ -204,7 +149,7 @@ def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(foun
 
 
 def test_an_effect_that_is_there_already_stays_and_the_new_one_follows(creeping, tmp_path):
-    known = AXIS.read_text() + "\n# glue\n" + CREEP.replace("0.03", "0.01").replace("0.2 s", "0.05 s")
+    known = AXIS_FILE.read_text() + "\n# glue\n" + CREEP.replace("0.03", "0.01").replace("0.2 s", "0.05 s")
     (tmp_path / "known.toml").write_text(known)
     again = ctrlgen.diagnose(tmp_path / "known.toml", creeping, laws=LAWS)
     text = next_text(again, known)
@@ -214,7 +159,7 @@ def test_an_effect_that_is_there_already_stays_and_the_new_one_follows(creeping,
 
 def test_effects_written_in_one_line_are_continued_in_that_line(creeping, tmp_path):
     first = 'effect = [{ kind = "home_offset", at = "axis", offset = "0 um" }] # level\n'
-    known = first + AXIS.read_text()
+    known = first + AXIS_FILE.read_text()
     (tmp_path / "known.toml").write_text(known)
     again = ctrlgen.diagnose(tmp_path / "known.toml", creeping, laws=LAWS)
     text = next_text(again, known)
@@ -226,10 +171,10 @@ def test_effects_written_in_one_line_are_continued_in_that_line(creeping, tmp_pa
 @pytest.mark.parametrize("layout", ["table", "text"])
 def test_a_number_in_a_list_changes_in_place_and_says_what_it_was(tmp_path, layout):
     row = '  { value = "51 deg", source = "S0 Table 1, phi_4" },'
-    written = MESO.read_text() if layout == "table" else MESO.read_text().replace(row, '  "51 deg", # mine')
+    written = MESO_FILE.read_text() if layout == "table" else MESO_FILE.read_text().replace(row, '  "51 deg", # mine')
     assert layout == "table" or "# mine" in written
     (tmp_path / "device.toml").write_text(written)
-    (tmp_path / "true.toml").write_text(MESO.read_text().replace('"51 deg"', '"51.2 deg"', 1))
+    (tmp_path / "true.toml").write_text(MESO_FILE.read_text().replace('"51 deg"', '"51.2 deg"', 1))
     folder = poses_recording(tmp_path, ctrlgen.load_device(tmp_path / "true.toml"))
     turned = ctrlgen.diagnose(tmp_path / "device.toml", folder, laws=LAWS)
     assert [f.cause.path for f in turned.findings] == ["hexapod.platform_angles[3]"]
@@ -363,12 +308,12 @@ def command(*words: object) -> int:
 
 def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path, capsys):
     out = tmp_path / "out"
-    assert command("diagnose", AXIS, creeping, "--out", out, "--seed", 3, "--laws", ",".join(LAWS)) == 0
+    assert command("diagnose", AXIS_FILE, creeping, "--out", out, "--seed", 3, "--laws", ",".join(LAWS)) == 0
     assert {p.name for p in out.iterdir()} == {"report.html", "diagnosis.json", "device.next.toml", ".ctrlgen"}
     printed = capsys.readouterr().out
     told = json.loads((out / "diagnosis.json").read_text())
     assert faults(told, "diagnosis") == [] and told["seed"] == 3
-    assert set(told["inputs"]) >= {AXIS.name} and len(told["inputs"]) == 4  # device, recording.toml, two tables
+    assert set(told["inputs"]) >= {AXIS_FILE.name} and len(told["inputs"]) == 4  # device, recording.toml, two tables
     assert "Explained: a flexure" in printed and "stage:axis" in printed and str(out / "report.html") in printed
     page_text = (out / "report.html").read_text()
     assert "seed 3" in page_text and "/fit.csv" in page_text and "/recording.toml" in page_text
@@ -381,7 +326,7 @@ def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path
 
 @pytest.mark.parametrize("where", [("--jobs", 2), ("--scheduler", "tcp://nowhere:1")])
 def test_a_place_for_replicates_that_nobody_asked_for_is_refused(creeping, tmp_path, capsys, where):
-    assert command("diagnose", AXIS, creeping, "--out", tmp_path / "out", *where) == 2
+    assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path / "out", *where) == 2
     assert "--bootstrap" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
@@ -395,12 +340,12 @@ def without_values(folder: Path) -> Path:
 
 @pytest.mark.parametrize(
     ("spoil", "device", "says"),
-    [(lambda f: f, MESO, "'flexure_axis' is not 'meso_hexapod'"), (lambda f: f / "none", AXIS, "does not exist"),
-     (lambda f: f, SCENARIOS / "none.toml", "does not exist"), (without_values, AXIS, "reading.axis")],
+    [(lambda f: f, MESO_FILE, "'flexure_axis' is not 'meso_hexapod'"), (lambda f: f / "none", AXIS_FILE, "does not exist"),
+     (lambda f: f, SCENARIOS / "none.toml", "does not exist"), (without_values, AXIS_FILE, "reading.axis")],
     ids=["device of another recording", "no recording", "no device file", "empty channel"],
 )  # fmt: skip
 def test_bad_input_is_refused_with_status_2_and_nothing_is_written(tmp_path, capsys, spoil, device, says):
-    folder = spoil(axis_recording(tmp_path / "given", AXIS.read_text()))
+    folder = spoil(axis_recording(tmp_path / "given", AXIS_FILE.read_text()))
     assert command("diagnose", device, folder, "--out", tmp_path / "out") == 2
     told = capsys.readouterr()
     assert says in told.err and "fault" in told.err and told.out == ""
@@ -409,7 +354,7 @@ def test_bad_input_is_refused_with_status_2_and_nothing_is_written(tmp_path, cap
 
 def test_a_foreign_folder_is_refused(creeping, tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("precious")
-    assert command("diagnose", AXIS, creeping, "--out", tmp_path) == 2
+    assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path) == 2
     assert "did not make" in capsys.readouterr().err and [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
@@ -422,27 +367,27 @@ def test_an_interruption_keeps_the_earlier_result(creeping, tmp_path, at):
             raise KeyboardInterrupt
 
     out = tmp_path / "out"
-    diagnose_into(AXIS, [creeping], out, laws=LAWS)
+    diagnose_into(AXIS_FILE, [creeping], out, laws=LAWS)
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     with pytest.raises(KeyboardInterrupt):
-        diagnose_into(AXIS, [creeping], out, progress=stop, laws=LAWS)
+        diagnose_into(AXIS_FILE, [creeping], out, progress=stop, laws=LAWS)
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
     assert set(tmp_path.iterdir()) <= {out, unfinished(out)}  # the fits, for when it is asked again
 
 
 def test_objects_and_paths_give_the_same_answer_and_the_same_page(creeping, found):
-    device = ctrlgen.load_device(AXIS)
+    device = ctrlgen.load_device(AXIS_FILE)
     again = ctrlgen.diagnose(device, ctrlgen.load_recordings([creeping], ctrlgen.build_model(device)), laws=LAWS)
     assert isinstance(again, ctrlgen.Diagnosis) and diagnosis_record(again, MADE_FROM) == diagnosis_record(
         found, MADE_FROM
     )
     assert page(again, Provenance({}, 0)) == page(found, Provenance({}, 0))
-    several = ctrlgen.diagnose(str(AXIS), [str(creeping / "recording.toml")], laws=LAWS)
+    several = ctrlgen.diagnose(str(AXIS_FILE), [str(creeping / "recording.toml")], laws=LAWS)
     assert diagnosis_record(several, MADE_FROM) == diagnosis_record(found, MADE_FROM)
 
 
 def test_check_says_what_the_gate_lets_through(creeping, capsys):
-    assert command("check", creeping, "--device", AXIS) == 0
+    assert command("check", creeping, "--device", AXIS_FILE) == 0
     printed = capsys.readouterr().out
     assert "creeping axis" in printed and "hold_out" in printed and "0 of 1200" in printed
     assert command("check", creeping) == 1

@@ -9,7 +9,7 @@ from math import factorial
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import AXIS_FILE
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -171,7 +171,7 @@ def test_rates_that_are_not_linear_are_of_second_order(linear):
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 6e-3])
 def test_a_linear_stage_with_inertia_moves_as_its_matrix_exponential(h, linear):
     u = broken_line(40)
-    x, z = walked(build_model(load_device(SCENARIOS / "devices" / "flexure_axis.toml")), u[:, None], h, linear)
+    x, z = walked(build_model(load_device(AXIS_FILE)), u[:, None], h, linear)
     A = np.array([[-30 / 0.5, -2e5 / 0.5], [1, 0]])  # velocity, displacement; kg, N s/m, N/m, N/V
     exact = lti(A, np.array([10 / 0.5, 0]), u, h, linear)
     assert np.abs(z[:, 0] - exact[:, 1]).max() < ROUNDING * np.abs(exact[:, 1]).max()
@@ -185,7 +185,7 @@ MASS, DAMPING, STIFFNESS, MOTOR, K3 = (
     10.0,
     2e12,
 )  # k3: a sixth stiffer at the end of the travel, so that no contact asks for steps
-AXIS = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
+AXIS = AXIS_FILE.read_text()
 PIECES, COARSE = 24, 4e-3
 
 

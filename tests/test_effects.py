@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 import pint
 import pytest
-from conftest import DEVICE, SCENARIOS
+from conftest import AXIS_FILE, DEVICE
 
 import ctrlgen.effects
 from ctrlgen import Controller, build_model, simulate
@@ -41,7 +41,7 @@ every_effect = pytest.mark.parametrize("effect", Effect.library.values(), ids=Ef
 @cache
 def tables() -> tuple[dict, ...]:
     """A device with heaters and no inertia, one with inertia, one whose motion is imposed."""
-    files = (DEVICE, SCENARIOS / "devices" / "flexure_axis.toml")
+    files = (DEVICE, AXIS_FILE)
     return (*(tomllib.loads(path.read_text()) for path in files), TESTED)
 
 

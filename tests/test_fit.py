@@ -6,14 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from axis_records import AXIS
+from conftest import DEVICES
 
 from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 
-AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
 N = 1000
 
 
@@ -63,7 +63,7 @@ def test_a_fit_leaves_noise_up_to_four_deviations_of_its_squares(side, noise):
     assert Fit(fit.structure, fit.theta, (), left - 3.0, N, fit.residual, fit.J, 3.0).is_noise == noise
 
 
-@pytest.mark.parametrize("path", sorted((SCENARIOS / "devices").glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted((DEVICES).glob("*.toml")), ids=lambda path: path.stem)
 def test_a_number_of_a_device_is_changed_where_it_stands_and_no_other(path):
     device = load_device(path)
     before = dict(device.quantities())

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS, effect_device
+from conftest import AXIS_FILE, SCENARIOS, effect_device
 
 from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
 from ctrlgen.firmware.cprint import Real
@@ -382,7 +382,7 @@ int main(void)
 
 def axis_scenario(folder: Path, more: str = ""):
     """A scenario on the axis with inertia, with `more` in its device file."""
-    (folder / "device.toml").write_text((SCENARIOS / "devices" / "flexure_axis.toml").read_text() + more)
+    (folder / "device.toml").write_text(AXIS_FILE.read_text() + more)
     (folder / "scenario.toml").write_text(
         'title = "a line"\ndevice = "device.toml"\nsample_rate = "2 kHz"\n'
         'duration = "0.1 s"\n[path]\nkind = "line"\nstart = {}\nend = { axis = "10 um" }\n'

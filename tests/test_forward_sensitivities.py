@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import AXIS_FILE
 
 from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation import sample_equations
@@ -20,7 +20,7 @@ from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
 
 H, N = 1e-3, 300
-AXIS = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
+AXIS = AXIS_FILE.read_text()
 LOOP = '\n[loop]\nposition_gain = "60 1/s"\nvelocity_gain = "20 V/(m/s)"\nintegral_gain = "5e4 V/(m*s)"\n'
 SHAPES = {
     "creep": {"gain": 0.05, "tau": 0.1, "slow": 0.2}, "bouc_wen": {"stiffness": 1e4, "reach": 3e-5, "loop": 0.9},

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import cos, pi, sin
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from conftest import DEVICE
 from direct_stiffness import Frame, assemble, section_loads
 
 from ctrlgen.devices import load_device
 from ctrlgen.physics import hexapod, screw, thermal_actuator, xy_stage
 
-DEVICE = Path(__file__).parents[1] / "scenarios/devices/mems_hexapod.toml"
 MICRO = 1e-6
 
 KINEMATIC_J = """

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from command_line import ctrlgen
-from conftest import DEVICE, SCENARIOS
+from conftest import AXIS_FILE, DEVICE, DEVICES, SCENARIOS
 
 from ctrlgen import InputError, build_model, load_device, load_recordings, load_scenario
 from ctrlgen.core.files import whole_folder, write_bytes
@@ -115,7 +115,7 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     (tmp_path / "recording.toml").write_bytes(BOM + AXIS.replace("FILE", "run.csv").encode())
     rows = "".join(f"{0.001 * (k % 50)},{0.01 * (k % 50)}\n" for k in range(400))
     (tmp_path / "run.csv").write_bytes(BOM + b"u,y\n" + rows.encode())
-    axis = build_model(load_device(SCENARIOS / "devices" / "flexure_axis.toml"))
+    axis = build_model(load_device(AXIS_FILE))
     assert load_recordings([tmp_path], axis).channels == ("reading.axis",)
 
 
@@ -123,7 +123,7 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
 def test_a_folder_in_place_of_a_measurement(tmp_path, name):
     (tmp_path / name).mkdir()
     (tmp_path / "recording.toml").write_text(AXIS.replace("FILE", name))
-    axis = SCENARIOS / "devices" / "flexure_axis.toml"
+    axis = AXIS_FILE
     done = ctrlgen("diagnose", axis, tmp_path, "--out", tmp_path / "out")
     refused(done, f"record[0].file: {name} is a folder; name the file inside it", status=2)
 
@@ -131,7 +131,7 @@ def test_a_folder_in_place_of_a_measurement(tmp_path, name):
 def test_json_that_is_nested_without_end(tmp_path):
     (tmp_path / "run.json").write_text(json.dumps({"u": [1, 2]})[:-1] + f', "y": {"[" * 100_000}')
     (tmp_path / "recording.toml").write_text(AXIS.replace("FILE", "run.json"))
-    axis = SCENARIOS / "devices" / "flexure_axis.toml"
+    axis = AXIS_FILE
     done = ctrlgen("diagnose", axis, tmp_path, "--out", tmp_path / "out")
     refused(done, "record[0].file: run.json cannot be read as .json", status=2)
 
@@ -165,7 +165,7 @@ def test_a_result_folder_that_is_a_link_to_itself(tmp_path, command):
         ("reproduce", "S2", "--out", "FILE/p.html"),
         ("example", "circle20", "--to", "FILE"),
         ("fmu", SCENARIOS / "rrr_circle", "--out", "FILE"),
-        ("workspace", SCENARIOS / "devices" / "rrr_case1.toml", "--out", "FILE/out"),
+        ("workspace", DEVICES / "rrr_case1.toml", "--out", "FILE/out"),
     ],
     ids=lambda words: words[0],
 )

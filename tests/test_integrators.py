@@ -5,13 +5,13 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import AXIS_FILE
 
 import ctrlgen
 from ctrlgen import build_model, load_device, simulate
 from ctrlgen.model import integrators
 
-AXIS = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
+AXIS = AXIS_FILE.read_text()
 MASS, DAMPING, STIFFNESS, MOTOR = 0.5, 30.0, 2e5, 10.0
 H, N = 1e-3, 400
 TIME = H * np.arange(N)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import MESO_FILE
 from scipy.spatial.transform import Rotation
 
 from ctrlgen import build_model, simulate
@@ -21,7 +21,7 @@ DEG, UM = np.pi / 180, 1e-6
 
 @pytest.fixture(scope="module")
 def device():
-    return load_device(SCENARIOS / "devices" / "meso_hexapod.toml")
+    return load_device(MESO_FILE)
 
 
 @pytest.fixture(scope="module")

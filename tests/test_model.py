@@ -3,7 +3,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import SCENARIOS, effect_device
+from conftest import AXIS_FILE, effect_device
 from scipy.linalg import expm
 
 from ctrlgen import InputError, build_model, load_device, simulate
@@ -218,7 +218,7 @@ def test_two_effects_of_one_kind_keep_their_own_states():
 @pytest.mark.parametrize("measures", ["reading", "displacement"])
 def test_a_loop_is_closed_on_what_it_measures(tmp_path, measures):
     """A sensor that reads 10 % too much misleads the controller that reads it, and no other."""
-    text = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
+    text = AXIS_FILE.read_text()
     loop = 'position_gain = "60 1/s"\nvelocity_gain = "20 V/(m/s)"\nintegral_gain = "5e4 V/(m*s)"\n'
     ends = []
     for effect in ("", '\n[[effect]]\nkind = "sensor_gain"\nat = "axis"\ngain = "10 %"\n'):

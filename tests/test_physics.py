@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from decimal import Decimal, localcontext
 from math import asin, cos, isclose, pi, radians, sin, sqrt
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,11 +11,11 @@ import casadi as ca
 import direct_stiffness as direct
 import numpy as np
 import pytest
+from conftest import DEVICE
 
 from ctrlgen.devices import load_device
 from ctrlgen.physics import flexure, hexapod, screw, thermal_actuator, xy_stage
 
-DEVICE = Path(__file__).parents[1] / "scenarios/devices/mems_hexapod.toml"
 MICRO = 1e-6
 
 PRINTED_K_TB = """

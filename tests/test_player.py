@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import DEVICE, SCENARIOS
 
 from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.firmware import spline
@@ -40,7 +40,7 @@ def line(tmp_path, samples, end="1 um"):
     """An open path, at rest at both ends."""
     path = tmp_path / "line.toml"
     path.write_text(f"""title = "line"
-device = "{SCENARIOS / "devices" / "mems_hexapod.toml"}"
+device = "{DEVICE}"
 sample_rate = "1 kHz"
 duration = "{samples} ms"
 [path]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT, SCENARIOS
+from conftest import MESO_FILE, ROOT, SCENARIOS
 from recorded import AXES, COLUMNS, N, csv_text, described, refused, samples, two
 
 from ctrlgen import build_model, load_device
@@ -22,7 +22,7 @@ MEASURED = Path(os.environ.get("CTRLGEN_RECORDINGS", ROOT.parent / "shared" / "r
 
 @pytest.fixture(scope="module")
 def meso():
-    return build_model(load_device(SCENARIOS / "devices" / "meso_hexapod.toml"))
+    return build_model(load_device(MESO_FILE))
 
 
 # what a record holds

@@ -11,12 +11,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from axis_records import AXIS, NOISE, SETTLING, H, move, record
 from conftest import DEVICE, SCENARIOS
 from scipy.linalg import expm
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
-from test_diagnosis_evidence import AXIS, NOISE, SETTLING, H, move, record
 
 import ctrlgen.effects  # noqa: F401
 from battery import laws

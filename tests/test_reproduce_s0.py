@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import ROOT, SCENARIOS
+from conftest import MESO_FILE, ROOT, SCENARIOS
 from scipy.stats import t as student
 
 from ctrlgen.core.errors import InputError
@@ -30,7 +30,7 @@ DEG, UM = np.pi / 180, 1e-6
 
 @pytest.fixture(scope="module")
 def device():
-    return load_device(SCENARIOS / "devices" / "meso_hexapod.toml")
+    return load_device(MESO_FILE)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import rrr_direct as direct
-from conftest import SCENARIOS
+from conftest import DEVICES
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices import rrr_stage as device_module
@@ -69,7 +69,7 @@ def corrected(case: int) -> rrr_stage.Kinetostatics:
 
 
 def test_a_hinge_that_would_give_energy_away_is_refused_by_its_name(tmp_path: Any) -> None:
-    text = (SCENARIOS / "devices" / "rrr_case2.toml").read_text()
+    text = (DEVICES / "rrr_case2.toml").read_text()
     assert text.count('value = "1.5"') == 3
     path = tmp_path / "device.toml"
     path.write_text(text.replace('value = "1.5"', 'value = "0"'))
@@ -82,7 +82,7 @@ def test_a_hinge_that_would_give_energy_away_is_refused_by_its_name(tmp_path: An
 
 def test_the_hinges_may_choose_their_own_equations(tmp_path: Any) -> None:
     """A device file whose hinges say "auto": another stiffness, but hardly another Jacobian (S3 section 5.1.1)."""
-    lines = (SCENARIOS / "devices" / "rrr_case2.toml").read_text().splitlines()
+    lines = (DEVICES / "rrr_case2.toml").read_text().splitlines()
     auto = ['equation = "auto"' if line.startswith("equation = ") else line for line in lines]
     assert auto != lines
     path = tmp_path / "device.toml"
@@ -381,7 +381,7 @@ def test_the_workspace_is_as_far_as_the_voltages_reach(case: int) -> None:
 def test_a_circle_is_solved_with_voltages_that_the_static_map_gives(tmp_path: Any) -> None:
     path = tmp_path / "scenario.toml"
     path.write_text(
-        f'''title = "circle"\ndevice = "{SCENARIOS / "devices" / "rrr_case2.toml"}"
+        f'''title = "circle"\ndevice = "{DEVICES / "rrr_case2.toml"}"
         sample_rate = "100 Hz"\nduration = "1 s"\n[path]\nkind = "circle"\ndiameter = "20 um"
         plane = ["delta_x", "delta_y"]\ncentre = {{ theta_z = "-2 mrad" }}\n'''
     )

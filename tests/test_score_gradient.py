@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import DEVICE
 
 from ctrlgen import build_model, load_device
 from ctrlgen.diagnosis.estimation.fit import Fitter
@@ -23,7 +23,7 @@ from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.recordings.recording import Record, Recording
 
 H, N = 1e-3, 700
-HEXAPOD = load_device(SCENARIOS / "devices" / "mems_hexapod.toml")
+HEXAPOD = load_device(DEVICE)
 LAWS = [
     Hypothesis("creep", "stage:1X", "1X"), Hypothesis("stiffening", "stage:2Y", "2Y"),
     Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("drive_gain", "actuator:1Y", "1Y"),

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, fitter_of, move, played
 from scipy.signal import lfilter
-from test_diagnosis_causes import BACKLASH, LATE, LIMIT, fitter_of, played
-from test_diagnosis_evidence import AXIS, NOISE, H, move
 
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise_colour

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import DEVICE
 
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, simulate, solve
 
@@ -14,9 +14,7 @@ def scenario(tmp_path):
     """A scenario from text, beside the shipped device."""
 
     def write(text: str):
-        (tmp_path / "scenario.toml").write_text(
-            f'title = "t"\ndevice = "{SCENARIOS / "devices" / "mems_hexapod.toml"}"\n{text}'
-        )
+        (tmp_path / "scenario.toml").write_text(f'title = "t"\ndevice = "{DEVICE}"\n{text}')
         return load_scenario(tmp_path)
 
     return write

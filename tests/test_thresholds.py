@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from axis_records import AXIS
 from scipy import stats
 
-from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.residual_tests import cross_correlation, run_residual_tests
@@ -227,9 +226,6 @@ def test_an_amplitude_that_is_not_usual_is_something_else(value, means):
     t = trial(numbers=2, causes=(GAIN,), theta=[0.5, value], usual=(0.8, 1.2))
     t.fit.structure.free_parameters = (number(), number(0, high=2.0))
     assert weighing().physically_meaningful(t) == means
-
-
-AXIS = load_device(SCENARIOS / "devices" / "flexure_axis.toml")
 
 
 def fitted(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SCENARIOS
+from conftest import DEVICES
 
 from ctrlgen import InputError, build_model, load_device
 from ctrlgen.core.files import validate
@@ -22,7 +22,7 @@ EDDY = {"kind": "displacement", "at": "delta_x", "model": "3316"}
 
 
 def with_sensors(kind: str, *sensors: dict[str, Any]) -> Model:
-    table = tomllib.loads((SCENARIOS / "devices" / f"{kind}.toml").read_text())
+    table = tomllib.loads((DEVICES / f"{kind}.toml").read_text())
     table["sensor"] = list(sensors)
     return build_model(validate(Device.library[table["kind"]], table, "device with sensors"))
 
@@ -36,7 +36,7 @@ def ramp(model: Model, channel: str, end: float, seconds: float) -> Trace:
 
 @pytest.fixture(scope="module")
 def stage() -> Model:
-    return build_model(load_device(SCENARIOS / "devices" / "rrr_case2.toml"))
+    return build_model(load_device(DEVICES / "rrr_case2.toml"))
 
 
 def test_the_shipped_stage_is_read_by_the_sensors_of_s2(stage):

@@ -1,0 +1,103 @@
+"""Records of the flexure axis that ctrlgen had no part in: exact steps of m, c, k, ten or more a sample, and their fitters."""
+
+from __future__ import annotations
+
+import numpy as np
+from conftest import AXIS_FILE
+from scipy.signal import cont2discrete
+
+from ctrlgen import load_device
+from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.estimation.noise import estimate_noise
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.recordings.recording import Record, Recording
+
+H, N, NOISE = 1e-3, 2500, 5e-9  # sample time [s], samples, noise of a reading [m]
+SETTLING = 0.5  # s, some dozen time constants of the stage
+M, C, K, KF = 0.5, 30.0, 2e5, 10.0
+AXIS = load_device(AXIS_FILE)
+FINE = 10  # steps a sample
+CACHE: dict = {}  # compiled responses of the axis, the same in every test
+BACKLASH = Hypothesis("backlash", "stage:axis", "axis")
+LATE = Hypothesis("log_creep", "stage:axis", "axis")
+LIMIT = Hypothesis("saturation", "actuator:axis", "axis")
+
+
+def move(u, force=None, fine=10, numbers=(M, C, K, KF)):
+    """Position [m] of the axis under `u` [V], held, plus force(t, q, v, memory) -> (N, memory)."""
+    m, c, stiffness, k_f = numbers
+    A, B = np.array([[0, 1], [-stiffness / m, -c / m]]), np.array([[0], [1 / m]])
+    Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / fine)
+    x, memory, out = np.zeros(2), 0.0, np.zeros(len(u))
+    for k, volts in enumerate(u):
+        out[k] = x[0]
+        for j in range(fine):
+            extra, memory = (0.0, 0.0) if force is None else force((k + j / fine) * H, x[0], x[1], memory)
+            x = Ad @ x + Bd[:, 0] * (k_f * volts + extra)
+    return out
+
+
+def drive(n=N, slow=1.5, fast=0.3):
+    t = np.arange(n) * H
+    return (
+        slow * np.sin(2 * np.pi * 2.3 * t) + fast * np.sin(2 * np.pi * 13.1 * t + 1) + 0.2 * np.sin(2 * np.pi * 41 * t)
+    )
+
+
+def record(u, y, role, first=0.0, h=H):
+    n = len(u)
+    u, y = (np.reshape(v, (n, -1)) for v in (u, y))
+    time = first + np.arange(n) * (h if np.isfinite(h) else 1.0)
+    return Record(role, role, time, h, u, y, False, None, np.ones(y.shape, bool))
+
+
+def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=None, numbers=(M, C, K, KF)):
+    """A record to fit and one to hold out, of another drive, with white noise or what `white` makes of it."""
+    rng = np.random.default_rng(seed)
+    fit_u, held_u = (drive(n), 1.2 * np.sin(2 * np.pi * 1.7 * np.arange(n) * H)) if u is None else (u, u)
+    n, parts = len(fit_u), []
+    for role, given in (("fit", fit_u), ("hold_out", held_u)):
+        e = rng.standard_normal(n)
+        y = change(move(given, force, numbers=numbers), given) + NOISE * (e if white is None else white(e))
+        parts.append(record(given, y, role, first=0.0 if role == "fit" else n * H))
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
+    fitter = Fitter(recording, estimate_noise(recording, SETTLING))
+    fitter.cache = CACHE
+    return fitter
+
+
+def drives(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """One that turns every six samples, and one that rests, steps and turns."""
+    t = np.arange(n) * H
+    fit = 0.5 * np.sin(2 * np.pi * 83 * t) + 0.4 * np.sin(2 * np.pi * 23 * t)
+    return fit, np.where(t < 0.1, 0.0, 0.6 * np.sin(2 * np.pi * 61 * t) + 0.3 * np.sign(np.sin(2 * np.pi * 3.1 * t)))
+
+
+def fitter_of(change=lambda u: move(u), after=lambda y: y, n=1500, seed=4) -> Fitter:
+    """A rest, a record to fit and one to hold out; `change` (u -> position), `after` (noisy reading -> reading)."""
+    rng = np.random.default_rng(seed)
+    parts = [record(np.zeros(600), after(NOISE * rng.standard_normal(600)), "rest")]
+    for u, role in zip(drives(n), ("fit", "hold_out"), strict=True):
+        parts.append(record(u, after(change(u) + NOISE * rng.standard_normal(n)), role))
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
+    return Fitter(recording, estimate_noise(recording, SETTLING))
+
+
+def fine(u: np.ndarray, push: np.ndarray | float = 0.0) -> np.ndarray:
+    """The position ten times a sample, under a drive held and another force `push` [N]."""
+    A, B = np.array([[0, 1], [-K / M, -C / M]]), np.array([[0], [1 / M]])
+    Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / FINE)
+    x, out = np.zeros(2), []
+    for force in KF * np.repeat(u, FINE) + push:
+        out.append(x[0])
+        x = Ad @ x + Bd[:, 0] * force
+    return np.array(out)
+
+
+def played(u: np.ndarray, gap: float = 6e-8) -> np.ndarray:
+    """The position behind a play, dragged along between the samples too."""
+    w, out = 0.0, []
+    for q in fine(u):
+        w = max(min(w, q + gap / 2), q - gap / 2)
+        out.append(w)
+    return np.array(out[::FINE])
