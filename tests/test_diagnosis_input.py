@@ -55,7 +55,7 @@ def test_a_column_of_another_unit_is_no_agreement(clean, unit, named):
     path = clean / "recording.toml"
     path.write_text(path.read_text().replace('"nm"', f'"{unit}"').replace('"5 nm"', f'"5 {unit}"'))
     found = ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS)
-    assert found.verdict == UNEXPLAINED and named in sentence(found) and "excludes" in sentence(found)
+    assert found.verdict == UNEXPLAINED and named in sentence(found) and "contradict" in sentence(found)
     assert "units" in " ".join(next_steps(found))
 
 
@@ -141,7 +141,7 @@ def test_agreement_without_a_known_noise_says_how_far_it_goes(tmp_path):
     path = folder / "recording.toml"
     path.write_text(path.read_text().replace(', noise = "0.001 deg"', ""))
     found = ctrlgen.diagnose(tmp_path / "table.toml", folder, laws=LAWS)
-    assert found.verdict == CONSISTENT and "nothing below 0.000918 deg" in sentence(found)
+    assert found.verdict == CONSISTENT and "errors below 0.000918 deg" in sentence(found)
 
 
 def test_only_the_effects_asked_for_are_considered_and_the_answer_says_so(tmp_path):

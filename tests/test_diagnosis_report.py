@@ -227,7 +227,7 @@ def test_the_page_shows_whatever_evidence_there_is(found):
     term = {"axis": "axis", "terms": {"d": 2.0, "d |v|": -0.5}, "unit": "mN", "held_out_gain": 0.43}
     extra = {
         "unmodelled_force": {
-            "statements": ["axis: 80% of the free disturbance goes with position"],
+            "statements": ["axis: position explains 80% of the unknown input's variance"],
             "empirical_term": term,
         }
     }
@@ -243,8 +243,8 @@ def test_the_page_shows_whatever_evidence_there_is(found):
         "20 s",
         "before",
         "drift",
-        "goes with position",
-        "empirical, no cause: 2 d -0.5 d |v| mN takes away 43% of what is left",
+        "position explains 80%",
+        "the empirical term 2 d -0.5 d |v| mN explains 43% of the excess",
     ):
         assert words in text
 
@@ -258,19 +258,19 @@ def test_a_verdict_says_what_to_do(found):
     assert first[CONSISTENT][1].startswith("Nothing to correct") and first[EXPLAINED][1].startswith(
         "Use device.next.toml"
     )
-    assert first[UNEXPLAINED][1].startswith("Not a cause I know")
+    assert first[UNEXPLAINED][1].startswith("No known effect is the cause")
     assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[AMBIGUOUS])
     assert "thermal_lag" not in sentence(told[EXPLAINED])
-    for settles, said in ((True, "Run the next experiment"), (False, "No drive I tried")):
+    for settles, said in ((True, "Run the next experiment"), (False, "None of the drives considered")):
         assert next_steps(replace(told[AMBIGUOUS], next_experiment={"settles": settles}))[0].startswith(said)
-    assert "no cause I know" in sentence(replace(found, verdict=UNEXPLAINED, findings=()))
+    assert "no known effect" in sentence(replace(found, verdict=UNEXPLAINED, findings=()))
 
 
 @pytest.mark.parametrize(
     ("value", "low", "high", "unit", "says"),
     [(0.041, 0.039, 0.043, "1", "4.1 % (3.9 ... 4.3 %)"), (312.0, 300.0, 324.0, "nm", "312 nm (300 ... 324 nm)"),
-     (2.5, 2.4, 2.6, "1", "2.5 (2.4 ... 2.6)"), (0.5, 0.3, 0.5, "s", "0.5 s (0.3 ... 0.5 s, at the end of its range)"),
-     (0.5, -np.inf, np.inf, "s", "0.5 s (this record does not hold it)")],
+     (2.5, 2.4, 2.6, "1", "2.5 (2.4 ... 2.6)"), (0.5, 0.3, 0.5, "s", "0.5 s (0.3 ... 0.5 s, at its bound)"),
+     (0.5, -np.inf, np.inf, "s", "0.5 s (this recording does not determine it)")],
 )  # fmt: skip
 def test_intervals_read_well(value, low, high, unit, says):
     assert interval(Estimate(value, (low, high), unit)) == says

@@ -167,7 +167,7 @@ def print_diagnosis(found: Diagnosis) -> None:
 
     out.print(f"[bold]{escape(sentence(found))}[/bold]", soft_wrap=True)
     if found.findings:
-        table = table_of(("found", "left"), ("at", "left"), ("number", "left"), ("95 % interval", "left"))
+        table = table_of(("found", "left"), ("at", "left"), ("parameter", "left"), ("estimate, 95 % interval", "left"))
         for finding in found.findings:
             rows = [(name, interval(e)) for name, e in finding.parameters.items()]
             alike = ", ".join(f"{effect} {location}" for effect, location in finding.alternatives)
@@ -176,7 +176,7 @@ def print_diagnosis(found: Diagnosis) -> None:
                 table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
         show_table(table)
     table = table_of(
-        ("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"), ("unsure", "right")
+        ("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"), ("parameters", "right")
     )
     for channel, e in found.held_out.items():
         values = (e.rms_before, e.rms_after, e.noise_floor, e.uncertainty)

@@ -1,1 +1,1 @@
-"""A diagnosis as sentences, figures, diagnosis.json, a page and a corrected device file."""
+"""Reports of a diagnosis: sentences, plots, diagnosis.json, report.html and the corrected device file device.next.toml."""

@@ -23,7 +23,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> dict[str, 
     return plain({
         **origin(provenance.inputs, provenance.seed, diagnosis.notes),
         "verdict": diagnosis.verdict,
-        "findings": [_finding(found) for found in diagnosis.findings],
+        "findings": [_finding(finding) for finding in diagnosis.findings],
         "residual_location": diagnosis.residual_location,
         "held_out": {channel: dataclasses.asdict(error) for channel, error in diagnosis.held_out.items()},
         "detectability": diagnosis.detectability,
@@ -32,14 +32,14 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> dict[str, 
     })  # fmt: skip
 
 
-def _finding(found: Finding) -> dict[str, Any]:
+def _finding(finding: Finding) -> dict[str, Any]:
     return {
-        "effect": found.effect,
-        "location": found.location,
+        "effect": finding.effect,
+        "location": finding.location,
         "parameters": {
-            name: {"value": e.value, "ci95": e.ci95, "unit": e.unit} for name, e in found.parameters.items()
+            name: {"value": e.value, "ci95": e.ci95, "unit": e.unit} for name, e in finding.parameters.items()
         },
-        "alternatives": [{"effect": effect, "location": location} for effect, location in found.alternatives],
-        "held_out_gain": found.held_out_gain,
-        "source": found.source,
+        "alternatives": [{"effect": effect, "location": location} for effect, location in finding.alternatives],
+        "held_out_gain": finding.held_out_gain,
+        "source": finding.source,
     }

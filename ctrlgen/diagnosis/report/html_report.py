@@ -1,4 +1,4 @@
-"""report.html of a diagnosis: one self-contained page, the answer on the first screen."""
+"""report.html of a diagnosis: one self-contained page with the answer at the top."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
 from ctrlgen.reporting.html import render
 
 CAPTIONS = {
-    "residuals": "What the model leaves of the held-out records. A gap is a marked sample.",
-    "spectrum": "The same by frequency. Where a curve lies on the noise, nothing more can be learnt from this recording.",
-    "where": "Where the mismatch is: excess of squares over the noise's with 95 % intervals, part by part.",
-    "unknown": "The disturbance that would explain the rest, with 95 % intervals: its shape is a hint at the law.",
-    "intervals": "An interval that reaches zero would mean that the cause may be absent.",
-    "profiles": "The objective with one number held and the others fitted again; below the dotted line lies the 95 % "
-    "interval (shaded).",
-    "rivals": "Each round fits the most conspicuous suspects and keeps the best. T: squares left on the records to fit "
-    "and on the held-out ones, in units of the noise, and a price for every number. Blue: in the final answer; orange: "
-    "explains alike; grey: worse.",
-    "confusability": "How alike two suspects look in this recording: |cos| of what they do to the readings once the "
-    "device's own uncertain numbers are free; 1 cannot be told apart, 0 cannot be confused. Each with one shape; "
-    "fitted shapes can make two more alike. |z|: how conspicuous, in standard deviations.",
+    "residuals": "Residual on the held-out records. Gaps are samples that were marked as not usable.",
+    "spectrum": "Amplitude spectral density of the same residual. Where a curve meets the noise, this recording holds no more information.",
+    "where": "Excess of the residual of the device as described over the noise, with 95 % intervals, by part of the recording.",
+    "unknown": "Unknown input that would explain the residual after the correction, with 95 % intervals: its shape hints at the effect.",
+    "intervals": "Where an interval includes zero, the cause may be absent.",
+    "profiles": "Profile likelihood: the objective with one parameter held and the others refitted. The 95 % interval (shaded) lies "
+    "below the dotted line.",
+    "rivals": "Each round fits the hypotheses with the largest scores and keeps the best. The criterion T adds the whitened squares "
+    "on the records to fit, the held-out deviance and a penalty for every parameter. Blue: in the final model; orange: "
+    "explains equally well; grey: worse.",
+    "confusability": "How similar the effects of two hypotheses on the readings are: |cos| of their sensitivities, projected "
+    "off the device's uncertain parameters. At 1 they cannot be told apart, at 0 they cannot be confused. Each has fixed "
+    "shape parameters; fitting those can make two more similar. |z|: score in standard deviations.",
 }
-TINY = 1e-4  # p below which its size says nothing more
-NEGLIGIBLE = 1e-3  # of its standard deviation: numbers that moved less are left out of the table
+TINY = 1e-4  # a p-value below is shown as "< 0.0001"
+NEGLIGIBLE = 1e-3  # standard deviations: parameters that moved by less are left out of the table
 
 
 def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
@@ -87,19 +87,19 @@ def _row(f: Finding) -> dict[str, Any]:
 
 
 def _tested(diagnosis: Diagnosis) -> str:
-    """What the adequacy gate says of the rest."""
-    gate = diagnosis.residual_tests
+    """The result of the residual tests in one sentence."""
+    result = diagnosis.residual_tests
     if any(e.noise_floor is None for e in diagnosis.held_out.values()):
-        return "The noise is not known, so these errors cannot be judged against it."
+        return "The noise is not known, so the residual cannot be tested against it."
     tests = ", ".join(
-        f"{name} p {'= ' + number(p, 2) if p >= TINY else '< ' + number(TINY)}" for name, p in gate.p_values.items()
+        f"{name} p {'= ' + number(p, 2) if p >= TINY else '< ' + number(TINY)}" for name, p in result.p_values.items()
     )
-    result = "passes" if gate.passed else "does not pass"
-    return f"What is left {result} the test against the noise" + (f" ({tests})." if tests else ".")
+    outcome = "passes" if result.passed else "does not pass"
+    return f"The residual {outcome} the tests against the noise model" + (f" ({tests})." if tests else ".")
 
 
 def _changed(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """The device's own numbers that the fit moved, the refitted and the diagnosed."""
+    """Parameters of the device that the fit changed, whether refitted within their uncertainty or found to differ."""
     fit = diagnosis.search.chosen.fit
     known = {path: q for path, _, q in numbers(diagnosis.device)}
     rows = []

@@ -1,4 +1,4 @@
-"""What a diagnosis says in sentences: for the page, the terminal and the header of the next device file."""
+"""The sentences of a diagnosis, for report.html, the console and the header of device.next.toml."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from ctrlgen.diagnosis.selection.verdict import (
 )
 from ctrlgen.effects import Effect
 
-NAMED = 3  # findings spelt out in the first sentence
-WIDE = 1.0  # a plain number with its whole interval below is shown in percent
+NAMED = 3  # findings that the first sentence names
+WIDE = 1.0  # a dimensionless number whose interval lies within this is shown in per cent
 HARD_SPACE = "\u00a0"
-EDGE = 1e-6  # of an interval: nearer to its end, a number stands on its bound
+EDGE = 1e-6  # share of its interval within which an estimate counts as on the interval's end
 HEADLINE = {
     EXPLAINED: "Explained",
     PARTLY: "Partly explained",
@@ -34,17 +34,17 @@ HEADLINE = {
 
 
 def plain_name(effect: str) -> str:
-    """The title of an effect, which says it without symbols: 'A clamped flexure stretches as it bends'."""
+    """The title of an effect, which describes it without symbols: 'A clamped flexure stretches as it bends'."""
     if effect == PARAMETER:
-        return "A number of the device is off its nominal"
+        return "A parameter of the device differs from its nominal value"
     law = Effect.library.get(effect)
     return law.title if law else effect
 
 
 def hypothesis_name(cause: Hypothesis) -> str:
-    """'stiffening at stage:axis', or 'mechanism:platform_radius off its nominal'."""
+    """'stiffening at stage:axis', or 'mechanism:platform_radius differs from its nominal value'."""
     if cause.effect == PARAMETER:
-        return f"{cause.location} off its nominal"
+        return f"{cause.location} differs from its nominal value"
     return f"{cause.effect} at {cause.location}" + (f", of {cause.of}" if cause.of else "")
 
 
@@ -55,23 +55,23 @@ def cause_text(finding: Finding) -> str:
 
 
 def interval(e: Estimate) -> str:
-    """'4.12 % (3.93 ... 4.31 %)': value and 95 % interval, with two digits of the interval's width."""
+    """'4.12 % (3.93 ... 4.31 %)': value and 95 % interval, to two digits of the interval's width."""
     ends = (e.value, *e.ci95)
     percent = e.unit == "1" and all(abs(v) < WIDE for v in ends)
     unit = " %" if percent else "" if e.unit == "1" else f" {e.unit}"
     value, low, high = (v * (100 if percent else 1) for v in ends)
     if not math.isfinite(high - low):
-        return f"{number(value)}{unit} (this record does not hold it)"
-    if high == low:  # it is so, or it was read off
+        return f"{number(value)}{unit} (this recording does not determine it)"
+    if high == low:  # detected directly, or fixed by its definition
         return f"{number(value)}{unit}"
     shown = [_to_width(v, high - low) for v in (value, low, high)]
     edge = EDGE * (high - low)
-    bound = ", at the end of its range" if value - low <= edge or high - value <= edge else ""
+    bound = ", at its bound" if value - low <= edge or high - value <= edge else ""
     return f"{shown[0]}{unit} ({shown[1]} ... {shown[2]}{unit}{bound})"
 
 
 def _to_width(value: float, width: float) -> str:
-    """`value` with as many digits as an interval of `width` bears."""
+    """`value` with as many digits as an interval of `width` justifies."""
     if width <= 0 or value == 0:
         return number(value)
     digits = math.floor(math.log10(max(abs(value), width))) - math.floor(math.log10(width)) + 2
@@ -79,7 +79,7 @@ def _to_width(value: float, width: float) -> str:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number to read: '0.00412', '1.2e-07', '53 800'."""
+    """A number as text: '0.00412', '1.2e-07', '53800'."""
     if not math.isfinite(value):
         return "not known"
     if value and (abs(value) >= 1e6 or abs(value) < 1e-4):
@@ -94,17 +94,18 @@ def channel_sentence(channel: str, error: ChannelError) -> str:
     shown = [f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after)]
     unsure = ""
     if error.uncertainty is not None and error.uncertainty > (error.noise_floor or 0.0):
-        unsure = f"; the numbers are known no better than to {number(error.uncertainty, 3)} {error.unit} there"
+        unsure = f"; the uncertainty of the parameters alone is {number(error.uncertainty, 3)} {error.unit}"
     return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}{unsure}."
 
 
 def short(channel: str) -> str:
-    """'delta_x' for 'reading.delta_x', which is what nearly every recording observes."""
+    """'delta_x' for 'reading.delta_x'."""
     return channel.removeprefix("reading.")
 
 
 def worst_channel(diagnosis: Diagnosis) -> str:
-    """The channel whose held-out error was largest beside its noise, or fell most where no noise is known."""
+    """The channel with the largest held-out error before the correction, relative to its noise; where the noise is not known,
+    relative to the error after the correction."""
 
     def size(item: tuple[str, ChannelError]) -> float:
         e = item[1]
@@ -120,11 +121,11 @@ def numbers_of(finding: Finding) -> str:
 
 
 def named(findings: Sequence[Finding]) -> str:
-    """The first findings with their numbers; what an effect means stands where it is named first."""
-    parts, said = [], set()
+    """The first findings with their parameters; each effect is described where it is named first."""
+    parts, described = [], set()
     for f in findings[:NAMED]:
-        cause = hypothesis_name(f.cause) if f.effect in said else cause_text(f)
-        said.add(f.effect)
+        cause = hypothesis_name(f.cause) if f.effect in described else cause_text(f)
+        described.add(f.effect)
         parts.append(f"{cause}, {numbers_of(f)}")
     more = [f"{len(findings) - NAMED} more"] if len(findings) > NAMED else []
     return "; ".join(parts + more)
@@ -136,53 +137,51 @@ def _within_a_sentence(text: str) -> str:
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The verdict in one sentence with numbers."""
-    found, verdict = diagnosis.findings, diagnosis.verdict
+    """The verdict in one sentence with numbers, and the held-out error of the worst channel."""
+    findings, verdict = diagnosis.findings, diagnosis.verdict
     head = HEADLINE[verdict]
     if verdict == CONSISTENT:
-        said = (
-            f"{head}: nothing that this recording can show is missing from the device file ({diagnosis.device.title})"
-        )
-        said += f"{_blind(diagnosis)}."
+        text = f"{head}: the device file ({diagnosis.device.title}) lacks nothing that this recording can show"
+        text += f"{_blind(diagnosis)}."
     elif (far := contradicts_datasheet(diagnosis.search.chosen.fit)) and diagnosis.residual_tests.passed:
-        said = f"{head}: {_beyond(diagnosis, far)}{f'; what helps is {named(found)}' if found else ''}."
-    elif not found:
-        said = f"{head}: the recording differs from {diagnosis.device.title}, and no cause I know explains it."
+        text = f"{head}: {_beyond(diagnosis, far)}{f'; the model also needs {named(findings)}' if findings else ''}."
+    elif not findings:
+        text = f"{head}: the recording differs from {diagnosis.device.title}, and no known effect explains it."
     else:
-        said = f"{head}: {LEAD[verdict]}{named(found)}{_rivals(diagnosis)}."
+        text = f"{head}: {LEAD[verdict]}{named(findings)}{_rivals(diagnosis)}."
     channel = worst_channel(diagnosis)
-    return f"{said} {channel_sentence(channel, diagnosis.held_out[channel])}"
+    return f"{text} {channel_sentence(channel, diagnosis.held_out[channel])}"
 
 
 def _blind(diagnosis: Diagnosis) -> str:
-    """'; nothing below 3.6 um can be judged', of the channels whose noise nothing tells."""
+    """'; errors below 3.6 um cannot be judged', for the channels whose noise is not known."""
     sizes = [f"{number(e.rms_after, 3)} {e.unit}" for e in diagnosis.held_out.values() if e.noise_floor is None]
-    return f"; the noise is not known, so nothing below {', '.join(sizes)} can be judged" if sizes else ""
+    return f"; the noise is not known, so errors below {', '.join(sizes)} cannot be judged" if sizes else ""
 
 
 def _beyond(diagnosis: Diagnosis, far: dict[str, float]) -> str:
-    """What it takes to agree, where the device file excludes that."""
+    """The parameters that contradict the device file, with their deviation in stated standard deviations."""
     numbers = ", ".join(
-        f"{path} = {number(e.value)} {e.unit} ({z:+.0f} stated deviations)"
+        f"{path} = {number(e.value)} {e.unit} ({z:+.0f} stated standard deviations)"
         for path, z in far.items()
         for e in [diagnosis.values[path]]
     )
     return (
-        f"the recording agrees with {diagnosis.device.title} only by numbers that its file excludes: {numbers}; "
-        "units, sign or gain of a column may be wrong"
+        f"the recording agrees with {diagnosis.device.title} only with parameters that contradict its file: {numbers}; "
+        "check the units, sign and gain of the recorded columns"
     )
 
 
 LEAD = {
     EXPLAINED: "",
-    PARTLY: "part of what was left out is ",
+    PARTLY: "part of the mismatch is ",
     AMBIGUOUS: "",
-    UNEXPLAINED: "no cause I know explains it; what helps is ",
+    UNEXPLAINED: "no known effect explains the recording; the best fit adds ",
 }
 
 
 def _rivals(diagnosis: Diagnosis) -> str:
-    """', or equally well thermal_lag at actuator:axis', for an ambiguous verdict."""
+    """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
     others = dict.fromkeys(f"{effect} at {place}" for f in diagnosis.findings for effect, place in f.alternatives)
     if diagnosis.verdict != AMBIGUOUS or not others:
         return ""
@@ -190,72 +189,79 @@ def _rivals(diagnosis: Diagnosis) -> str:
 
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:
-    """What a reader does now, in order."""
+    """What to do next, in order."""
     verdict = diagnosis.verdict
-    use = "Use device.next.toml instead of the device file: solve and generate the C with it, and record once more."
+    use = "Use device.next.toml in place of the device file: solve and generate the C with it, then record again to confirm."
     known = all(e.noise_floor is not None for e in diagnosis.held_out.values())
-    rest = "" if known else " Record a rest (drive off) or repeat poses, so that the noise is known."
+    rest = "" if known else " Record a period at rest (drive off), or repeat poses, so that the noise can be estimated."
     if verdict == CONSISTENT:
-        unseen = " Effects smaller than those listed below would not have been seen." if diagnosis.detectability else ""
+        unseen = (
+            " Effects smaller than those listed in the report would not have been detected."
+            if diagnosis.detectability
+            else ""
+        )
         return [f"Nothing to correct.{unseen}{rest}"]
     if verdict == EXPLAINED:
         return [use]
     if verdict == AMBIGUOUS:
-        first = "No drive I tried would settle which of the alternatives it is: measure one of them apart, with another sensor or gauge."
+        first = "None of the drives considered would decide between the alternatives: measure one directly, with another sensor."
         if (diagnosis.next_experiment or {}).get("settles"):
-            first = "Run the next experiment below to settle which of the alternatives it is; name no cause until then."
+            first = "Run the next experiment (next_experiment/) to decide between the alternatives; until then the cause is not known."
         return [
             first,
-            "device.next.toml holds the best of them; it predicts records of this kind as well as any." + rest,
+            "device.next.toml holds the best of them, which predicts recordings of this kind as well as the others do."
+            + rest,
         ]
     if verdict == PARTLY:
-        left = f"Whether something remains cannot be said.{rest}"
+        remark = f"Whether a mismatch remains cannot be said, because the noise is not known.{rest}"
         if known:
             most = number(100 * model_error_allowance(diagnosis.search))
-            left = f"A little remains above the noise, less than {most} % of what was wrong: see where below."
+            remark = f"A residual above the noise remains, less than {most} % of the mismatch: the report shows where."
         if poorly_determined(diagnosis.fitter, diagnosis.search):
             return [
-                "The cause is there, but its numbers are known too loosely to foresee the held-out records: fit those too, or "
-                "record more of where it acts. Until then device.next.toml foresees worse than the device file.",
+                "The cause is identified, but its parameters are too uncertain to predict the held-out data: record more data "
+                "where the effect is active. Until then device.next.toml predicts worse than the device file.",
             ]
         if diagnosis.unconfirmed:
             names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
-            left = f"No held-out record shows {names}: hold out one that goes where the record to fit went."
-        return [f"{use} It is better than before.", left]
+            remark = (
+                f"No held-out record shows {names}: hold out a record that covers the same range as the records to fit."
+            )
+        return [f"{use} It predicts better than the device file.", remark]
     return [
-        "Not a cause I know. Look below at where the mismatch lives, and check the set-up: wiring, units, clocks.",
-        "device.next.toml is the best fit found, not an explanation: do not build on its numbers.",
+        "No known effect is the cause. The report shows where the residual is large; check wiring, units and clocks of the set-up.",
+        "device.next.toml is the best fit found, not an explanation: do not rely on its parameters.",
     ]
 
 
 def unknown_lines(diagnosis: Diagnosis) -> list[str]:
-    """What the free disturbance goes with, and the empirical term: a description of the rest, never a cause."""
-    found = diagnosis.extra.get("unmodelled_force")
-    if not found:
+    """What the unknown input depends on, and the empirical term: they describe the residual and name no cause."""
+    force = diagnosis.extra.get("unmodelled_force")
+    if not force:
         return []
-    term = found["empirical_term"]
-    lines = list(found["statements"])
+    term = force["empirical_term"]
+    lines = list(force["statements"])
     if term:
         formula = " ".join(f"{value:+.3g} {name}" for name, value in term["terms"].items()).removeprefix("+")
         lines.append(
-            f"{term['axis']}, empirical, no cause: {formula} {term['unit']} takes away {term['held_out_gain']:.0%} of what is "
-            "left of the held-out records (d, v, u: position, speed and drives, each over its largest value)"
+            f"{term['axis']}: the empirical term {formula} {term['unit']} explains {term['held_out_gain']:.0%} of the excess on "
+            "the held-out records (d, v, u: position, speed and drives, each over its largest value); it names no cause"
         )
     return lines
 
 
 def hard(text: str) -> str:
-    """`text` with numbers and units that no line break parts."""
+    """`text` with non-breaking spaces between numbers and their units."""
     return re.sub(r"(?<=\d) (?=[^\W\d]|%)", HARD_SPACE, text)
 
 
 def gathered(notes: tuple[str, ...]) -> list[str]:
-    """Notes that say the same of several channels as one sentence."""
-    same: dict[str, list[str]] = {}
+    """The notes, those that differ only by their channel joined into one."""
+    by_text: dict[str, list[str]] = {}
     for note in notes:
-        subject, colon, said = note.partition(": ")
+        subject, colon, text = note.partition(": ")
         if colon and re.fullmatch(r"\w+\.\w+", subject):
-            same.setdefault(said, []).append(subject)
+            by_text.setdefault(text, []).append(subject)
         else:
-            same.setdefault(note, [])
-    return [f"{', '.join(subjects)}: {said}" if subjects else said for said, subjects in same.items()]
+            by_text.setdefault(note, [])
+    return [f"{', '.join(subjects)}: {text}" if subjects else text for text, subjects in by_text.items()]

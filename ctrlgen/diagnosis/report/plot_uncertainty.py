@@ -1,4 +1,4 @@
-"""Figures of how sure a diagnosis is: rivals, what looks alike, intervals and profiles."""
+"""Plots of the certainty of a diagnosis: candidate models, confusability, intervals, profile likelihoods."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from ctrlgen.diagnosis.settings import SEARCH, STATISTICS
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6
-SUSPECTS = 8  # in the confusability matrix
+SUSPECTS = 8  # hypotheses in the confusability matrix
 LABEL = 26  # characters of a label before it is broken
 PROFILES = 9
-WIDEST = 300.0  # percent: intervals are shown so far
+WIDEST = 300.0  # per cent: intervals are shown up to here
 FOUND, ALIKE, WORSE = COLOURS[0], COLOURS[2], "#b0b0b0"
 
 
 def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
-    """Round by round: by how much each suspect explains worse than the best one of its round."""
+    """Round by round, the criterion of each candidate model above that of the best one."""
     rounds = [r for r in diagnosis.search.rounds if r.candidates]
     if not rounds:
         return None
@@ -38,8 +38,8 @@ def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
     for k, (panel, round_) in enumerate(zip(axes[:, 0], rounds, strict=True)):
         _rival_bars(panel, round_, kept)
         gained = round_.before.criterion - round_.candidates[0].criterion
-        panel.set_title(f"round {k + 1}: the best one gains {number(gained, 3)}", fontsize=9, loc="left")
-    axes[-1, 0].set_xlabel("worse than the best of the round, difference of T (dotted: nearer than that is alike)")
+        panel.set_title(f"round {k + 1}: the best candidate lowers T by {number(gained, 3)}", fontsize=9, loc="left")
+    axes[-1, 0].set_xlabel("T above that of the best candidate (left of the dotted line: explains equally well)")
     return figure
 
 
@@ -63,12 +63,12 @@ def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
 
 
 def _beside(panel: Axes, x: float, y: float, text: str) -> None:
-    """Text a little to the right of a mark."""
+    """Text to the right of a mark."""
     panel.annotate(text, (x, y), xytext=(6, 0), textcoords="offset points", va="center", fontsize=8)
 
 
 def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
-    """|cos| between what the most conspicuous suspects of the first round do to the readings."""
+    """|cos| between the sensitivities of the hypotheses with the largest scores in the first round."""
     search = diagnosis.search
     screened = search.rounds[0].screened if search.rounds else search.final_screen
     top = screened.suspects[:SUSPECTS]
@@ -98,12 +98,12 @@ def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
 
 
 def _cosine(value: float) -> str:
-    """Two digits, more where it is nearly one: 0.998 is not 0.98."""
+    """Two digits, four where it is nearly one."""
     return f"{value:.2f}" if value < 0.985 or value > 0.99995 else f"{value:.4f}"
 
 
 def draw_intervals(diagnosis: Diagnosis) -> Figure | None:
-    """Every parameter found, its 95 % interval in percent of its value; left of zero it may be absent."""
+    """The 95 % interval of every parameter found, in per cent of its value."""
     rows = []
     for finding in diagnosis.findings:
         for name, e in finding.parameters.items():
@@ -122,17 +122,17 @@ def draw_intervals(diagnosis: Diagnosis) -> Figure | None:
     low, high = max(min(0.0, *(e[0] for _, e in rows)), -WIDEST), min(max(100.0, *(e[1] for _, e in rows)), WIDEST)
     panel.set_xlim(low - 0.03 * (high - low), high + 0.3 * (high - low))
     panel.axvline(0.0, color="#666666", lw=1)
-    panel.set_xlabel("95 % interval in percent of the value found")
+    panel.set_xlabel("95 % interval in per cent of the estimate")
     return figure
 
 
 def _percent(value: float) -> str:
-    """'+0.16 %'; nothing below a thousandth, where a number stands on its bound."""
+    """'+0.16 %'; '0 %' below a thousandth, where an estimate lies on its bound."""
     return f"{value:+.2g} %" if abs(value) > 1e-3 else "0 %"
 
 
 def draw_profiles(diagnosis: Diagnosis) -> Figure | None:
-    """How the objective rises when one number is held elsewhere and the others are fitted again."""
+    """Profile likelihoods: the rise of the objective when one parameter is held and the others are refitted."""
     profiles = [p for p in plain(diagnosis.profiles) if len(p["points"]) > 2][:PROFILES]
     if not profiles:
         return None

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis, as SVG; here what is left on the held-out data, over time or poses and by frequency."""
+"""All plots of a diagnosis as SVG; those of the held-out residual, over time or poses and by frequency, are drawn here."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 BEFORE, AFTER, NOISE = COLOURS[2], COLOURS[0], "#d9d9d9"
 WIDTH = 8.6
-POINTS = 700  # columns of a long curve; each keeps its smallest and its largest sample
-SEGMENT = 2048  # samples of the spectrum's windows
-BANDS = 20  # a decade
+POINTS = 700  # columns of a long curve; of each the smallest and the largest sample are drawn
+SEGMENT = 2048  # samples of a window of the spectrum
+BANDS = 20  # bands a decade
 
 
 def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
-    """Every figure that this diagnosis has something to show in: name -> SVG text."""
-    left = Residuals(diagnosis)
+    """SVG text by name of every plot for which this diagnosis has data."""
+    residuals = Residuals(diagnosis)
     drawings: dict[str, Callable[[], Figure | None]] = {
-        "residuals": lambda: draw_residuals(left),
-        "spectrum": lambda: draw_spectrum(left),
+        "residuals": lambda: draw_residuals(residuals),
+        "spectrum": lambda: draw_spectrum(residuals),
         "where": lambda: draw_where(diagnosis),
         "unknown": lambda: draw_unknown(diagnosis),
         "rivals": lambda: draw_rivals(diagnosis),
@@ -50,7 +50,7 @@ def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
 
 
 class Residuals:
-    """What the nominal and the chosen fit leave on the held-out records, in the reader's units."""
+    """Held-out residuals of the nominal and of the chosen model, in the recording's units."""
 
     def __init__(self, diagnosis: Diagnosis) -> None:
         self.diagnosis, self.recording, fitter = diagnosis, diagnosis.recording, diagnosis.fitter
@@ -65,7 +65,7 @@ class Residuals:
         self.changed = bool(diagnosis.findings)
 
     def spans(self) -> Iterator[tuple[int, np.ndarray]]:
-        """(record, its place on one axis): seconds, or poses, one record behind the other."""
+        """(record, its abscissa): seconds or poses, the records one after another."""
         first = 0.0
         for k, record in enumerate(self.records):
             n, step = len(record.time), 1.0 if self.settled else record.sample_time
@@ -73,46 +73,47 @@ class Residuals:
             first += step * n
 
     def floor(self, i: int) -> float | None:
-        """Standard deviation of the noise of channel i, in its unit."""
+        """Noise standard deviation of channel i in its unit, None where it is not known."""
         return self.diagnosis.held_out[self.recording.channels[i]].noise_floor
 
 
-def draw_residuals(left: Residuals) -> Figure:
-    """Channel by channel: before with after, and after alone on its own scale with the noise; one panel where both are one."""
-    channels, wide = left.recording.channels, 1 + left.changed
+def draw_residuals(residuals: Residuals) -> Figure:
+    """By channel: the residual before and after the correction, and after alone on its own scale with the noise; one panel
+    where nothing was corrected."""
+    channels, wide = residuals.recording.channels, 1 + residuals.changed
     size = (WIDTH, 0.9 + 1.55 * len(channels))
     figure, axes = plt.subplots(len(channels), wide, figsize=size, sharex=True, squeeze=False)
-    for i, (channel, unit) in enumerate(zip(channels, left.recording.units, strict=True)):
-        if left.changed:
-            _curve(axes[i, 0], left, left.before, i, BEFORE, "before")
+    for i, (channel, unit) in enumerate(zip(channels, residuals.recording.units, strict=True)):
+        if residuals.changed:
+            _curve(axes[i, 0], residuals, residuals.before, i, BEFORE, "before")
         for panel in axes[i]:
-            _curve(panel, left, left.after, i, AFTER, "after")
+            _curve(panel, residuals, residuals.after, i, AFTER, "after")
         axes[i, 0].set_ylabel(f"{short(channel)} [{unit}]")
-        floor = left.floor(i)
+        floor = residuals.floor(i)
         if floor is not None:
             axes[i, -1].axhspan(-2 * floor, 2 * floor, color=NOISE, zorder=0)
-    known = all(left.floor(i) is not None for i in range(len(channels)))
-    title = "after, on its own scale" if left.changed else "what is left"
+    known = all(residuals.floor(i) is not None for i in range(len(channels)))
+    title = "after, on its own scale" if residuals.changed else "residual"
     axes[0, -1].set_title(title + (" (grey: noise, ± 2 sd)" if known else ""), fontsize=9)
     for panel in axes[-1]:
-        panel.set_xlabel("held-out pose" if left.settled else "time in the held-out records [s]")
-    if left.changed:
+        panel.set_xlabel("held-out pose" if residuals.settled else "time in the held-out records [s]")
+    if residuals.changed:
         axes[0, 0].set_title("before and after", fontsize=9)
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize=8)
     return figure
 
 
-def _curve(panel: Axes, left: Residuals, parts: list[np.ndarray], i: int, colour: str, label: str) -> None:
-    """One channel over all held-out records, with a line between two of them."""
-    style: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3} if left.settled else {"lw": 0.9}
-    for k, x in left.spans():
+def _curve(panel: Axes, residuals: Residuals, parts: list[np.ndarray], i: int, colour: str, label: str) -> None:
+    """One channel over all held-out records, with a line between records."""
+    style: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3} if residuals.settled else {"lw": 0.9}
+    for k, x in residuals.spans():
         panel.plot(*thinned(x, parts[k][:, i]), color=colour, label=label if k == 0 else None, **style)
         if k > 0:
             panel.axvline(x[0], color="#999999", lw=0.7, ls=":")
 
 
 def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A long curve by the smallest and largest sample of each of `POINTS` columns, which looks the same."""
+    """A long curve reduced to the smallest and largest sample of each of `POINTS` columns."""
     if len(x) <= 2 * POINTS:
         return x, y
     pieces = np.array_split(np.arange(len(x)), POINTS)
@@ -124,22 +125,25 @@ def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x[places], y[places]
 
 
-def draw_spectrum(left: Residuals) -> Figure | None:
-    """Amplitude density of what is left, before and after, and of the noise; None for poses and short records."""
-    records = [k for k, part in enumerate(left.before) if min(len(_judged(y)) for y in part.T) >= 64]
-    if left.settled or not records:
+def draw_spectrum(residuals: Residuals) -> Figure | None:
+    """Amplitude spectral density of the residual before and after, and of the noise; None for poses and short records."""
+    records = [k for k, part in enumerate(residuals.before) if min(len(_judged(y)) for y in part.T) >= 64]
+    if residuals.settled or not records:
         return None
-    n = len(left.recording.channels)
+    n = len(residuals.recording.channels)
     columns = min(n, 2)
     rows = -(-n // columns)
     figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.8 + 2.3 * rows), squeeze=False)
-    for i, channel in enumerate(left.recording.channels):
-        panel, unit = axes.flat[i], left.recording.units[i]
-        curves = ((left.before, BEFORE, "before"), (left.after, AFTER, "after" if left.changed else "what is left"))
-        for parts, colour, label in curves[not left.changed :]:
-            f, density = _density(left, parts, records, i)
+    for i, channel in enumerate(residuals.recording.channels):
+        panel, unit = axes.flat[i], residuals.recording.units[i]
+        curves = (
+            (residuals.before, BEFORE, "before"),
+            (residuals.after, AFTER, "after" if residuals.changed else "residual"),
+        )
+        for parts, colour, label in curves[not residuals.changed :]:
+            f, density = _density(residuals, parts, records, i)
             panel.loglog(f, density, color=colour, lw=1.1, label=label)
-        noise = _noise_density(left, i, f)
+        noise = _noise_density(residuals, i, f)
         if noise is not None:
             panel.loglog(f, noise, color="#777777", lw=1.1, ls="--", label="noise")
         panel.set_ylabel(f"{short(channel)} [{unit}/√Hz]")
@@ -153,16 +157,19 @@ def draw_spectrum(left: Residuals) -> Figure | None:
 
 
 def _judged(values: np.ndarray) -> np.ndarray:
-    """From the first to the last sample that counts: without the lead-in."""
+    """The samples from the first to the last usable one: without the lead-in."""
     seen = np.flatnonzero(np.isfinite(values))
     return values[seen[0] : seen[-1] + 1] if len(seen) else values[:0]
 
 
-def _density(left: Residuals, parts: list[np.ndarray], records: list[int], i: int) -> tuple[np.ndarray, np.ndarray]:
-    """Welch's amplitude density over the held-out records of the longest one's sample time; marked samples count as zero."""
-    longest = max(records, key=lambda k: len(left.records[k].time))
-    h = left.records[longest].sample_time
-    alike = [k for k in records if left.records[k].sample_time == h]
+def _density(
+    residuals: Residuals, parts: list[np.ndarray], records: list[int], i: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Welch's amplitude spectral density over the held-out records that have the longest one's sample time; marked samples
+    count as zero."""
+    longest = max(records, key=lambda k: len(residuals.records[k].time))
+    h = residuals.records[longest].sample_time
+    alike = [k for k in records if residuals.records[k].sample_time == h]
     stretches = [_judged(parts[k][:, i]) for k in alike]
     size = min(SEGMENT, *map(len, stretches))
     total, weight = np.zeros(size // 2 + 1), 0
@@ -176,10 +183,10 @@ def _density(left: Residuals, parts: list[np.ndarray], records: list[int], i: in
     return middle, np.sqrt(mean)
 
 
-def _noise_density(left: Residuals, i: int, f: np.ndarray) -> np.ndarray | None:
-    noise = left.diagnosis.fitter.noise
+def _noise_density(residuals: Residuals, i: int, f: np.ndarray) -> np.ndarray | None:
+    noise = residuals.diagnosis.fitter.noise
     if not noise.known[i]:
         return None
-    h = max(left.records, key=lambda r: len(r.time)).sample_time
+    h = max(residuals.records, key=lambda r: len(r.time)).sample_time
     _, response = freqz([1.0], np.concatenate([[1.0], -noise.ar[i]]), worN=2 * np.pi * f * h)
-    return np.abs(response) * noise.sd[i] * left.scales[i] * np.sqrt(2 * h)
+    return np.abs(response) * noise.sd[i] * residuals.scales[i] * np.sqrt(2 * h)

@@ -1,7 +1,8 @@
-"""device.next.toml: the device file as its author wrote it, with what was found written in.
+"""device.next.toml: the device file as its author wrote it, with the findings written in.
 
-Numbers change in place and keep their comments; each says where its new value comes from and what it was. Effects are
-appended under a comment that tells their history. The file gives the model that the chosen fit predicts with.
+Parameters change in place and keep their comments; each states the source of its new value and its old value. Effects are
+appended under a comment with the recording, the verdict and the held-out errors. The file gives the model that the chosen
+fit predicts with.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ from ctrlgen.diagnosis.report.narrative import HARD_SPACE, channel_sentence, har
 from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
 
-DIGITS = 12  # nine would leave 5e-9 of a number, more than the prediction may differ by
+DIGITS = 12  # nine would round by 5e-9, more than the predictions may differ by
 SD_DIGITS = 3
 WIDTH = 110
-MOVED = 1e-12  # of a number: less is not written
+MOVED = 1e-12  # relative change below which a parameter is left as it is
 
 
 def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
-    """Writes `target`, whole or not at all, from the device file `original`. Raises InputError when that is unreadable."""
+    """Writes `target`, as a whole or not at all, from the device file `original`. Raises InputError where that cannot be read."""
     write_text(target, next_text(diagnosis, read_text(original)))
 
 
@@ -57,7 +58,7 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
 def _change_numbers(
     document: Any, diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]
 ) -> list[str]:
-    """Puts the device's own numbers that moved into the document; their paths."""
+    """Writes the changed parameters of the device into the document; returns their paths."""
     known = {path: number for path, _, number in numbers(diagnosis.device)}
     causes, changed = diagnosis.search.chosen.fit.structure.causes, []
     for unknown, value, sd in found:
@@ -100,7 +101,7 @@ def _toml(value: str | dict[str, Any]) -> str:
 
 
 def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
-    """One table an effect that was found; numbers as {value, sd} where the record holds them."""
+    """One table for each effect found; parameters as {value, sd} where the recording determines them."""
     fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in found}, []
     for k, effect in enumerate(diagnosis.corrected.effect):
         if k < len(diagnosis.device.effect):
@@ -117,7 +118,7 @@ def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, f
 
 
 def _table(fields: dict[str, Any]) -> str:
-    """[[effect]] with one line a key."""
+    """[[effect]] with one line for each key."""
     width = max(map(len, fields))
     return "\n[[effect]]\n" + "".join(f"{key:{width}} = {_toml(value)}\n" for key, value in fields.items())
 
@@ -127,7 +128,7 @@ def _written(si: float, unit: str, digits: int = DIGITS) -> str:
 
 
 def _within(si: float, unknown: FreeParameter) -> str:
-    """A number of an effect as text that a reader of the file finds inside the law's bounds, in spite of rounding."""
+    """A parameter of an effect as text, with enough digits that rounding does not move it beyond its bounds."""
     for digits in (DIGITS, 17):
         shown = f"{from_si(si, unknown.unit):.{digits}g}"
         if unknown.low <= to_si(float(shown), unknown.unit) <= unknown.high:
@@ -136,7 +137,7 @@ def _within(si: float, unknown: FreeParameter) -> str:
 
 
 def _written_sd(sd: float, unit: str) -> str:
-    """A deviation in `unit`, '' where the record does not hold the number."""
+    """A standard deviation as text in `unit`; empty where the recording does not determine the parameter."""
     if not np.isfinite(sd) or sd == 0:
         return ""
     scale = from_si(sd, unit) - from_si(0.0, unit)
@@ -145,14 +146,14 @@ def _written_sd(sd: float, unit: str) -> str:
 
 
 def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
-    """Comment: what was found, from which recording, and held-out errors before and after."""
+    """Comment with recording, verdict, findings and held-out errors before and after."""
     lines = [f"Diagnosed from {diagnosis.recording.title!r} by {program()}, verdict {diagnosis.verdict}."]
     lines.append(sentence(diagnosis))
     lines += [channel_sentence(channel, error) for channel, error in diagnosis.held_out.items()]
     if changed:
-        lines.append(f"Numbers changed above: {', '.join(changed)}.")
+        lines.append(f"Parameters changed above: {', '.join(changed)}.")
     if diagnosis.verdict == UNEXPLAINED:
-        lines.append("This does NOT explain the recording: take the numbers as the best fit, not as physics.")
+        lines.append("This does NOT explain the recording: the values are the best fit, not physical parameters.")
     kept = (hard(" ".join(line.split())) for line in lines)
     wrapped = (part for line in kept for part in textwrap.wrap(line, WIDTH, break_long_words=False))
     return "".join(f"# {part}\n" for part in wrapped).replace(HARD_SPACE, " ")
