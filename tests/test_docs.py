@@ -12,6 +12,13 @@ import pytest
 from conftest import ROOT
 from markdown_it import MarkdownIt
 
+from ctrlgen.app.batch import BatchFile
+from ctrlgen.app.result_schemas import RESULTS
+from ctrlgen.devices import Device
+from ctrlgen.devices.sensor import DisplacementSensor, InterferometerSensor
+from ctrlgen.recordings.schema import RecordingFile
+from ctrlgen.trajectory.scenario import ScenarioFile
+
 DOCS = ROOT / "docs"
 IN_ORDER = {  # pages that build on files of the pages before them
     "device": ["tutorial/first_device.md"],
@@ -78,6 +85,19 @@ def test_every_page_is_in_the_contents():
     listed = (DOCS / "index.md").read_text(encoding="utf-8").split()
     pages = {path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md")} - {"index"}
     assert pages <= {*listed, *(page for page in pages if page.startswith("reference/generated"))}
+
+
+FILES = [*Device.library.values(), DisplacementSensor, InterferometerSensor, ScenarioFile, RecordingFile, BatchFile]
+
+
+@pytest.mark.parametrize("file", [*FILES, *RESULTS.values()], ids=lambda model: model.__name__)
+def test_every_key_of_a_file_has_a_description(file):
+    """The reference pages are made of them."""
+    schema = file.model_json_schema()
+    tables = {file.__name__: schema, **schema.get("$defs", {})}
+    keys = [(name, key, entry) for name, table in tables.items() for key, entry in table.get("properties", {}).items()]
+    assert keys
+    assert [f"{name}.{key}" for name, key, entry in keys if not entry.get("description", "").strip()] == []
 
 
 @pytest.mark.long

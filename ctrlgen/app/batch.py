@@ -43,16 +43,24 @@ class JobTable(Section):
     """One [[job]] of the list."""
 
     device: str
+    """The device file, relative to the list."""
     recordings: Annotated[tuple[str | tuple[str, ...], ...], Field(min_length=1)]
+    """Recordings, relative to the list; `*` and `?` match several, one diagnosis each. An inner list is joined into one
+    diagnosis.
+    """
     name: str | None = Field(default=None, pattern=r"^[\w.-]+$")
+    """What the names of the result folders begin with. Left out: the device file's name."""
 
 
 class BatchFile(Section):
     """The schema of the list."""
 
     seed: int = 0
+    """Seed of everything drawn at random; `--seed` replaces it."""
     laws: tuple[str, ...] | None = None
+    """Kinds of the effects to consider. Left out: all."""
     job: Annotated[tuple[JobTable, ...], Field(min_length=1)]
+    """`[[job]]` tables: what is diagnosed."""
 
 
 @dataclass(frozen=True)

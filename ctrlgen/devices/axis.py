@@ -20,9 +20,13 @@ class Mechanics(Section):
     tolerance: ClassVar[float | None] = 0.1
 
     mass: Annotated[Quantity, In("kg", positive=True)]
+    """Moving mass m."""
     damping: Annotated[Quantity, In("N*s/m", low=0.0)]
+    """Viscous damping c: the force -c q' opposes the velocity."""
     stiffness: Annotated[Quantity, In("N/um", low=0.0)]
+    """Stiffness k of the flexures: the force -k q pulls toward q = 0."""
     stroke: Annotated[Quantity, In("um", positive=True)]
+    """Largest displacement to either side of q = 0; a limit of trajectories and of the generated controller."""
 
 
 class Actuator(Section):
@@ -32,32 +36,41 @@ class Actuator(Section):
     tolerance: ClassVar[float | None] = 0.1
 
     force_constant: ForceConstant
+    """Force per drive k_f; its unit decides whether the drive is a voltage or a current."""
     drive_limit: Annotated[Quantity, In("V", positive=True)] | Annotated[Quantity, In("A", positive=True)]
+    """Largest drive of either sign, in volt or ampere as in `force_constant`."""
 
 
 class Loop(Section):
     """The position controller, u = k_p k_v (r - y) - k_v q' + k_i int(r - y) dt, clipped at the drive limit.
 
-    Computed at every sample and held until the next, as a digital controller does. `measures`: whether y is the
-    recorded reading, with all its errors, or the displacement q, as an encoder of the controller's own has it.
+    Computed at every sample and held until the next, as a digital controller does.
     """
 
     domain: ClassVar[str] = "actuator"
     tolerance: ClassVar[float | None] = 0.0
 
     measures: Literal["reading", "displacement"] = "reading"
+    """What y is: the recorded reading with all its errors, or the displacement q, seen by an encoder of its own."""
     position_gain: Annotated[Quantity, In("1/s", positive=True)]
+    """k_p: commanded velocity per position error."""
     velocity_gain: Annotated[Quantity, In("V/(m/s)", low=0.0)]
+    """k_v: drive per velocity error."""
     integral_gain: Annotated[Quantity, In("V/(m*s)", low=0.0)]
+    """k_i: drive per integral of the position error; 0 for a controller without it."""
 
 
 class Axis(Device):
     """Drive (or, in closed loop, reference) -> force -> displacement of one moving mass on flexures."""
 
     kind: Literal["axis"]
+    """Newton's second law of one moving mass."""
     mechanics: Mechanics
+    """Mass, flexures and stroke."""
     actuator: Actuator
+    """The motor."""
     loop: Loop | None = None
+    """The position controller; the drive of the device is then the reference position. Left out: open loop."""
 
     def physics(self, p: SimpleNamespace) -> InertialPhysics:
         """Newton's second law with the device's numbers."""

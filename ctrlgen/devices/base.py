@@ -165,11 +165,19 @@ class Device(Section):
     library: ClassVar[dict[str, type[Device]]] = {}
 
     kind: str
+    """Chooses the equations of the device."""
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    """A C identifier in lower case; recordings and scenarios name the device by it, and generated functions bear it."""
     title: str
+    """The device in words, for reports."""
     source: str
+    """Where the numbers come from: a paper, a data sheet, a measurement."""
     effect: tuple[EffectTable, ...] = ()
+    """`[[effect]]` tables: physical effects that the kind leaves out; each adds one term to the model."""
     sensor: tuple[AnySensor, ...] = ()
+    """`[[sensor]]` tables: what reads the channels of the pose. They do not enter the model; `ctrlgen check` gives
+    their resolution and range, `ctrlgen.simulate_sensors` their recordings.
+    """
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

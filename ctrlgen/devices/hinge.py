@@ -8,7 +8,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Section
@@ -34,8 +34,11 @@ class HingeEquations(Section):
     """Whose equation gives each compliance, as in S3 Table 2; one name in place of the table means all three."""
 
     alpha_z_per_M_z: Group = "auto"
+    """Rotation per moment: authors of the equation."""
     delta_y_per_F_y: Group = "auto"
+    """Deflection across the hinge per force: authors of the equation."""
     delta_x_per_F_x: Group = "auto"
+    """Extension along the hinge per force: authors of the equation."""
 
     @model_validator(mode="before")
     @classmethod
@@ -49,22 +52,32 @@ class HingeEquations(Section):
 
 
 class Hinge(Section):
-    """A right circular hinge. Width and material may be its own or come from the device.
-
-    `equation` names one group of authors, one per compliance, or "auto". Beyond an equation's t/R range, `outside`
-    refuses it, warns, or accepts it in silence (`ctrlgen check` still says so). `shear_factor` 0 leaves shear out of
-    delta_y/F_y; without it each group's own is taken.
-    """
+    """A right circular hinge. Width and material may be its own or come from the device."""
 
     kind: Literal["circular"]
+    """A hinge with two circular cut-outs."""
     R: Length
+    """Radius of the cut-outs."""
     t: Length
+    """Least thickness, at the neck; t/R decides which equations hold."""
     equation: HingeEquations = HingeEquations()
+    """Authors of the equations: one name for all three compliances, a table with one each, or `auto`, the one that S3
+    Table 3 recommends at this t/R.
+    """
     outside: table.Outside = "refuse"
+    """What happens where t/R is outside an equation's range: an error, a warning, or nothing (`ctrlgen check` still
+    says so).
+    """
     shear_factor: Annotated[Quantity, In("1", low=0.0, high=2.0)] | None = None
-    b: Length | None = Field(default=None, description="width")
+    """Factor of the shear term of delta_y/F_y, 3/2 for a rectangular section; 0 leaves shear out. Left out: each
+    author's own.
+    """
+    b: Length | None = None
+    """Width, normal to the plane of motion. Left out: the device's."""
     young: Annotated[Quantity, In("GPa", positive=True)] | None = None
+    """Young's modulus. Left out: the device's."""
     poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)] | None = None
+    """Poisson's ratio. Left out: the device's."""
 
     @model_validator(mode="after")
     def _equations_hold(self) -> Hinge:

@@ -25,24 +25,43 @@ class Actuator(Section):
     domain: ClassVar[str] = "actuator"
 
     beams: Annotated[Quantity, In("1", low=1, whole=True)]
+    """n: beams on each side of the bar."""
     beam_length: Length
+    """l^bt: length of one beam."""
     beam_width: Length
+    """w_1: width of one beam, in the plane of motion."""
     beam_gap: Length
+    """w_2: distance between two beams."""
     bar_width: Length
+    """w_3: width of a beam as measured along the bar; beams stand w_2 + w_3/2 apart."""
     bar_half_height: Length
+    """Distance from the bar's middle line to the roots of its beams, 50 um in d_1^i of S1 section 3.1."""
     beam_angle: Annotated[Quantity, In("rad", positive=True, high=0.5)]
+    """theta^t: angle of the beams to the normal of the bar; the force grows with its sine."""
     thickness: Length
+    """h: thickness of the device layer, of beams, levers and notches alike."""
     young: Annotated[Quantity, In("GPa", positive=True)]
+    """Young's modulus E of the device layer."""
     poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
+    """Poisson's ratio v of the device layer."""
     expansion: Annotated[Quantity, In("1/K", positive=True)]
+    """Coefficient of thermal expansion alpha at 0 degC."""
     expansion_slope: Annotated[Quantity, In("1/K^2", low=0.0)]
+    """Increase of alpha per kelvin."""
     ambient: Annotated[Quantity, In("degC", low=200.0, high=400.0)]
+    """Temperature T_amb at which the actuators are without force and to which they cool."""
     temperature_limit: Annotated[Quantity, In("degC", positive=True)]
+    """Largest average temperature of an actuator; a limit of trajectories and of the generated controller."""
     thermal_resistance: Annotated[Quantity, In("K/W", positive=True)]
+    """R_th: temperature rise per heater power in the steady state."""
     time_constant: Annotated[Quantity, In("ms", positive=True)]
+    """tau: time constant of heating and of cooling, first order."""
     power_limit: Annotated[Quantity, In("W", positive=True)]
+    """Largest heater power; the smallest is 0, because cooling is passive."""
     heater_resistance: Annotated[Quantity, In("ohm", positive=True)]
+    """R: turns a drive in volts into power, P = V^2/R; not used where the drive is a power."""
     drive: Literal["power", "voltage"]
+    """Whether the six drives are heater powers [W] or heater voltages [V]."""
 
 
 class Notch(Section):
@@ -51,15 +70,25 @@ class Notch(Section):
     domain: ClassVar[str] = "stage"
 
     theta_x_per_M_x: Annotated[Quantity, In("rad/(N*um)", positive=True)]
+    """Torsion per moment about x, the axis along the flexure."""
     theta_y_per_F_z: Annotated[Quantity, In("rad/N")]
+    """Rotation about y per force along z; averaged with `delta_z_per_M_y`, which is the same by reciprocity."""
     theta_y_per_M_y: Annotated[Quantity, In("rad/(N*um)", positive=True)]
+    """Rotation about y per moment about y, out of the plane."""
     theta_z_per_F_y: Annotated[Quantity, In("rad/N")]
+    """Rotation about z per force along y; averaged with `delta_y_per_M_z`."""
     theta_z_per_M_z: Annotated[Quantity, In("rad/(N*um)", positive=True)]
+    """Rotation about z per moment about z: the hinge's own motion, in S1 eq. (9)."""
     delta_x_per_F_x: Annotated[Quantity, In("um/N", positive=True)]
+    """Extension along the flexure per force."""
     delta_y_per_F_y: Annotated[Quantity, In("um/N", positive=True)]
+    """Deflection along y, in the plane, per force."""
     delta_y_per_M_z: Annotated[Quantity, In("um/(N*um)")]
+    """Deflection along y per moment about z."""
     delta_z_per_F_z: Annotated[Quantity, In("um/N", positive=True)]
+    """Deflection along z, out of the plane, per force."""
     delta_z_per_M_y: Annotated[Quantity, In("um/(N*um)")]
+    """Deflection along z per moment about y."""
 
 
 class Stage(Section):
@@ -68,50 +97,82 @@ class Stage(Section):
     domain: ClassVar[str] = "stage"
 
     lever_short: Length
+    """e_3: from the lever's root to the notch that drives it."""
     lever_long: Length
+    """e_4: length of levers and guides between their notches; e_4/e_3 multiplies the bar's travel."""
     lever_width: Length
+    """w_5: width of levers and guides, in the plane."""
     notch_radius: Length
+    """r: radius of the circular notches."""
     notches: Count
+    """Notches that turn when the stage moves, each by d/e_4 (S1 eq. 9)."""
     notch: Notch
+    """Compliance of one notch."""
     half_stage_stiffness: Annotated[Quantity, In("N/um", positive=True)]
+    """k_a: axial stiffness of one half stage, which makes the nonlinear force of S1 eq. (11)."""
     plate_half_length: Length
+    """From the plate's centre to its arms, along the motion."""
     plate_half_width: Length
+    """e_6: from the plate's centre to its arms, across the motion."""
     centre_offset: Length
+    """e_8: from the centre of the X stage to that of the Y stage, along y."""
     stroke: Length
+    """Largest displacement; the smallest is 0. A limit of trajectories and of the generated controller."""
     notch_rotation_limit: Annotated[Quantity, In("deg", positive=True)]
+    """Largest rotation phi = asin(d/e_4) of a notch; a limit."""
 
 
 class Hexapod(Section):
     """Struts and platform, S1 Table 2."""
 
     platform_radius: Length
+    """r_a: radius of the circle of strut ends on the platform."""
     base_radius: Length
+    """r_b: radius of the circle of strut ends on the stages at home."""
     height: Length
+    """H: height of a strut, from its lower to its upper end."""
     platform_thickness: Length
+    """t: the upper strut ends stand t below the origin, the centre of the platform's top face."""
     platform_angles: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+    """alpha_1 to alpha_6: angles of the platform's strut ends about z, from x."""
     base_angles: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+    """beta_1 to beta_6: angles of the lower strut ends about z, from x."""
     stage_angles: tuple[Angle, Angle, Angle]
+    """Angle by which each of the three stages is turned about z."""
     wire_length: Length
+    """l: length of the wire flexure at each end of a strut."""
     wire_diameter: Length
+    """d: diameter of the wire flexures."""
     rod_diameter: Length
+    """D: diameter of the rod between them."""
     young: Annotated[Quantity, In("GPa", positive=True)]
+    """Young's modulus of wires and rods."""
     poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
+    """Poisson's ratio of wires and rods."""
     stress_limit: Annotated[Quantity, In("MPa", positive=True)]
+    """Largest stress at the ends of the wires; a limit."""
 
 
 class MemsHexapod(Device):
     """Heater power -> temperature -> bar force == stage force of the displacement -> pose.
 
-    `push` is the table of signs of S1 eq. (19): the direction along the paper's stage axis in
-    which each actuator pushes. Inside, displacement and force count positive along the push.
+    Displacements and forces count positive in the direction in which the actuators push.
     """
 
     kind: Literal["mems_hexapod"]
+    """NIST's MEMS hexapod with thermal actuators (S1)."""
     axes: tuple[Axis, Axis, Axis, Axis, Axis, Axis]
+    """Names of the six actuators, in the order 1X, 1Y, 2X, 2Y, 3X, 3Y of S1 eq. (19)."""
     push: tuple[Literal[-1, 1], ...] = Field(min_length=6, max_length=6)
+    """Signs of S1 eq. (19): along which direction of the paper's axis each actuator pushes. Displacements and forces
+    count positive along the push.
+    """
     actuator: Actuator
+    """The thermal actuators, all six alike."""
     stage: Stage
+    """One axis of an X-Y stage, all six alike."""
     hexapod: Hexapod
+    """Struts and platform."""
 
     @model_validator(mode="after")
     def _lengths_fit(self) -> MemsHexapod:

@@ -21,48 +21,71 @@ class Hexapod(Section):
     """Strut ends and platform, S0 Table 1. The four spacings follow from radii and angles; none enters an equation."""
 
     platform_radius: Length
+    """r_a: radius of the circle of strut ends on the platform."""
     base_radius: Length
+    """r_b: radius of the circle of strut ends on the stages at home."""
     platform_thickness: Length
+    """t: the strut ends stand t/2 below the platform's centre (S0 eq. 1)."""
     height: Length
+    """H: the lower strut ends stand H below the platform's centre (S0 eq. 1)."""
     strut_length: Length
+    """L as printed; it enters no equation, because the lengths follow from the strut ends at home."""
     base_near: Length
+    """c_1: between neighbouring strut ends on the base; enters no equation."""
     base_far: Length
+    """c_2: between the other strut ends on the base; enters no equation."""
     platform_near: Length
+    """c_3: between neighbouring strut ends on the platform; enters no equation."""
     platform_far: Length
+    """c_4: between the other strut ends on the platform; enters no equation."""
     platform_angles: Six
+    """phi_1 to phi_6: angles of the platform's strut ends about z, from x."""
     base_angles: Six
+    """psi_1 to psi_6: angles of the lower strut ends about z, from x."""
 
 
 class Directions(Section):
     """The direction of each actuator's motion, as the constraint (S0 eq. 4) and as the Jacobian (eq. 9) has it."""
 
     constraint: Six
+    """As the position constraint has them (S0 eq. 4); the model does not use them."""
     jacobian: Six
+    """As the Jacobian has them (S0 eq. 9); the model uses these."""
 
 
 class Cube(Section):
     """The reflective cube below the platform, which the instruments look at."""
 
     depth: Length
+    """h: the cube's centre stands h below the platform's (S0 eq. 16)."""
 
 
 class RatedTravel(Section):
     """Largest rotation and translation of any axis that the paper states; no limit of the model, `travel` is."""
 
     rotation: Annotated[Quantity, In("deg", positive=True)]
+    """Largest rotation about any axis, either sign."""
     translation: Annotated[Quantity, In("um", positive=True)]
+    """Largest translation along any axis, either sign."""
 
 
 class MesoHexapod(Device):
     """Actuator displacement -> stage -> platform pose: kinematics alone, without force, temperature or time."""
 
     kind: Literal["meso_hexapod"]
+    """The kinematics of NIST's meso-scale hexapod (S0)."""
     axes: tuple[str, str, str, str, str, str]
+    """Names of the six actuators, in the order of S0 eq. (6): 1x, 2x, 2y, 3x, 3y, 1y."""
     hexapod: Hexapod
+    """Strut ends and platform."""
     directions: Directions
+    """Direction in which each actuator moves its stage, as an angle from the global x, in the order of `axes`."""
     cube: Cube
+    """The reflective cube that is measured."""
     workspace: RatedTravel
+    """Range of poses that the paper states."""
     travel: Length
+    """Largest displacement of an actuator, either sign; the limit of drives and stages."""
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """Commanded actuator travel == stage displacement -> pose by the kinematic Jacobian (6)-(10), as printed."""

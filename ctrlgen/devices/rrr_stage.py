@@ -23,47 +23,70 @@ class Lengths(Section):
     """Link lengths of S3 Fig. 6(b)."""
 
     l1: Length
+    """From Point 1, the end of hinge 1, to Point o', where the link meets the platform, along x of Link 1 (S3 eq.
+    B.17).
+    """
     l2: Length
+    """Length of the rigid link between hinges 2 and 3 (S3 Table 1)."""
     l3: Annotated[Quantity, In("mm", low=0.0)]
+    """From the end of hinge 3 to Point o' (S3 Table 1)."""
     l4: Length
+    """From Point 1 to Point o', along y of Link 1 (S3 eq. B.17)."""
     l5: Annotated[Quantity, In("mm", low=0.0)]
+    """Arm of the input force about Point 1 (S3 below eq. B.8)."""
     l6: Annotated[Quantity, In("mm", low=0.0)]
+    """From Point o' to the platform's centre, Point o (S3 eq. B.58)."""
 
 
 class Material(Section):
     """Material and width of the sheet the stage is cut from."""
 
     young: Annotated[Quantity, In("GPa", positive=True)]
+    """Young's modulus E."""
     poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
+    """Poisson's ratio v."""
     width: Length
+    """Thickness of the sheet, which is the width b of every hinge."""
 
 
 class Piezo(Section):
     """The stack behind each input and its amplifier."""
 
     stroke: Annotated[Quantity, In("um", positive=True)]
+    """Free travel s at the largest voltage."""
     blocking_force: Annotated[Quantity, In("N", positive=True)]
+    """Force F_b at the largest voltage and no travel; the stack's stiffness is F_b/s."""
     voltage_limit: Annotated[Quantity, In("V", positive=True)]
+    """Largest voltage V_max; voltages run from 0 to it."""
     time_constant: Annotated[Quantity, In("ms", positive=True)]
+    """Time constant with which the stack's voltage follows the amplifier's input."""
 
 
 class RrrStage(Device):
-    """Stack voltage -> force on the input == stiffness of the input -> output displacement.
-
-    `frame_angle` turns the output frame from that of Link 1. `inputs` says whether the input compliance is that of the
-    whole linear model or, as the paper prints it (B.83), without what the inputs give with the platform held.
-    """
+    """Stack voltage -> force on the input == stiffness of the input -> output displacement."""
 
     kind: Literal["rrr_stage"]
+    """A planar stage of three links with three circular hinges each (S3)."""
     axes: tuple[str, str, str]
+    """Names of the three inputs, in the order of Links 1 to 3."""
     frame_angle: Annotated[Quantity, In("deg")]
+    """Angle by which the output frame is turned from the frame of Link 1."""
     inputs: Literal["whole", "printed"] = "whole"
+    """Input compliance of the whole linear model, or as S3 eq. (B.83) prints it, without the part that the inputs give
+    with the platform held.
+    """
     lengths: Lengths
+    """Lengths of the links."""
     material: Material
+    """Material and thickness of the sheet."""
     hinge1: Hinge
+    """Hinge 1 of every link, at the base."""
     hinge2: Hinge
+    """Hinge 2 of every link, in the middle."""
     hinge3: Hinge
+    """Hinge 3 of every link, at the platform."""
     piezo: Piezo
+    """The stacks, all three alike."""
 
     @model_validator(mode="after")
     def _hinges_store_energy(self) -> RrrStage:

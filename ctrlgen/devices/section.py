@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Section(BaseModel):
-    """A table of a device file. Unknown keys are faults; nothing changes after loading.
+    """A table of a device file. Unknown keys are faults; nothing changes after loading. The docstring below a key describes it.
 
     `domain` is where a report places its numbers; `tolerance` is how far they may be off, relative, where the file
     states no standard deviation: None where a number off its nominal would be a finding.
@@ -17,4 +17,4 @@ class Section(BaseModel):
     domain: ClassVar[str] = "mechanism"
     tolerance: ClassVar[float | None] = None
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, use_attribute_docstrings=True)

@@ -38,9 +38,13 @@ class Converter(Section):
     """The ADC behind a sensor; by default that of S2 A.3.1, dSPACE DS1104."""
 
     low: Volt | None = None
+    """Lower end of the range. Left out: -10 V."""
     high: Volt | None = None
+    """Upper end of the range. Left out: 10 V."""
     bits: Annotated[Quantity, In("1", low=1, high=32, whole=True)] | None = None
+    """Resolution: the step is (high - low)/2^bits. Left out: 16."""
     rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Sampling rate. Left out: 5 kHz."""
 
     @model_validator(mode="after")
     def _has_a_range(self) -> Converter:
@@ -71,11 +75,14 @@ class Figures:
 
 
 class _Mounted(Section):
-    """`at` the channel of the pose. A rotation is read at the end of an `arm`: displacement = arm * angle."""
+    """What every sensor has: where it stands, and the converter behind it."""
 
     at: str
+    """Channel of the pose that is read, such as `delta_x`."""
     arm: Annotated[Quantity, In("mm", positive=True)] | None = None
+    """Lever arm, for a rotation alone, which is read at its end: displacement = arm * angle."""
     adc: Converter = Converter()
+    """The ADC behind the sensor."""
 
     @property
     def lever(self) -> float:
@@ -84,24 +91,38 @@ class _Mounted(Section):
 
 
 class DisplacementSensor(_Mounted):
-    """Sensor with amplifier and digital filter. S2 Appendix A; `home` is where the platform at pose 0 stands in the range.
-
-    `home` counts from the end of the range at which the voltage begins; without it the middle.
-    """
+    """Displacement sensor with amplifier, ADC and digital filter (S2 Appendix A)."""
 
     kind: Literal["displacement"]
+    """A sensor whose voltage is linear in the displacement."""
     model: Literal["3316", "3317", "3338", "fibre"] | None = None
+    """One of the sensors of S2 Appendix A, whose numbers hold where none is written here. Left out: every number must
+    be given.
+    """
     home: Annotated[Quantity, In("um", low=0.0)] | None = None
+    """Where pose 0 stands, counted from the end of the range at which the voltage begins. Left out: in the middle."""
     sensitivity: Annotated[Quantity, In("um/V")] | None = None
+    """Displacement per voltage at the ADC, amplifier included; negative where the voltage falls as the displacement
+    grows.
+    """
     gain: Annotated[Quantity, In("1", positive=True)] | None = None
+    """Gain of the amplifier, which `sensitivity` contains."""
     bandwidth: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Cut-off frequency of the analogue filter."""
     noise: Positive | None = None
+    """Noise at the ADC, peak to peak, without the digital filter."""
     filtered_noise: Positive | None = None
+    """Noise at the ADC, peak to peak, after the digital filter."""
     filter_cutoff: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Cut-off frequency of the digital low-pass filter."""
     offset_rate: Annotated[Quantity, In("V/delta_degC")] | None = None
+    """Voltage offset per kelvin of difference from `calibrated_at`."""
     calibrated_at: Annotated[Quantity, In("degC")] | None = None
+    """Temperature of the calibration, at which the offset is zero."""
     low: Volt | None = None
+    """Lower end of the linear range."""
     high: Volt | None = None
+    """Upper end of the linear range."""
 
     @model_validator(mode="after")
     def _is_complete(self) -> DisplacementSensor:
@@ -162,10 +183,15 @@ class InterferometerSensor(_Mounted):
     """Michelson interferometer with a photodiode, S2 A.3.4; what is not given is S2's. Its reading is the fringe voltage."""
 
     kind: Literal["interferometer"]
+    """An interferometer whose fringe voltage is read."""
     wavelength: Annotated[Quantity, In("nm", positive=True)] | None = None
+    """Wavelength of the laser; half of it is one fringe. Left out: 632.8 nm."""
     mean: Volt | None = None
+    """Mean of the fringe voltage. Left out: 5 V."""
     amplitude: Positive | None = None
+    """Amplitude of the fringe voltage. Left out: 4 V."""
     noise: Annotated[Quantity, In("V", low=0.0)] | None = None
+    """Standard deviation of the voltage's noise. Left out: 0.02 V."""
 
     def interferometer(self) -> chain.Interferometer:
         """The interferometer of the measuring chain with these numbers."""

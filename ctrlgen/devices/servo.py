@@ -17,7 +17,9 @@ class Servo(Device):
     """Command -> position, without force or time; linear or rotary by the unit of `travel`, the largest excursion."""
 
     kind: Literal["servo"]
+    """An axis whose reading equals its command."""
     travel: Travel
+    """Largest excursion to either side of zero; an angle makes the axis rotary, a length linear."""
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """The identity."""

@@ -18,18 +18,26 @@ class Mechanics(Section):
     tolerance: ClassVar[float | None] = 1.0
 
     mass: Annotated[Quantity, In("kg", low=0.0)]
+    """Mass m that is accelerated with the motion."""
     damping: Annotated[Quantity, In("N*s/m", low=0.0)]
+    """Viscous damping c: the reading contains +c v."""
     stiffness: Annotated[Quantity, In("N/um", low=0.0)]
+    """Stiffness k: the reading contains +k d."""
     stroke: Annotated[Quantity, In("um", positive=True)]
+    """Largest displacement to either side of d = 0; a limit, and the scale of the displacement."""
     speed: Annotated[Quantity, In("um/s", positive=True)]
+    """Typical largest speed; a scale of the computation, not a limit."""
     force: Annotated[Quantity, In("N", positive=True)]
+    """Typical largest force; a scale of the computation, not a limit."""
 
 
 class TestedAxis(Device):
     """Imposed displacement, velocity and acceleration -> force F = m a + c v + k d."""
 
     kind: Literal["tested_axis"]
+    """An axis whose motion is imposed and whose force is read."""
     mechanics: Mechanics
+    """What resists the motion."""
 
     def physics(self, p: SimpleNamespace) -> ImposedPhysics:
         """Newton's second law, read for the force."""

@@ -18,53 +18,69 @@ LAST_ROW = 1 << 62  # stands for the end of a file whose length is not known yet
 
 
 class Column(Section):
-    """A column of a measurement file: its name or its number from 0, its unit, the standard deviation of its noise.
-
-    `file` names another file than the record's, with the same samples row by row. The column's numbers times `scale` are in
-    `unit`: newtons per volt of an amplifier whose voltage was recorded, -1 for reversed polarity. `later`: by how much they
-    act after their row's time, such as the one cycle after which a recorded command takes effect.
-    """
+    """A column of a measurement file."""
 
     column: str | Annotated[int, Field(strict=True, ge=0)]
+    """Name of the column in the file's header, or its number from 0."""
     unit: str
+    """Unit of the column's numbers after `scale`."""
     noise: str | None = None
+    """Standard deviation of the noise, with its unit, such as `"10 nm"`. Left out: estimated from the recording."""
     file: str | None = None
+    """Another file than the record's, with the same samples row by row. Left out: the record's file."""
     scale: float = 1.0
+    """Factor that brings the column's numbers to `unit`: newtons per volt of a recorded amplifier voltage, -1 for
+    reversed polarity.
+    """
     later: Annotated[Quantity, In("s")] | None = None
+    """How much later than its row's time a number acts: the one cycle after which a recorded command takes effect."""
 
 
 class Derivative(Section):
-    """A signal that was not recorded: the derivative of given `order` in time `of` another one, by central differences."""
+    """A signal that was not recorded: the derivative of another one in time, by central differences."""
 
     of: str
+    """Name of the recorded signal."""
     order: Literal[1, 2]
+    """Order of the derivative in time."""
 
 
 class Conditions(Section):
     """The surroundings of the device: the ambient temperature, constant or recorded."""
 
     ambient: str | Column | None = None
+    """Ambient temperature: constant, such as `"22 degC"`, or a column. Left out: no effect of it is considered."""
 
 
 class RecordTable(Section):
-    """One [[record]] of recording.toml.
-
-    `rows`: the half-open range of the file's rows that is used. The first `lead_in` of them only set the device's states and
-    memories; their readings are not compared. `period`: after it the drive repeats. `dwell`: time from pose to pose.
-    """
+    """One `[[record]]` of recording.toml: a stretch of one measurement file, and what it is used for."""
 
     file: str
+    """The measurement file, relative to recording.toml; its ending tells the format."""
     role: Literal["fit", "hold_out", "rest"]
+    """`fit`: parameters are estimated from it; `hold_out`: it only judges predictions; `rest`: nothing moves, it gives
+    the noise. Without a `hold_out`, part of the longest record is held out.
+    """
     time: Column | None = None
+    """Column of the time of each row. A series has either this or `sample_rate`; poses have neither."""
     sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Rows a second, for a series without a column of time."""
     dwell: Annotated[Quantity, In("s", positive=True)] | None = None
+    """Time from pose to pose, for poses that did not settle. Left out: every pose has settled."""
     start: Annotated[Quantity, In("s")] | None = None
+    """Time of the first row on the clock common to all records. Left out: 0 s."""
     between_samples: Literal["held", "linear"] = "held"
+    """Whether the drive is held at a sample's value until the next sample or is linear between them."""
     rows: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
+    """The half-open range [first, one past the last] of the file's rows that is used, from 0. Left out: all."""
     lead_in: Annotated[int, Field(ge=0)] = 0
+    """The first so many used rows only set the device's states and memories; their readings are not compared."""
     period: Annotated[Quantity, In("s", positive=True)] | None = None
+    """Time after which the drive repeats; differences of periods give the noise. Left out: sought in the drive."""
     conditions: Conditions = Conditions()
+    """The surroundings of the device."""
     columns: dict[str, Column] = {}
+    """Columns of this record alone, by signal; they replace those of the whole file."""
 
     @property
     def used_rows(self) -> tuple[int, int]:
@@ -74,23 +90,28 @@ class RecordTable(Section):
 
 
 class RecordingFile(Section):
-    """recording.toml; its `columns` hold for every record, which may override single ones.
-
-    `source`: who measured it and where it is published. `sha256`: of files that are not kept beside this one, by their names
-    without folders, so that a reader can tell the right file. `low_pass`: of a series, the cut-off of a zero-phase filter
-    that all columns and `derivatives` pass. `keep_every`: one row in so many is kept after it.
-    """
+    """The file beside the measurements: on which device they were made, and what their columns are."""
 
     title: str
+    """The recording in words, for reports."""
     device: str
+    """`name` of the device that it was made on."""
     source: str = ""
+    """Who measured it and where it is published."""
     sha256: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]] = {}
+    """SHA-256 of measurement files that are not kept beside this one, by name without folder; they are checked."""
     kind: Literal["series", "poses"]
+    """`series`: motion in time; `poses`: a list of settled poses."""
     low_pass: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Cut-off of a zero-phase low-pass filter, which all columns and `derivatives` of a series pass."""
     keep_every: Annotated[int, Field(ge=1)] = 1
+    """One row in so many is kept, after the filter."""
     columns: dict[str, Column] = {}
+    """Columns by signal of the model, such as `"drive.1X"` or `"reading.delta_x"`, for every record."""
     derivatives: dict[str, Derivative] = {}
+    """Signals that were not recorded, by their name: derivatives of recorded ones."""
     record: Annotated[tuple[RecordTable, ...], Field(min_length=1)]
+    """`[[record]]` tables: the measurement files."""
 
     def columns_of(self, record: RecordTable) -> dict[str, Column]:
         """The columns of one record by signal: its own, else those of the whole file."""

@@ -40,7 +40,7 @@ class Origin(Keys):
     """What every result file states of its origin."""
 
     schema_version: Literal[1] = Field(description="Version of this schema.")
-    program: Program
+    program: Program = Field(description="Name, version and commit of the program.")
     inputs: dict[str, Sha256] = Field(description="SHA-256 of every file that was read, by name.")
     seed: int | None = Field(description="Seed of everything drawn at random; null where nothing is.")
     notes: list[str] = Field(description="What a reader should know of the inputs or of how the result was made.")
@@ -162,15 +162,15 @@ class SignalChannels(Keys):
 class StatusEntry(Keys):
     """One value of the controller's status."""
 
-    value: int
-    name: str
-    meaning: str
+    value: int = Field(description="Its value in C, a bit of the status.")
+    name: str = Field(description="Its name in C.")
+    meaning: str = Field(description="What it tells the caller.")
 
 
 class LimitEntry(Keys):
     """A limit that the controller keeps."""
 
-    label: str
+    label: str = Field(description="The limited quantity in words.")
     lower: str | None = Field(description="Bound with its unit; null without one.")
     upper: str | None = Field(description="Bound with its unit; null without one.")
 
@@ -179,12 +179,14 @@ class Interface(Keys):
     """What the generated C takes and gives, in SI units."""
 
     functions: dict[str, list[str]] = Field(description="Signatures, by arithmetic.")
-    target: SignalChannels
-    drive: SignalChannels
-    actuator_state: SignalChannels | None
+    target: SignalChannels = Field(description="What the controller is given at each sample.")
+    drive: SignalChannels = Field(description="What it returns.")
+    actuator_state: SignalChannels | None = Field(
+        description="The actuators' states that it keeps account of; null for a device without any."
+    )
     memory: list[str] = Field(description="'name [unit]' of what the controller keeps between samples.")
-    status: list[StatusEntry]
-    limits: list[LimitEntry]
+    status: list[StatusEntry] = Field(description="Values of the status.")
+    limits: list[LimitEntry] = Field(description="Limits that the controller keeps.")
 
 
 class Budgets(Keys):
@@ -209,10 +211,10 @@ class CallCost(Keys):
 class Target(Keys):
     """The C on one emulated processor, compared with this computer bit by bit."""
 
-    core: str
-    compiler: str
+    core: str = Field(description="The emulated processor.")
+    compiler: str = Field(description="Compiler and flags.")
     real: str = Field(description="Arithmetic: float or double.")
-    costs: list[CallCost]
+    costs: list[CallCost] = Field(description="Instructions by kind of call.")
     stack: int = Field(description="Bytes of stack.")
     code: int = Field(description="Bytes of code.")
     tables: int = Field(description="Bytes of constant data.")
@@ -221,15 +223,15 @@ class Target(Keys):
     differing: int = Field(description="Numbers that differ.")
     ulp: int = Field(description="Largest difference in units in the last place.")
     where: str = Field(description="First call whose numbers differ; empty without one.")
-    passed: bool
+    passed: bool = Field(description="Whether no number differs and no static memory is writable.")
     instructions: dict[str, int | None] = Field(description="Largest number of instructions of one call, by kind.")
 
 
 class StoppedTarget(Keys):
     """An emulated run that stopped early."""
 
-    core: str
-    compiler: str
+    core: str = Field(description="The emulated processor.")
+    compiler: str = Field(description="Compiler and flags.")
     real: str = Field(description="Arithmetic: float or double.")
     words: str = Field(description="Why it stopped.")
 
@@ -237,20 +239,20 @@ class StoppedTarget(Keys):
 class ToolFinding(Keys):
     """One finding of an analyser."""
 
-    file: str
-    line: int
-    rule: str
-    severity: str
-    text: str
+    file: str = Field(description="The generated file.")
+    line: int = Field(description="Its line.")
+    rule: str = Field(description="The analyser's name of the rule.")
+    severity: str = Field(description="The analyser's word for how grave it is.")
+    text: str = Field(description="The analyser's message.")
     permitted: bool = Field(description="Whether DEVIATIONS.md permits it.")
 
 
 class ToolCheck(Keys):
     """One tool that read or ran the generated C."""
 
-    tool: str
-    version: str
-    state: Literal["passed", "failed", "not run"]
+    tool: str = Field(description="Name of the tool.")
+    version: str = Field(description="Its version; empty where it is not known.")
+    state: Literal["passed", "failed", "not run"] = Field(description="Its outcome.")
     note: str = Field(description="Remark, or the remedy where it did not run.")
     files: list[str] = Field(description="Files that it was given.")
     permitted: int = Field(description="Findings that DEVIATIONS.md permits.")
@@ -261,15 +263,15 @@ class BuildRecord(Summary):
     """Result of `ctrlgen verify`: everything of summary.json, and every check of the generated C."""
 
     failures: list[str] = Field(description="What failed, one line each.")
-    not_run: list[NotRun]
-    interface: Interface
+    not_run: list[NotRun] = Field(description="Checks that did not run.")
+    interface: Interface = Field(description="What the generated C takes and gives.")
     budgets: Budgets | None = Field(description="Null for devices for which no budget is stated.")
     errors_along_the_trajectory: list[dict[str, str | float]] = Field(
         description="Largest error of the model driven by the C, by 'channel [unit]', with the keys c (online C or player C) and real."
     )
-    targets: list[Target]
-    stopped: list[StoppedTarget]
-    checks: list[ToolCheck]
+    targets: list[Target] = Field(description="The C on emulated processors.")
+    stopped: list[StoppedTarget] = Field(description="Emulated runs that stopped early.")
+    checks: list[ToolCheck] = Field(description="Analysers and tests of the generated C.")
 
 
 def schema_text(model: type[BaseModel], name: str) -> str:

@@ -16,6 +16,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
+from pydantic.json_schema import SkipJsonSchema
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
@@ -94,10 +95,15 @@ class Circle(Path_):
 
     closed: ClassVar[bool] = True
     kind: Literal["circle"]
+    """A circle."""
     diameter: Length
+    """Diameter."""
     centre: Point = {}
+    """Its centre, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
+    """Two translations that span the plane of the path, first and second."""
     turns: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Whole turns in the duration."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         angle = 2 * np.pi * self.turns * np.arange(n) / n
@@ -112,9 +118,13 @@ class Line(Path_):
     """From `start` to `end`: minimum jerk in time, or evenly spaced where the scenario is static."""
 
     kind: Literal["line"]
+    """A straight line."""
     start: Point = {}
+    """First pose, as channels with units; channels left out are zero."""
     end: Point
+    """Last pose, as channels with units; channels left out are zero."""
     even: bool = False
+    """Samples evenly spaced; otherwise they follow the minimum-jerk law, at rest at both ends."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         s = np.linspace(0, 1, n)
@@ -130,12 +140,19 @@ class Raster(Path_):
     """
 
     kind: Literal["raster"]
+    """Parallel lines, back and forth."""
     length: Length
+    """Length of a line, along the first channel of `plane`."""
     spacing: Length
+    """Distance between lines, along the second channel of `plane`."""
     lines: Annotated[int, Field(ge=1, le=10000)]
+    """Number of lines."""
     centre: Point = {}
+    """Middle of the raster, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
+    """Two translations that span the plane of the path, first and second."""
     step_share: Annotated[float, Field(gt=0, le=1)] = 0.2
+    """Time of a step to the next line as a share of the time of a line."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         fast, slow = frame.directions(self.plane, "plane")
@@ -153,10 +170,15 @@ class Spiral(Path_):
     """Archimedean, from the centre outwards: r = (diameter/2) s, angle = 2 pi turns s, s minimum jerk."""
 
     kind: Literal["spiral"]
+    """An Archimedean spiral."""
     diameter: Length
+    """Diameter of the last turn."""
     turns: Annotated[float, Field(gt=0, le=1000)]
+    """Number of turns, not necessarily whole."""
     centre: Point = {}
+    """Its centre, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
+    """Two translations that span the plane of the path, first and second."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         s = minimum_jerk(np.linspace(0, 1, n))
@@ -174,11 +196,17 @@ class Lissajous(Path_):
 
     closed: ClassVar[bool] = True
     kind: Literal["lissajous"]
+    """A Lissajous figure."""
     amplitudes: tuple[Length, Length]
+    """a_1 and a_2: amplitudes along the two channels of `plane`."""
     periods: tuple[Annotated[int, Field(ge=1, le=1000)], Annotated[int, Field(ge=1, le=1000)]]
+    """f_1 and f_2: whole periods in the duration."""
     phase: Annotated[Quantity, In("deg")] = read_quantity("deg", "90 deg")
+    """Phase of the first channel at the start."""
     centre: Point = {}
+    """Its centre, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
+    """Two translations that span the plane of the path, first and second."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         t = np.arange(n) / n
@@ -189,15 +217,16 @@ class Lissajous(Path_):
 
 
 class Poses(Path_):
-    """Samples listed in the scenario (`points`) or in a CSV file (`file`), one row per sample.
-
-    The CSV has one header row of channels with units, such as `delta_z [um]`; channels not named are zero.
-    """
+    """Samples listed in the scenario (`points`) or in a CSV file (`file`), one row per sample."""
 
     kind: Literal["poses"]
+    """Listed samples."""
     points: tuple[Point, ...] = ()
+    """The samples, each as channels with units; channels left out are zero."""
     file: str = ""
-    folder: Path = Field(default=Path(), exclude=True)
+    """A CSV file, relative to scenario.toml: a header row of channels such as `delta_z [um]`, then one row a sample."""
+    folder: SkipJsonSchema[Path] = Field(default=Path(), exclude=True)
+    """Where `file` is looked for; set by the program."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         if bool(self.points) == bool(self.file):

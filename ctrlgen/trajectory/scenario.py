@@ -24,29 +24,41 @@ MOST_SAMPLES = 1_000_000  # of one path: what memory holds
 
 
 class Expectation(Section):
-    """One expected value of the solution: `value` names it (see `ctrlgen.trajectory.metrics.metric`), `range` in its unit."""
+    """One `[[expect]]` table: a value that the solution must have, named as `trajectory.metrics.metric` reads it."""
 
     value: str
+    """What is expected: SIGNAL.CHANNEL.min, .max, .rms or .abs, SIGNAL.CHANNEL[sample], or margin.LIMIT."""
     range: tuple[str, str]
+    """Smallest and largest value that pass, with units."""
     source: str = ""
+    """Where the expected value comes from."""
 
 
 class ScenarioFile(Section):
-    """The schema of scenario.toml.
+    """A path for a device to follow.
 
-    `follow`: the signal that the path commands. With `sample_rate` the path is followed in time, for `duration`; without it
-    the scenario is static: `points` separate equilibria. `outcome`: whether the path can be followed.
+    With `sample_rate` the path is followed in time; without it the scenario is static, a row of separate equilibria.
     """
 
     title: str
+    """The scenario in words, for reports."""
     device: str
+    """The device file, relative to this one."""
     follow: Literal["pose", "displacement"] = "pose"
+    """The signal that the path commands: the platform's pose, or the stages' displacements."""
     sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Samples a second of a motion in time. Left out: the scenario is static, and its samples are separate equilibria.
+    """
     duration: Annotated[Quantity, In("s", positive=True)] | None = None
+    """Length of the motion; with `sample_rate` it gives the number of samples."""
     points: Annotated[int, Field(ge=2, le=MOST_SAMPLES)] | None = None
+    """Number of samples of a static scenario; not needed for a list of poses."""
     path: PathKind
+    """The commanded path; its `kind` chooses the shape."""
     outcome: Literal["solved", "unreachable"] = "solved"
+    """Whether a trajectory is expected to exist; `unreachable` passes where none does."""
     expect: tuple[Expectation, ...] = ()
+    """`[[expect]]` tables: values that the solution must have."""
 
     @model_validator(mode="after")
     def _timing(self) -> ScenarioFile:

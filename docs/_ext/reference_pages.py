@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -58,19 +59,21 @@ def type_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     if "x-unit" in schema:
         unit = schema["x-unit"]
         number = "count" if schema.get("x-whole") else "number" if unit == "1" else f'quantity, such as `"1 {unit}"`'
-        bounds = re.sub(r" 1\b(?! )", "", schema.get("x-bounds", "")) if unit == "1" else schema.get("x-bounds", "")
+        bounds = re.sub(r"(?<=\d) 1\b", "", schema.get("x-bounds", "")) if unit == "1" else schema.get("x-bounds", "")
         return number + (f", {bounds}" if bounds else "")
     if "const" in schema:
-        return f'`"{schema["const"]}"`'
+        return f"`{json.dumps(schema['const'])}`"
     if "enum" in schema:
-        return "one of " + ", ".join(f'`"{value}"`' for value in schema["enum"])
+        return "one of " + ", ".join(f"`{json.dumps(value)}`" for value in schema["enum"])
     if schema.get("type") == "array":
         members = schema.get("prefixItems")
         if members:
             return f"list of {len(members)}: {type_of(members[0], definitions)}"
-        return f"list of {type_of(schema.get('items', {}), definitions)}"
+        length = schema["minItems"] if schema.get("minItems") == schema.get("maxItems") else None
+        member = type_of(schema.get("items", {}), definitions).replace("table, see", "tables, see")
+        return f"list of {length}: {member}" if length else f"list of {member}"
     if schema.get("type") == "object" and isinstance(schema.get("additionalProperties"), dict):
-        return f"table of names, each {type_of(schema['additionalProperties'], definitions)}"
+        return f"table of names, each with a value: {type_of(schema['additionalProperties'], definitions)}"
     limits = [f"{sign} {schema[key]}" for key, sign in (("minimum", ">="), ("maximum", "<=")) if key in schema]
     word = {"string": "text", "integer": "whole number", "boolean": "true or false", "number": "number"}
     return ", ".join([word.get(schema.get("type", ""), schema.get("type", "any value")), *limits])
@@ -82,8 +85,9 @@ def table_of(schema: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
     rows = ["| key | value | if left out | meaning |", "|---|---|---|---|"]
     for key, value in schema.get("properties", {}).items():
         default = value.get("default")
-        shown = "must be given" if key in required else "-" if default in (None, [], {}, ()) else f"`{default}`"
-        meaning = value.get("description", "") if "$ref" not in value else ""
+        nothing = default in (None, "", [], {}, ()) or isinstance(default, dict)  # a table then has its own defaults
+        shown = "must be given" if key in required else "-" if nothing else f"`{json.dumps(default)}`"
+        meaning = value.get("description", "")
         rows.append(f"| `{key}` | {cell(type_of(value, definitions))} | {cell(shown)} | {cell(meaning)} |")
     return rows
 
@@ -266,8 +270,6 @@ def _help(runner: Any, app: Any, words: list[str], environment: dict[str, str]) 
 
 def results_page() -> str:
     """The files that programs read, from their published JSON schemas."""
-    import json
-
     from ctrlgen import reporting
 
     folder = Path(reporting.__file__).parent / "schemas"

@@ -93,9 +93,9 @@ class CoordinatesEntry(Keys):
 class SpectralLinesEntry(Keys):
     """Response of one reading to a periodic drive, by kind of spectral line, root mean square in unit."""
 
-    record: str
-    channel: str
-    unit: str
+    record: str = Field(description="Name of the record.")
+    channel: str = Field(description="The reading.")
+    unit: str = Field(description="Unit of the four levels.")
     periods: int = Field(description="Periods averaged.")
     excited: Number = Field(description="At the lines of the drive.")
     odd: Number = Field(description="At odd harmonics that are not driven; null without any.")
@@ -109,12 +109,12 @@ class SpectralLinesEntry(Keys):
 class EmpiricalTermEntry(Keys):
     """A sparse sum of features that describes the residual; no cause."""
 
-    label: Literal["empirical"]
+    label: Literal["empirical"] = Field(description="Always empirical: it names no cause.")
     axis: str = Field(description="Axis on which it acts.")
     terms: dict[str, float] = Field(
         description="Coefficient [unit] by feature; d, v, u: position, speed, drives over their largest."
     )
-    unit: str
+    unit: str = Field(description="Unit of the coefficients.")
     travel: float = Field(description="Largest displacement of the axis, SI.")
     speed: float = Field(description="Largest speed of the axis, SI.")
     drives: list[float] = Field(description="Largest value of every drive, SI.")
@@ -132,15 +132,17 @@ class ResidualLocationEntry(Keys):
     """Where the residual of one model is large."""
 
     excess: Number = Field(description="Mean square of the whitened residual over all readings, less 1.")
-    by_reading: list[ResidualPartEntry]
+    by_reading: list[ResidualPartEntry] = Field(description="The residual of each reading.")
     by_actuator: list[ResidualPartEntry] = Field(description="The residual as an equivalent input at each axis.")
-    coordinates: CoordinatesEntry
-    by_frequency: list[FrequencyBandEntry]
+    coordinates: CoordinatesEntry = Field(description="Whether it is sparser in the readings or in the actuators.")
+    by_frequency: list[FrequencyBandEntry] = Field(description="The residual by frequency band.")
     by_travel: dict[str, list[ResidualPartEntry]] = Field(description="Fifths of the travel, by axis.")
     by_direction: dict[str, list[ResidualPartEntry]] = Field(description="Forward and backward motion, by axis.")
-    by_time: list[ResidualPartEntry]
-    by_temperature: list[ResidualPartEntry]
-    spectral_lines: list[SpectralLinesEntry]
+    by_time: list[ResidualPartEntry] = Field(description="The residual by stretch of time.")
+    by_temperature: list[ResidualPartEntry] = Field(
+        description="The residual by temperature; empty where none is known."
+    )
+    spectral_lines: list[SpectralLinesEntry] = Field(description="Responses to periodic drives; empty without any.")
     statements: list[str] = Field(description="What follows, in sentences.")
     unmodelled_force: UnmodelledForceEntry | None = Field(
         default=None, description="In `after`, where the findings do not explain all."
@@ -162,7 +164,7 @@ class SmallestDetectableEntry(EffectAt):
     amplitude: str = Field(description="Name of the amplitude parameter.")
     detectable_from: Number = Field(description="Smallest amplitude that exceeds the screen's threshold [unit].")
     identifiable_from: Number = Field(description="Smallest amplitude that would also have been named [unit].")
-    unit: str
+    unit: str = Field(description="Unit of the amplitude.")
     confusable_with: list[tuple[str, str]] = Field(description="[effect, location] of what it would be taken for.")
     by_location: dict[str, Number] = Field(description="detectable_from at every location [unit].")
 
@@ -177,14 +179,14 @@ class DetectabilityEntry(Keys):
     """What this recording could have shown besides the findings."""
 
     smallest: dict[str, SmallestDetectableEntry] = Field(description="By effect.")
-    undetectable: list[UndetectableEntry]
+    undetectable: list[UndetectableEntry] = Field(description="Causes that this recording cannot show.")
 
 
 class CandidateExperimentEntry(Keys):
     """One drive that was considered."""
 
-    kind: str
-    description: str
+    kind: str = Field(description="Form of the drive.")
+    description: str = Field(description="The drive in words.")
     strength: float = Field(description="Amplitude as a share of the drive's range.")
     separation: float = Field(description="Separation of the rivals with it [standard deviations].")
 
@@ -195,9 +197,9 @@ class NextExperimentEntry(Keys):
     discriminates_between: tuple[str, str] = Field(description="The two models, by their causes.")
     reason: str = Field(description="Why these two.")
     description: str = Field(description="The drive in words.")
-    kind: str
+    kind: str = Field(description="Form of the drive.")
     strength: float = Field(description="Amplitude as a share of the drive's range.")
-    samples: int
+    samples: int = Field(description="Length of the drive.")
     sample_time: Number = Field(description="[s]; null for settled poses.")
     separation_now: Number = Field(description="Separation by this recording [standard deviations].")
     separation_after: Number = Field(description="Separation by both recordings [standard deviations].")
@@ -226,13 +228,13 @@ class CandidateModelEntry(Keys):
 class RoundEntry(Keys):
     """One round of the search."""
 
-    round: int
+    round: int = Field(description="Its number, from 1.")
     threshold: Number = Field(description="|z| that a recording without mismatch exceeds anywhere with 1 % chance.")
     suspects: int = Field(description="Hypotheses screened.")
     criterion_before: Number = Field(description="Selection criterion T of the model before the round.")
     candidates: list[CandidateModelEntry] = Field(description="Models fitted, the best first.")
     causes_after: list[tuple[str, str]] = Field(description="[effect, location] of the causes after the round.")
-    decision: str
+    decision: str = Field(description="What was decided, and why.")
 
 
 class DiagnosisRecord(Origin):
@@ -242,8 +244,8 @@ class DiagnosisRecord(Origin):
     findings: list[FindingEntry] = Field(
         description="Causes that the device file leaves out, the most important first."
     )
-    residual_location: ResidualLocations
+    residual_location: ResidualLocations = Field(description="Where the residual is large, before and after.")
     held_out: dict[str, ChannelErrorEntry] = Field(description="Errors on the held-out records, by channel.")
-    detectability: DetectabilityEntry
+    detectability: DetectabilityEntry = Field(description="What this recording could have shown besides.")
     next_experiment: NextExperimentEntry | None = Field(description="Null where no drive would decide anything.")
-    search_history: list[RoundEntry]
+    search_history: list[RoundEntry] = Field(description="Rounds of the search.")
