@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -16,6 +19,8 @@ from ctrlgen.app.batch import BatchFile
 from ctrlgen.app.result_schemas import RESULTS
 from ctrlgen.devices import Device
 from ctrlgen.devices.sensor import DisplacementSensor, InterferometerSensor
+from ctrlgen.diagnosis import settings
+from ctrlgen.effects import Effect
 from ctrlgen.recordings.schema import RecordingFile
 from ctrlgen.trajectory.scenario import ScenarioFile
 
@@ -98,6 +103,16 @@ def test_every_key_of_a_file_has_a_description(file):
     keys = [(name, key, entry) for name, table in tables.items() for key, entry in table.get("properties", {}).items()]
     assert keys
     assert [f"{name}.{key}" for name, key, entry in keys if not entry.get("description", "").strip()] == []
+
+
+def test_the_pages_of_settings_and_priors_hold_every_entry(monkeypatch):
+    """The pages are read from source files, which can move."""
+    monkeypatch.syspath_prepend(str(DOCS / "_ext"))
+    pages = importlib.import_module("reference_pages")
+    records = [record for record in vars(settings).values() if dataclasses.is_dataclass(record)]
+    named = {entry.name for record in records for entry in dataclasses.fields(record)}
+    assert named and named == set(re.findall(r"^\| `(\w+)` ", pages.settings_page(), re.MULTILINE))
+    assert set(Effect.library) == set(re.findall(r"^\| `(\w+)` ", pages.priors_page(), re.MULTILINE))
 
 
 @pytest.mark.long

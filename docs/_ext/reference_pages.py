@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import inspect
+import itertools
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -69,7 +71,7 @@ def type_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
         members = schema.get("prefixItems")
         if members:
             return f"list of {len(members)}: {type_of(members[0], definitions)}"
-        length = schema["minItems"] if schema.get("minItems") == schema.get("maxItems") else None
+        length = schema.get("minItems") if schema.get("minItems") == schema.get("maxItems") else None
         member = type_of(schema.get("items", {}), definitions).replace("table, see", "tables, see")
         return f"list of {length}: {member}" if length else f"list of {member}"
     if schema.get("type") == "object" and isinstance(schema.get("additionalProperties"), dict):
@@ -80,7 +82,7 @@ def type_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
 
 
 def table_of(schema: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
-    """A table of keys, one row a key."""
+    """A table of keys, one row a key, of a file that a user writes."""
     required = set(schema.get("required", ()))
     rows = ["| key | value | if left out | meaning |", "|---|---|---|---|"]
     for key, value in schema.get("properties", {}).items():
@@ -89,6 +91,16 @@ def table_of(schema: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
         shown = "must be given" if key in required else "-" if nothing else f"`{json.dumps(default)}`"
         meaning = value.get("description", "")
         rows.append(f"| `{key}` | {cell(type_of(value, definitions))} | {cell(shown)} | {cell(meaning)} |")
+    return rows
+
+
+def result_table(schema: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
+    """The same for a file that the program writes: every key is there, some are null."""
+    rows = ["| key | value | meaning |", "|---|---|---|"]
+    for key, value in schema.get("properties", {}).items():
+        null = " or null" if {"type": "null"} in value.get("anyOf", ()) else ""
+        kind, meaning = type_of(value, definitions) + null, value.get("description", "")
+        rows.append(f"| `{key}` | {cell(kind)} | {cell(meaning)} |")
     return rows
 
 
@@ -136,11 +148,25 @@ def equations_page() -> str:
 
 def priors_page() -> str:
     """What the search believes of each law before it sees data, from `ctrlgen/diagnosis/hypotheses/priors.py`."""
-    package = Path(inspect.getfile(__import__("ctrlgen"))).parent
-    source = package / "diagnosis" / "hypotheses" / "priors.py"
-    text = source.read_text(encoding="utf-8") if source.exists() else ""
-    head = "What the diagnosis believes of each law before it sees a recording: one row a law, with its reason."
-    return "\n".join([GENERATED, "# Priors of the laws", "", head, "", "```python", text.rstrip(), "```", ""])
+    from ctrlgen.diagnosis.hypotheses import priors
+    from ctrlgen.effects import Effect
+
+    lines = [
+        GENERATED, "# Priors of the laws", "",
+        "What the diagnosis believes of each [law](effects.md) before it sees a recording; "
+        "`ctrlgen/diagnosis/hypotheses/priors.py` states it.", "",
+        "- *Odds*: how many times commoner the law is than a wrong gain; it decides among causes that explain alike.",
+        "- *Form error*: what the law's form leaves after its parameters are fitted, as a share of what the law explains.",
+        "- *Family*: laws that are forms of one physics. A place has at most one of a family.",
+        "- *Nested case*: the simpler law inside this one, named as an alternative where the fit does not exclude it.", "",
+        "| law | odds | form error | family | nested case | reason |", "|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    for kind, law in sorted(Effect.library.items()):
+        prior = priors.prior_of(law)
+        nested = f"`{prior.nested_case.effect}`" if prior.nested_case else ""
+        odds, error = f"{math.exp(prior.log_prior_odds):.2g}", f"{100 * prior.model_form_error:g} %"
+        lines.append(f"| `{kind}` | {odds} | {error} | {prior.family or ''} | {nested} | {cell(prior.reason)} |")
+    return "\n".join([*lines, ""])
 
 
 def model_section(
@@ -283,19 +309,39 @@ def results_page() -> str:
         schema = json.loads(path.read_text(encoding="utf-8"))
         definitions = schema.get("$defs", {})
         lines += [f"## {path.name.removesuffix('.schema.json')}.json", "", schema.get("description", ""), ""]
-        lines += [*table_of(schema, definitions), ""]
+        lines += [*result_table(schema, definitions), ""]
         for name in reachable(schema.get("properties", {}), definitions):
             section = definitions[name]
-            lines += [f"### {name}", "", section.get("description", ""), "", *table_of(section, definitions), ""]
+            lines += [f"### {name}", "", section.get("description", ""), "", *result_table(section, definitions), ""]
     return "\n".join(lines)
 
 
 def settings_page() -> str:
-    """The thresholds of the diagnosis, each with its reason, as `ctrlgen/diagnosis/settings.py` states them."""
-    source = Path(inspect.getfile(__import__("ctrlgen"))).parent / "diagnosis" / "settings.py"
-    text = source.read_text(encoding="utf-8") if source.exists() else ""
-    head = "Every threshold of the diagnosis stands in one module, with its unit and its reason."
-    return "\n".join([GENERATED, "# Settings of the diagnosis", "", head, "", "```python", text.rstrip(), "```", ""])
+    """The thresholds of the diagnosis, each with its reason, from the files of `ctrlgen/diagnosis/settings/`."""
+    from ctrlgen.diagnosis import settings
+
+    lines = [
+        GENERATED, "# Settings of the diagnosis", "",
+        "Every threshold, size and count of the diagnosis, from `ctrlgen/diagnosis/settings/`. *Judgement* marks a value that no "
+        "derivation fixes: it was chosen on simulated recordings with known causes, and another of the same order would serve.", "",
+    ]  # fmt: skip
+    files = sorted(path for path in Path(inspect.getfile(settings)).parent.glob("*.py") if path.stem != "__init__")
+    for path in files:
+        lines += [f"## {path.stem}", ""]
+        for record in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(record, ast.ClassDef):
+                lines += [f"### {record.name}", "", ast.get_docstring(record) or "", "", *settings_table(record), ""]
+    return "\n".join(lines)
+
+
+def settings_table(record: ast.ClassDef) -> list[str]:
+    """One row a setting: its value and the docstring below it."""
+    rows = ["| setting | value | meaning and reason |", "|---|---|---|"]
+    for entry, after in itertools.pairwise(record.body):
+        if isinstance(entry, ast.AnnAssign) and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+            value = re.sub(r"^field\(default_factory=lambda: (.*)\)$", r"\1", ast.unparse(entry.value or after.value))
+            rows.append(f"| `{ast.unparse(entry.target)}` | `{cell(value)}` | {cell(after.value.value)} |")
+    return rows
 
 
 def python_page() -> str:
