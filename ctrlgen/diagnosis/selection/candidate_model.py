@@ -1,4 +1,4 @@
-"""What a search tries and finds: structures fitted and judged, round by round."""
+"""Records of the search: candidate models with their criterion, rounds, and the result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from ctrlgen.diagnosis.selection.screen import Screened
 
 @dataclass(frozen=True, eq=False)
 class CandidateModel:
-    """One structure fitted, with `held`, its -2 ln likelihood on the held-out records (`Fitter.held_out`), and its total T."""
+    """A fitted structure with its selection criterion.
+
+    held_out_deviance: -2 ln likelihood on the held-out records. criterion: T (see `model_selection`), smaller is better.
+    cause: the hypothesis that the candidate was fitted for.
+    """
 
     fit: Fit
     held_out_deviance: float
@@ -23,13 +27,13 @@ class CandidateModel:
 
     @property
     def complexity_penalty(self) -> float:
-        """Of its numbers and of the prior odds of its causes."""
+        """Penalty for the number of parameters and the prior odds of the causes."""
         return self.criterion - self.fit.objective - self.held_out_deviance
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """What one round saw: its screen and its trials, best first."""
+    """One round of the search: its screen, its candidate models, the best first, and the model before."""
 
     screened: Screened
     candidates: tuple[CandidateModel, ...]
@@ -38,8 +42,12 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The nominal fit, the chosen one, the chosen one without each of its causes, per cause the rivals that explain alike,
-    and the rounds in order."""
+    """The result of a search.
+
+    nominal: the device as described, refitted within its stated uncertainty. chosen: the selected model.
+    without_cause: the chosen model without each of its causes. rivals: for each cause, models with another cause in its
+    place that explain the recording equally well. rounds: in order. final_screen: the screen of the chosen model.
+    """
 
     nominal: CandidateModel
     chosen: CandidateModel
@@ -50,18 +58,18 @@ class SearchResult:
 
 
 def linearised_optimum(fit: Fit) -> float:
-    """The objective once the free numbers of a fit that is not at its optimum have moved there, to first order."""
+    """The objective at the optimum of a fit's linearisation: what remains once all free parameters have adapted."""
     step = np.linalg.lstsq(fit.J, fit.residual, rcond=None)[0]
     return float(np.sum((fit.residual - fit.J @ step) ** 2))
 
 
 def restart(fit: Fit) -> Structure:
-    """The structure with its causes and the device's own numbers starting where the fit ended."""
+    """The structure of a fit with all parameters starting at their fitted values."""
     s = fit.structure
     own = {u.path: float(v) for u, v in zip(s.free_parameters, fit.theta, strict=True) if u.cause is None}
     return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))), own)
 
 
 def restart_with(fit: Fit, cause: Hypothesis, start: dict[str, float]) -> Structure:
-    """The same with another cause, begun at `start` [SI]."""
+    """The same with another cause, whose parameters start at `start` [SI]."""
     return restart(fit).with_cause(cause, start)

@@ -1,7 +1,10 @@
-"""Step 8: what a structure is worth beside another: on the records to fit, on those held out, at the price of its numbers.
+"""Model selection: compares candidate models on the records to fit, on the held-out records and by their complexity.
 
-T = objective on the records to fit + BIC's price of their numbers + -2 ln of how likely they make the held-out records,
-where nothing was fitted, - twice the log prior odds of their causes: among equals the plainer one is named.
+    T = objective + k ln n + held-out deviance - 2 ln(prior odds)
+
+with the objective (whitened squares on the n samples to fit, plus the penalties of stated parameters), the k parameters of
+the causes (as in BIC), the deviance -2 ln likelihood on the held-out records, to which nothing was fitted, and the prior
+odds of the causes.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from ctrlgen.diagnosis.settings import MODEL_SELECTION, RESIDUAL_TESTS, STATISTI
 
 
 class ModelSelection:
-    """Weighs trials against one another; `trial` fits a structure so far as it takes to know what a cause takes away."""
+    """The tests by which candidate models are compared; `candidate` fits a structure for them."""
 
     def __init__(self, fitter: Fitter, candidate: Callable[..., CandidateModel]) -> None:
         self.fitter, self.fit_candidate = fitter, candidate
@@ -28,17 +31,18 @@ class ModelSelection:
         self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)
 
     def scored(self, fit: Fit, cause: Hypothesis | None) -> CandidateModel:
-        """A fit with what the held-out records and the price of its numbers say."""
+        """The candidate model of a fit, with its held-out deviance and criterion T."""
         structure, held_out_loss = fit.structure, self.fitter.held_out_deviance(fit)
         price = sum(u.cause is not None for u in structure.free_parameters) * np.log(max(self.n_fit, 2))
         price -= 2 * structure.log_prior_odds
         return CandidateModel(fit, held_out_loss, fit.objective + price + held_out_loss, cause)
 
     def advantage(self, a: CandidateModel, b: CandidateModel) -> float:
-        """By how much `a` is better than `b`, and that is beyond what says nothing; negative where it is not.
+        """By how much the criterion of `a` is better than that of `b`, less the slack; negative where it is not better.
 
-        Where both leave more than noise, squares count in units of what the better one leaves a sample, on the records to
-        fit and on those held out (quasi-likelihood): what neither explains does not choose between them.
+        Where both leave more than noise, squares are divided by the mean square that the better one leaves
+        (quasi-likelihood), on the records to fit and on the held-out ones, and small differences of what neither explains
+        do not count (slack).
         """
         best = min(a, b, key=lambda t: t.criterion)
         c_fit = max(best.fit.objective / max(self.n_fit, 1), 1.0)
@@ -52,13 +56,13 @@ class ModelSelection:
         both_are_noise = a.fit.is_noise and b.fit.is_noise and self.fitter.noise.known.all()
         slack = (
             MODEL_SELECTION.held_out_slack if both_are_noise else MODEL_SELECTION.excess_slack
-        )  # alike on the records to fit, and neither law is right
+        )  # both explain the records to fit, and neither law is exact
         return (
             gain - MODEL_SELECTION.excess_slack * self.n_fit * (1 - 1 / c_fit) - slack * self.n_held * (1 - 1 / c_held)
         )
 
     def most_parsimonious(self, better: list[CandidateModel]) -> CandidateModel:
-        """The best trial, or one of as few numbers that is no worse beyond the slack and is less rare."""
+        """The best candidate or, of those within the slack with no more parameters, the one with the largest prior odds."""
         first = better[0]
         for t in better:
             first = t if self.advantage(t, first) > 0 else first
@@ -68,11 +72,12 @@ class ModelSelection:
 
     @staticmethod
     def parameters_may_mask_cause(fit: Fit) -> bool:
-        """Whether the device's own numbers stand so far off that they may hide a cause, at a price."""
+        """Whether the device's parameters deviate so far from their stated values that they may mask a cause."""
         return fit.penalty > MODEL_SELECTION.hidden_penalty + 2 * len(fit.structure.free_parameters)
 
     def required_z2(self, current: CandidateModel, screened: Screened) -> float:
-        """The z^2 that a cause must show: of its own size in the readings, or of the price at which the device hides it."""
+        """The z^2 that a hypothesis needs to be fitted: the screen's threshold and, unless parameters of the device may
+        mask it, a material effect on the readings."""
         return (
             screened.threshold**2
             if self.parameters_may_mask_cause(current.fit)
@@ -80,7 +85,8 @@ class ModelSelection:
         )
 
     def physically_meaningful(self, candidate: CandidateModel, accepted: tuple[Hypothesis, ...] = ()) -> bool:
-        """Whether every cause but those `accepted` has an amplitude inside its bounds, and a usual one, holds, and is no double."""
+        """Whether each cause that is not yet `accepted` has an amplitude inside its bounds and its plausible range, fulfils the
+        validity conditions of its law, and can be told apart from other lines of its kind."""
         structure = candidate.fit.structure
         if not lines_resolved(self.fitter.recording, candidate.fit, accepted):
             return False
@@ -99,21 +105,22 @@ class ModelSelection:
         return True
 
     def justified(self, before: CandidateModel, after: CandidateModel) -> bool:
-        """Whether what `after` has more is worth it and means something."""
+        """Whether `after` improves enough on `before`, and its new causes are physically meaningful."""
         return self.improves_enough(before, after) and self.physically_meaningful(after, before.fit.structure.causes)
 
     def improves_enough(self, before: CandidateModel, after: CandidateModel) -> bool:
-        """Whether `after` explains enough more than `before` for its numbers, fitted and held out.
+        """Whether `after` lowers the objective and the held-out deviance enough for its additional parameters.
 
-        What the held-out records confirm counts as much as what was fitted, up to the same amount: chance alone gives
-        z^2 of 10 in both no more often than one of 17 in the first and of 2 in the other.
+        The held-out gain counts as much as the gain on the records to fit, up to the same amount: chance gives z^2 = 10 on
+        both no more often than 17 on the first and 2 on the second. Less is required of the held-out records where the
+        device's parameters masked the cause, and where the held-out records cannot show it.
         """
         gain, confirmed = before.fit.objective - after.fit.objective, before.held_out_deviance - after.held_out_deviance
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
         needed = MODEL_SELECTION.least_gain + added * np.log(max(self.n_fit, 2))
         if (
             before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain
-        ):  # the device hid it at a price: it shows nowhere else
+        ):  # parameters of the device masked it, so the readings hardly show it
             return gain > needed and confirmed > -MODEL_SELECTION.largest_contradiction
         if (
             self.unseen_in_held_out(before)
@@ -132,7 +139,7 @@ class ModelSelection:
         )
 
     def unseen_in_held_out(self, candidate: CandidateModel) -> bool:
-        """Whether the records to fit show, by the gate of adequacy, what the held-out ones do not."""
+        """Whether the residual fails the residual test on the records to fit, and passes it on the held-out records."""
         most = RESIDUAL_TESTS.error_ratio**2 - 1
         return (
             candidate.fit.objective - self.n_fit > most * self.n_fit
@@ -140,9 +147,9 @@ class ModelSelection:
         )
 
     def within_model_form_error(self, bare: CandidateModel, current: CandidateModel, k: int) -> bool:
-        """Whether cause k takes away no more than the form of another's law may leave of what that one takes away, of the
-        records to fit and of those held out (geometric mean); more, where k may be nothing (the 95 % interval of its
-        amplitude reaches off)."""
+        """Whether cause k explains no more than the model-form error of another accepted cause (geometric mean of the squares
+        on the records to fit and on the held-out records); a multiple of that where the 95 % interval of k's amplitude
+        includes zero. `bare` is the model without k."""
         fit = current.fit
         own = [i for i, u in enumerate(fit.structure.free_parameters) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
@@ -154,22 +161,22 @@ class ModelSelection:
         )
         return self._explained_by_model_form_error(
             loss, bare, MODEL_SELECTION.vague_factor if vague else 1.0
-        )  # beside k another may take a cause's place
+        )  # beside k, another cause may take the place of an accepted one
 
     def residual_within_model_form_error(self, current: CandidateModel) -> bool:
-        """Whether all that is left is no more than the form of a cause's law may leave: what would be found in it, would be
-        doubtful. Not where the device hides something at a price, or where only what is left tells the noise."""
+        """Whether the residual is no larger than the model-form error of a cause, so that further causes could not be trusted.
+        False where parameters of the device may mask a cause, and where the noise is known from the residual alone."""
         if self.parameters_may_mask_cause(current.fit) or not self.fitter.noise.known.all():
             return False
         left = max(current.held_out_deviance - self.n_held, 0.0) * max(current.fit.objective - self.n_fit, 0.0)
         return self._explained_by_model_form_error(left, current)
 
     def _explained_by_model_form_error(self, squares: float, current: CandidateModel, times: float = 1.0) -> bool:
-        """Whether the product of these squares, fitted and held out, is within what the form of a law is off, so many
-        `times`, of what its cause takes away."""
+        """Whether `squares`, the product of those on the records to fit and on the held-out records, is at most the same product
+        for the model-form error of a cause, multiplied by `times`."""
         most = self.fit_candidate(
             Structure(current.fit.structure.device), steps=40
-        )  # without one alone a fit may leave the numbers
+        )  # the model without one cause may diverge
         for j, cause in enumerate(current.fit.structure.causes):
             if form_error := cause.prior.model_form_error:
                 without_one = self.fit_candidate(restart(current.fit).without(j))

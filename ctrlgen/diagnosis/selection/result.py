@@ -34,9 +34,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Finding:
-    """One cause that was left out.
+    """One cause that the device file leaves out.
 
-    `held_out_gain`: what is lost without it, in shares of the nominal whitened squares on the held-out records.
+    alternatives: (effect, location) of other causes that explain the recording equally well in its place.
+    held_out_gain: rise of the held-out deviance without the cause, over the deviance of the device as described.
+    source: publication of the effect's law. cause: the hypothesis.
     """
 
     effect: str
@@ -50,8 +52,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class ChannelError:
-    """Held-out error of one channel before and after, the noise, and what the uncertainty of the fitted numbers alone leaves
-    there (None where that is not known), in `unit`."""
+    """Root mean square error of one channel on the held-out records [unit].
+
+    rms_before: of the device as described, refitted within its stated uncertainty. rms_after: with the findings.
+    noise_floor: standard deviation of the noise, None where it is not known.
+    uncertainty: prediction uncertainty that the fitted parameters alone cause, None where it is not known.
+    """
 
     rms_before: float
     rms_after: float
@@ -62,7 +68,7 @@ class ChannelError:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The answer; `search` is how it was found."""
+    """The answer: verdict, findings and supporting analyses; `search` and `fitter` hold how it was found."""
 
     verdict: str
     findings: tuple[Finding, ...]
@@ -90,12 +96,12 @@ class Diagnosis:
 
     @property
     def unconfirmed(self) -> tuple[Hypothesis, ...]:
-        """Causes that no held-out record shows."""
+        """Causes that the held-out records do not confirm."""
         return unconfirmed(self.search)
 
     @cached_property
     def corrected(self) -> Device:
-        """The device with all that was found in it, as device.next.toml describes it; what was read off stands last."""
+        """The device with all findings, as device.next.toml describes it; directly detected effects stand last."""
         fit = self.search.chosen.fit
         own = {
             u.path: float(v) for u, v in zip(fit.structure.free_parameters, fit.theta, strict=True) if u.cause is None
@@ -113,15 +119,15 @@ class Diagnosis:
 
 
 def held_out_errors(fitter: Fitter, search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:
-    """Held-out root mean square of each channel, nominal and chosen."""
+    """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known."""
     found = {}
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
         rms = []
-        for trial in (search.nominal, search.chosen):
+        for model in (search.nominal, search.chosen):
             squares = [
-                ((r.observed - fitter.predict(trial.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held_out_records
+                ((r.observed - fitter.predict(model.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held_out_records
             ]
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         noise = float(floor[i] * scale) if known[i] else None
@@ -131,8 +137,11 @@ def held_out_errors(fitter: Fitter, search: SearchResult, known: np.ndarray) -> 
 
 
 def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
-    """Every unknown of a fit, in its reader's unit. An amplitude is known no better than its law's form is right, and no
-    number better than its profile says."""
+    """Every free parameter of a fit with its 95 % interval, by path, in the unit of its file.
+
+    An interval includes the model-form error of an amplitude's law, and is at least as wide as the parameter's profile
+    likelihood gives.
+    """
     found, profiled = {}, {p.path: p for p in profiles}
     for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
@@ -148,7 +157,7 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
 
 
 def findings(search: SearchResult, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
-    """The causes of the chosen structure with intervals and rivals, the most important first."""
+    """The causes of the chosen model with intervals and alternatives, that with the largest held-out gain first."""
     fit, rows = search.chosen.fit, []
     estimates = estimated_values(fit, profiles)
     for k, cause in enumerate(fit.structure.causes):
@@ -163,7 +172,7 @@ def findings(search: SearchResult, profiles: tuple[Profile, ...] = ()) -> tuple[
                 middle = sum(fixed) / 2
                 parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
         rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
-        source = "the device file's own number" if cause.effect == PARAMETER else cause.law.source
+        source = "parameter of the device file" if cause.effect == PARAMETER else cause.law.source
         gain = float(
             (search.without_cause[k].held_out_deviance - search.chosen.held_out_deviance)
             / search.nominal.held_out_deviance

@@ -1,7 +1,8 @@
-"""Steps 7 and 8: fit the suspects jointly with the device, add the one that explains most, drop what is not needed, swap.
+"""The search: stepwise selection of causes. Each round fits the suspects of the screen jointly with the device's parameters,
+adds the best one, tries to replace each cause, and drops causes that are no longer needed.
 
-A cause is added only if the record shows it beyond what chance does anywhere among all hypotheses, if it is material (a
-tenth of the noise), and if the held-out records gain: see `weighing`.
+A cause is added only if its score exceeds what chance gives anywhere among all hypotheses, if its effect on the readings is
+material, and if the held-out records confirm it: see `model_selection`.
 """
 
 from __future__ import annotations
@@ -37,17 +38,19 @@ class Searcher:
         self.fitted: dict[frozenset, tuple[CandidateModel, int]] = {}
         self.screens: dict[frozenset, tuple[Fit, Screened]] = {}
         self.mismatch = np.inf  # objective of the described device beyond the noise
-        self.candidates_per_round = SEARCH.trials * (SEARCH.cheap_factor if fitter.recording.kind == "poses" else 1)
+        self.candidates_per_round = SEARCH.candidates_per_round * (
+            SEARCH.cheap_factor if fitter.recording.kind == "poses" else 1
+        )
 
     def fit_candidate(
         self,
         structure: Structure,
         cause: Hypothesis | None = None,
-        steps: int = SEARCH.trial_steps,
+        steps: int = SEARCH.candidate_steps,
         nested: Fit | None = None,
     ) -> CandidateModel:
-        """Fits one structure, which contains that of `nested`, and judges it on the held-out records; not again where it was
-        fitted before and begins no better than that ended."""
+        """Fits one structure, in which that of `nested` is nested, and computes its criterion. A structure that was fitted before
+        is not fitted again unless its start values are better than that fit."""
         key = frozenset(structure.causes)
         known, done = self.fitted.get(key, (None, 0))
         if known is not None and done >= steps and known.fit.objective <= self.fitter.initial_objective(structure):
@@ -115,7 +118,7 @@ class Searcher:
             visited[key] = current.fit.objective
 
     def _converged(self, candidate: CandidateModel) -> CandidateModel:
-        """The same fit driven to its end; trials stop early."""
+        """The same candidate fitted until it converges; candidates are first fitted for a few steps only."""
         return self.fit_candidate(restart(candidate.fit), candidate.cause, steps=40)
 
     def _most_parsimonious(
@@ -141,7 +144,7 @@ class Searcher:
             begins = [*shapes, *({**shape, size: structure.starts[k][size]} for shape in shapes)]
             if begins:
                 restarted = [structure.restarted(k, begin) for begin in begins]
-                again = self.fitter.fit(min(restarted, key=self.fitter.initial_objective), steps=SEARCH.trial_steps)
+                again = self.fitter.fit(min(restarted, key=self.fitter.initial_objective), steps=SEARCH.candidate_steps)
                 if again.objective < candidate.fit.objective:
                     candidate = self._converged(self.selection.scored(again, candidate.cause))
         return candidate
@@ -151,13 +154,13 @@ class Searcher:
     ) -> list[CandidateModel]:
         """The first of those that take away nearly as much of an objective as the best one."""
         least = SEARCH.nearly_best * (without - best.fit.objective)
-        return [t for t in others if without - t.fit.objective >= least][: SEARCH.finished_trials]
+        return [t for t in others if without - t.fit.objective >= least][: SEARCH.converged_candidates]
 
     def _converge_promising(
         self, current: CandidateModel, candidates: tuple[CandidateModel, ...]
     ) -> tuple[CandidateModel, ...]:
         """The trials, those driven to their end that leave least on the records to fit but are not justified so early."""
-        best = sorted(candidates, key=lambda t: t.fit.objective)[: SEARCH.finished_trials]
+        best = sorted(candidates, key=lambda t: t.fit.objective)[: SEARCH.converged_candidates]
         early = [
             t for t in best if t.fit.objective < current.fit.objective and not self.selection.justified(current, t)
         ]

@@ -14,19 +14,22 @@ from ctrlgen.diagnosis.settings import MODEL_SELECTION, STATISTICS, VERDICT
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 
 
-def verdict(fitter: Fitter, search: SearchResult, after: ResidualTests, seen: bool = False) -> str:
-    """consistent | explained | partly | ambiguous | unexplained; `seen`: something was read off the readings themselves.
+def verdict(fitter: Fitter, search: SearchResult, tests: ResidualTests, detected: bool = False) -> str:
+    """The verdict: one of the five words above; `detected` says whether an effect was detected directly in the readings.
 
-    Partly: causes are found, but they leave a little more than noise, or no held-out record shows one of them, or nothing
-    tells the noise, so that nobody can say whether all is explained, or the numbers are too loose. Unexplained, too, where
-    it takes numbers that the device file excludes: a wrong unit, sign or gain of a column looks like that.
+    unexplained: the residual exceeds the noise by more than the model-form error of the causes, or the fit contradicts the
+    stated uncertainty of the device file, as a wrong unit, sign or gain of a recorded column would make it.
+    consistent: no cause is found. ambiguous: other causes explain the recording equally well.
+    partly: causes are found, but a residual within the model-form error remains, the held-out records do not confirm a
+    cause, the noise is not known, or the parameters are too uncertain to predict the held-out records.
+    explained: otherwise.
     """
-    found, known = seen or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
+    found, known = detected or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
     if contradicts_datasheet(search.chosen.fit):
         return UNEXPLAINED
     if (
         known
-        and not after.passed
+        and not tests.passed
         and not (found and unexplained_share(fitter, search) <= model_error_allowance(search))
     ):
         return UNEXPLAINED
@@ -34,13 +37,16 @@ def verdict(fitter: Fitter, search: SearchResult, after: ResidualTests, seen: bo
         return CONSISTENT
     if any(search.rivals):
         return AMBIGUOUS
-    sure = known and after.passed and not unconfirmed(search) and not poorly_determined(fitter, search)
-    return EXPLAINED if sure else PARTLY
+    certain = known and tests.passed and not unconfirmed(search) and not poorly_determined(fitter, search)
+    return EXPLAINED if certain else PARTLY
 
 
 def contradicts_datasheet(fit: Fit) -> dict[str, float]:
-    """The device's uncertain numbers, by path, that stand more than `VERDICT.named_deviation` stated deviations off, in deviations; empty
-    where all of them together are as far off as chance puts them."""
+    """Deviations of the device's uncertain parameters from their stated values, in stated standard deviations, by path.
+
+    Empty where a chi-square test does not reject the stated uncertainty; else the parameters that deviate by more than
+    `VERDICT.named_deviation`, or the one that deviates most.
+    """
     off = {
         u.path: float((value - u.nominal) / u.sd)
         for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)
@@ -53,7 +59,7 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
 
 
 def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:
-    """The causes that no held-out record shows, and that nothing the device states of itself demands."""
+    """Causes that the held-out records do not confirm, except where the device's stated parameters alone require them."""
     chosen = search.chosen
     return tuple(
         cause
@@ -64,21 +70,21 @@ def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:
 
 
 def poorly_determined(fitter: Fitter, search: SearchResult) -> bool:
-    """Whether the held-out records are foreseen worse than before, beyond chance, though the causes may be right: by the
-    numbers as fitted, not as far as those are known."""
+    """Whether the chosen model with its parameters as fitted predicts the held-out records significantly worse than the
+    device as described. The causes may still be right, and their parameters too uncertain."""
     worse = fitter.held_out_squares(search.chosen.fit) - fitter.held_out_squares(search.nominal.fit)
     return worse > STATISTICS.chance_excess * np.sqrt(2 * _n_held(fitter))
 
 
 def model_error_allowance(search: SearchResult) -> float:
-    """The share of the mismatch that the chosen causes may leave: what the form of the roughest of their laws may."""
+    """Share of the mismatch (rms) that the chosen causes may leave: the largest model-form error of their laws."""
     causes = search.chosen.fit.structure.causes
     return max([VERDICT.model_form_error, *(c.prior.model_form_error for c in causes)])
 
 
 def unexplained_share(fitter: Fitter, search: SearchResult) -> float:
-    """What the chosen causes leave beyond the noise, as a share of what the device as described leaves, both root mean
-    square; the larger one of the records to fit and of those held out. An excess below `STATISTICS.chance_excess`
+    """Residual of the chosen model beyond the noise, over that of the device as described, both root mean square; the
+    larger value of the records to fit and of the held-out records. An excess below `STATISTICS.chance_excess`
     standard deviations of chi-square counts as noise."""
     n_held = _n_held(fitter)
     after, before = search.chosen, search.nominal

@@ -96,14 +96,14 @@ class SearchSettings:
     """Updates of the noise from the residual at most."""
     same_noise: float = 0.05
     """Relative change of the noise below which it counts as unchanged."""
-    trials: int = 6
+    candidates_per_round: int = 6
     """Single candidates fitted a round, and as many sets of each size."""
     cheap_factor: int = 3
     """Times as many for settled poses, whose fits are cheap."""
-    trial_steps: int = 8
-    """Levenberg-Marquardt steps of a trial. The ones that matter are fitted to the end later."""
-    finished_trials: int = 2
-    """Trials a round that are fitted to the end although they look useless: laws with corners and moments of events need
+    candidate_steps: int = 8
+    """Levenberg-Marquardt steps of a candidate at first; the promising ones are fitted until they converge."""
+    converged_candidates: int = 2
+    """Candidates a round that are fitted until they converge although they look useless: laws with corners and events need
     many steps."""
     rival_difference: float = 9.0
     """Difference of the total criterion below which two models explain alike: three standard deviations."""
