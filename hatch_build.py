@@ -15,7 +15,7 @@ class CommitHook(BuildHookInterface):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Called by hatchling before the files are collected."""
-        source = runpy.run_path(str(Path(self.root) / "ctrlgen" / "_version.py"))
+        source = runpy.run_path(str(Path(self.root) / "ctrlgen" / "version.py"))
         commit = source["commit_of"](Path(self.root))
         if version != "editable" and commit:
             self.folder = tempfile.TemporaryDirectory()

@@ -7,7 +7,7 @@ print(outcome.passed, outcome.solution.tightest)
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from ctrlgen._version import __version__
+from ctrlgen.version import __version__
 
 if TYPE_CHECKING:
     from ctrlgen.app.batch import load_batch, run_batch

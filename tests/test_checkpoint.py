@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from recording_folders import SERVO, servo_poses
 
-from ctrlgen._version import code_hash
 from ctrlgen.diagnosis.estimation import fit
 from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests, unfinished
+from ctrlgen.version import code_hash
 
 MADE_FROM = {"code": "1", "seed": 0, "files": {"a": "b"}}
 
@@ -53,7 +53,7 @@ def test_what_is_stopped_goes_on_and_ends_alike(asked, sought, tmp_path):
     done, said = len(sought), []
     assert 0 < done < needed and not stopped.exists() and unfinished(stopped).exists()
     made_from = json.loads(unfinished(stopped).read_text().splitlines()[0])
-    assert made_from == {"code": code_hash(), "seed": 0, "files": digests(*asked)}
+    assert made_from == {"code": code_hash(), "seed": 0, "files": digests(*asked), "laws": None}
     sought.clear()
     diagnose_into(*asked, stopped, progress=said.append)
     assert len(sought) == needed - done

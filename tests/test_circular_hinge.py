@@ -14,7 +14,7 @@ from scipy.integrate import quad
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
-from ctrlgen.devices.base import Section, _namespace
+from ctrlgen.devices.base import Section, si_namespace
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.physics import circular_hinge as c
 from ctrlgen.physics import circular_hinge_table as table
@@ -249,13 +249,13 @@ def part(text: str) -> Part:
 def test_a_hinge_in_a_device_file_takes_width_and_material_from_the_device():
     loaded = part('hinge = { kind = "circular", R = "1.1 mm", t = "0.84 mm", equation = "auto" }')
     with pytest.warns(table.HingeRangeWarning):
-        C = loaded.hinge.planar(_namespace(loaded.hinge, "", {}), b=B, E=E, nu=NU)
+        C = loaded.hinge.planar(si_namespace(loaded.hinge, "", {}), b=B, E=E, nu=NU)
     assert float(C[2, 2]) == pytest.approx(c.c22(1.1e-3, 0.84e-3, B, E), rel=1e-12)
     with pytest.raises(ValueError, match="b is missing"):
-        loaded.hinge.planar(_namespace(loaded.hinge, "", {}), E=E, nu=NU)
+        loaded.hinge.planar(si_namespace(loaded.hinge, "", {}), E=E, nu=NU)
     symbol = ca.SX.sym("t")
     with pytest.warns(table.HingeRangeWarning):
-        free = loaded.hinge.planar(_namespace(loaded.hinge, "hinge", {"hinge.t": symbol}), b=B, E=E, nu=NU)
+        free = loaded.hinge.planar(si_namespace(loaded.hinge, "hinge", {"hinge.t": symbol}), b=B, E=E, nu=NU)
     assert ca.DM(ca.substitute(free, symbol, 0.84e-3)).full() == pytest.approx(ca.DM(C).full(), rel=1e-12)
 
 

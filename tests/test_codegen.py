@@ -16,13 +16,13 @@ import pytest
 from conftest import ROOT, SCENARIOS
 
 from ctrlgen import Controller, CtrlgenError, __version__, build_model, load_scenario
-from ctrlgen._version import program
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.fmu import write_fmus
 from ctrlgen.firmware.folder import generate, write_harness
 from ctrlgen.firmware.plant import plant_of, write_plant
 from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.version import program
 
 GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"
 NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from ctrlgen.app import console as terminal
+from ctrlgen.app import console
 
 COLUMNS = (("what was found", "left"), ("place", "left"), ("value", "right"), ("bound", "right"))
 ROWS = (
@@ -17,11 +17,11 @@ ROWS = (
 
 @pytest.mark.parametrize("width", [20, 60, 80, 110, 300])
 def test_a_table_loses_no_text_and_breaks_no_number_at_any_width(monkeypatch, capsys, width):
-    monkeypatch.setattr(terminal.out, "_width", width)
-    table = terminal.table_of(*COLUMNS)
+    monkeypatch.setattr(console.out, "width", width)
+    table = console.table_of(*COLUMNS)
     for row in ROWS:
         table.add_row(*row)
-    terminal.show_table(table)
+    console.show_table(table)
     printed = capsys.readouterr().out
     assert "…" not in printed
     for row in ROWS:
@@ -33,9 +33,9 @@ def test_a_table_loses_no_text_and_breaks_no_number_at_any_width(monkeypatch, ca
 
 
 def test_a_table_in_a_log_wraps_at_its_width(capsys):
-    table = terminal.table_of(("what", "left"))
+    table = console.table_of(("what", "left"))
     table.add_row("many words in a row " * 20)
-    terminal.show_table(table)
+    console.show_table(table)
     printed = capsys.readouterr().out
     assert len(re.findall("words", printed)) == 20
     assert max(map(len, printed.splitlines())) <= 110

@@ -230,7 +230,7 @@ def test_fringes_that_bend_the_path_they_are_read_along_are_found_along_the_one_
     foreseen = fitter.predict(fit, fitter.fit_records[0])[:, 0]
     near = pytest.approx(pitch, rel=1e-3)
     assert near not in spatial_periods(read, read - foreseen) and near in spatial_periods(foreseen, read - foreseen)
-    suggested = Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["spatial_periods"]
+    suggested = Screen(fitter, []).data_hints(fit)(Place.SENSOR, 0).suggested["spatial_periods"]
     assert near in suggested and merged_periods([suggested, suggested]) == suggested
 
 
@@ -253,7 +253,7 @@ def test_the_harmonic_of_a_fringe_that_is_known_is_found_along_what_the_fringe_c
     read, foreseen = fitter.fit_records[0].observed[:, 0], fitter.predict(fit, fitter.fit_records[0])[:, 0]
     near = pytest.approx(pitch / 2, rel=1e-3)
     assert near not in spatial_periods(foreseen, read - foreseen) and near not in spatial_periods(read, read - foreseen)
-    assert near in Screen(fitter, [])._seen(fit)(Place.SENSOR, 0).suggested["spatial_periods"]
+    assert near in Screen(fitter, []).data_hints(fit)(Place.SENSOR, 0).suggested["spatial_periods"]
 
 
 @pytest.mark.parametrize("place", [-6e-6, 1.5e-6, 1.1e-5])

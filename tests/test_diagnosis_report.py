@@ -26,7 +26,7 @@ from ctrlgen.diagnosis.pipeline import diagnose_into, unfinished
 from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
-from ctrlgen.diagnosis.report.plots import POINTS, _density, thinned
+from ctrlgen.diagnosis.report.plots import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.selection.result import Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED
@@ -287,7 +287,7 @@ def test_the_spectrum_of_a_short_stretch_behind_a_long_lead_in_is_that_of_the_st
     """White noise of 3 nm at 1 kHz has the density 3 sqrt(2/1000) nm/sqrt(Hz), wherever in the record it is judged."""
     white = np.concatenate([np.full(3100, np.nan), 3.0 * np.random.default_rng(1).standard_normal(1200)])[:, None]
     left = SimpleNamespace(records=[SimpleNamespace(time=np.arange(4300) * 1e-3, sample_time=1e-3)])
-    f, density = _density(left, [white], [0], 0)
+    f, density = residual_density(left, [white], [0], 0)
     assert np.sqrt(np.mean(density[f > 20] ** 2)) == pytest.approx(3 * np.sqrt(2e-3), rel=0.1)
 
 

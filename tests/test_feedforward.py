@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 from ctrlgen import Controller, ControllerStatus, build_model, simulate
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.model.inverse import _solve, _Values
+from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 
 NM, H = 1e-9, 1e-3
 
@@ -37,12 +37,12 @@ def solve_one(equations, unknowns, **at) -> ca.DM:
     """Roots of `equations` by the block solver, all symbols but the unknowns at given values."""
     others = ca.vertcat(*at.values()) if at else ca.SX(0, 1)
     n = unknowns.numel()
-    known = _Values(
+    known = ExpansionPoint(
         ca.vertcat(others, unknowns),
         np.concatenate([np.zeros(others.numel()), np.zeros(n)]),
         np.ones(others.numel() + n),
     )
-    return ca.Function("f", [others], [_solve(known, equations, unknowns)])
+    return ca.Function("f", [others], [solve_by_blocks(known, equations, unknowns)])
 
 
 def test_a_linear_block_is_solved_exactly():

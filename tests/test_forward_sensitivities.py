@@ -49,7 +49,7 @@ def record(amplitude) -> Record:
 
 def differentiated(r: Simulator, moved: Record, p: np.ndarray) -> np.ndarray:
     """dy/dp and dy/dstart (n, n_y, m): D+ = F_S D + F_p, with whole samples differentiated by CasADi."""
-    q = r._equations
+    q = r.equations
     by = [q.given[0], q.given[4]]
     slopes = ca.Function("slopes", q.given, [ca.jacobian(value, s) for value in (q.following, q.y) for s in by])
     after, _ = r.simulate_states(moved, p)
@@ -59,7 +59,7 @@ def differentiated(r: Simulator, moved: Record, p: np.ndarray) -> np.ndarray:
     D, Y = np.zeros((r.n_s, len(p) + starts)), []
     D[list(r.free_initial_states), len(p) + np.arange(starts)] = 1.0
     entering = np.hstack([c_p.full(), np.zeros((len(c.full()), starts))])
-    for S, u, u_next, e in zip(before, *r._inputs(moved), strict=True):
+    for S, u, u_next, e in zip(before, *r.inputs(moved), strict=True):
         F_S, F_c, H_S, H_c = (value.full() for value in slopes(S, u, u_next, e, c))
         Y.append(H_S @ D + H_c @ entering)
         D = F_S @ D + F_c @ entering
@@ -70,7 +70,7 @@ def linearised(r: Simulator, moved: Record, p: np.ndarray) -> np.ndarray:
     """dy/dp (n, n_y, m) from the motion linearised sample by sample."""
     after, _ = r.simulate_states(moved, p)
     before = np.vstack([r.initial_state(moved, p), after[:-1]])
-    F_S, F_p, H_S, H_p = r.linearise(p, range(len(p))).evaluate_along(before, *r._inputs(moved))
+    F_S, F_p, H_S, H_p = r.linearise(p, range(len(p))).evaluate_along(before, *r.inputs(moved))
     D, Y = np.zeros((r.n_s, len(p))), []
     for k in range(N):
         Y.append(H_S[k] @ D + H_p[k])
@@ -96,8 +96,8 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
     )  # to the end: where N is solved for, slopes of steps on the way are others
     monkeypatch.setattr(sample_equations, "SIMULATION", replace(SIMULATION, parametric_operations=worth))
     r, p = simulator(text, effects, linear, tmp_path)
-    assert isinstance(r._equations.integrator, integrators.ImplicitRadau) == ("coulomb" in effects)
-    assert r._equations.model.held.numel() == ("loop" in text)
+    assert isinstance(r.equations.integrator, integrators.ImplicitRadau) == ("coulomb" in effects)
+    assert r.equations.model.held.numel() == ("loop" in text)
     moved = record(size)
     y, Y = r.sensitivities(moved, p)
     agree(Y, differentiated(r, moved, p))

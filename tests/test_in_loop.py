@@ -151,7 +151,7 @@ def test_counting_by_block_is_counting_every_instruction(cross, folder, referenc
     cross_compile(cross, M4F, [folder.path / f"{name}.c"], folder.path, f"{name}_init", program)
     machine = Machine(M4F, program)
     single = Single()
-    machine._uc.hook_add(unicorn.UC_HOOK_CODE, single)
+    machine.emulator.hook_add(unicorn.UC_HOOK_CODE, single)
     state, target, out = (machine.reserve(count, Real.FLOAT) for count in (12, 6, 18))
     machine.call(f"{name}_init", state)
     counts = []

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ctrlgen.firmware.cprint import Real, _heron, print_function
+from ctrlgen.firmware.cprint import Real, heron_plan, print_function
 from ctrlgen.numerics.interval_arithmetic import bounds
 
 a, b = ca.SX.sym("a"), ca.SX.sym("b")
@@ -35,7 +35,7 @@ def test_every_value_is_between_its_bounds(name, rng):
 @pytest.mark.parametrize("real", list(Real))
 @pytest.mark.parametrize("ratio", [1.0001, 1.2, 3.0, 10.0])
 def test_a_line_and_a_few_steps_of_heron_give_the_root_in_a_known_range(real, ratio):
-    (start, slope), steps = _heron((2.0, 2.0 * ratio), real)
+    (start, slope), steps = heron_plan((2.0, 2.0 * ratio), real)
     number = np.float32 if real is Real.FLOAT else np.float64
     x = np.linspace(2.0, 2.0 * ratio, 10001).astype(number)
     y = number(start) + number(slope) * x
@@ -46,7 +46,7 @@ def test_a_line_and_a_few_steps_of_heron_give_the_root_in_a_known_range(real, ra
 
 
 def test_a_range_that_is_wide_or_reaches_zero_needs_the_general_root():
-    assert _heron((0.0, 1.0), Real.FLOAT) is None and _heron((1e-9, 1e9), Real.DOUBLE) is None
+    assert heron_plan((0.0, 1.0), Real.FLOAT) is None and heron_plan((1e-9, 1e9), Real.DOUBLE) is None
     f = ca.Function("f", [a], [ca.sqrt(a)], ["a"], ["r"])
     assert print_function(f, "f", Real.FLOAT, {"a": (np.array([1.0]), np.array([2.0]))}).calls == frozenset()
     assert print_function(f, "f", Real.FLOAT).calls == {"root"}

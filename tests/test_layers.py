@@ -69,7 +69,7 @@ def our_imports(path) -> set[str]:
 def test_a_package_imports_only_what_it_may(path):
     own = package_of(name_of(path))
     allowed = {own, *MAY_IMPORT[own].split()}
-    for imported in our_imports(path) - {"_version"}:
+    for imported in our_imports(path) - {"version"}:
         assert package_of(imported) in allowed, f"{name_of(path)} imports {imported}"
 
 

@@ -12,9 +12,9 @@ import pytest
 from jsonschema import Draft202012Validator
 from result_files import faults, schema_of
 
-from ctrlgen._version import __version__
 from ctrlgen.app.result_schemas import RESULTS, schemas, write_schemas
 from ctrlgen.reporting.result_schemas import SCHEMAS, origin
+from ctrlgen.version import __version__
 
 EMPTY = {
     "excess": 0.1, "by_reading": [], "by_actuator": [],

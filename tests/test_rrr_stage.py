@@ -204,7 +204,7 @@ def test_a_third_of_a_turn_maps_the_stage_onto_itself(corrected: rrr_stage.Kinet
 
 
 def test_the_jacobian_hardly_depends_on_the_hinge_equations() -> None:
-    one, two = (array(s3._stage(case).J) for case in CASES)
+    one, two = (array(s3.stage_of_case(case).J) for case in CASES)
     assert np.abs(one / two - 1).max() < 2e-4  # S3 section 5.1.1; 5 in the fourth digit as printed
 
 
@@ -264,7 +264,7 @@ def test_no_single_length_explains_table_4() -> None:
 
 def test_a_planted_wrong_length_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The diagnosis names what was changed, not l1 and l2 whatever the table: l4 is planted 3 mm off as well as l2."""
-    truth = s3_lengths._printed()
+    truth = s3_lengths.printed_lengths()
     truth[[1, 3]] += [-0.4e-3, 3e-3]
     tables = {}
     for case in CASES:
@@ -283,7 +283,7 @@ def test_a_planted_wrong_length_is_found(monkeypatch: pytest.MonkeyPatch) -> Non
             for symbol, lines in s3_tables.TABLE_4[case].items()
         }
     monkeypatch.setattr(s3_lengths, "TABLE_4", tables)
-    caches = (s3_lengths._misfit, s3_lengths.fit, s3_lengths.diagnosis)
+    caches = (s3_lengths.table_4_misfit, s3_lengths.fit, s3_lengths.diagnosis)
     try:
         for cached in caches:
             cached.cache_clear()
@@ -319,7 +319,7 @@ def test_a_finite_element_number_taken_within_its_print_meets_both_cases() -> No
 
 def test_the_model_stands_eleven_per_cent_off_the_finite_elements_in_the_jacobian() -> None:
     J_fea = np.array([[float(word) for word in line.split()] for line in s3_tables.TABLE_5["J"]])
-    k = s3._stage(2)
+    k = s3.stage_of_case(2)
     gap, complete = (np.mean(array(M) / J_fea - 1) for M in (k.J, k.complete_J))
     assert 0.105 < gap < 0.115
     assert 0.085 < complete < 0.095  # (B.83) accounts for two of the eleven

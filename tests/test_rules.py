@@ -23,7 +23,7 @@ from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.verification.check import Check
 from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile
-from ctrlgen.verification.rules import ANALYZERS, _analyzed, check_rules
+from ctrlgen.verification.rules import ANALYZERS, check_rules, run_analyzer
 
 STATIC = ("cppcheck --addon=misra", "clang-tidy", "gcc -fanalyzer", "clang --analyze")
 HOSTILE = ("sanitizers, random calls", "libFuzzer")
@@ -187,7 +187,7 @@ def test_a_planted_fault_is_reported(broken, folder, tool, real, rule):
 def test_a_double_constant_in_float_is_reported(folder, tmp_path):
     status = f"    int status = {folder.online[Real.FLOAT].upper()}_INPUT;\n"
     wide = status + "    const float wide = 1.5 * (float)status;\n    (void)wide;\n"
-    check = ran(_analyzed(ANALYZERS[1], planted(folder, tmp_path / "c", {Real.FLOAT: (status, wide)})))
+    check = ran(run_analyzer(ANALYZERS[1], planted(folder, tmp_path / "c", {Real.FLOAT: (status, wide)})))
     assert check.state == "failed" and {"-Wdouble-promotion", "-Wfloat-conversion"} & {f.rule for f in check.findings}
 
 
@@ -198,7 +198,7 @@ def test_an_analyzer_that_gives_up_has_not_passed(folder):
         gcc,
         words=(*gcc.words, "--param=analyzer-bb-explosion-factor=1", "--param=analyzer-max-enodes-per-program-point=1"),
     )
-    check = _analyzed(limited, folder)
+    check = run_analyzer(limited, folder)
     assert check.state == "not run" and ("gave up" in check.note or "missing" in check.note)
 
 

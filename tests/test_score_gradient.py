@@ -63,8 +63,8 @@ def brute(slopes, start):
     """S (n, n_y, columns) by the recursion over all states and all columns, whitened."""
     r, record = slopes.simulator, slopes.record
     after, _ = r.simulate_states(record, slopes.p, start)
-    before = np.vstack([r._start(record, slopes.p, start), after[:-1]])
-    F_S, F_p, H_S, H_p = slopes.linear.evaluate_along(before, *r._inputs(record))
+    before = np.vstack([r.starting_state(record, slopes.p, start), after[:-1]])
+    F_S, F_p, H_S, H_p = slopes.linear.evaluate_along(before, *r.inputs(record))
     step, memory, f, ends = slopes.laws.compiled(slopes.p), slopes.laws.start(record.time[0]), [], []
     for k in range(N):
         memory, term, end = step(memory, before[k], record.drive[k], 0.0, after[k])

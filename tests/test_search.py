@@ -66,10 +66,10 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     )
     others = tuple({**start, "frequency": f} for f in (100.0, 50.0, 33.0))
     screened = Screened((Suspect(hum, start, 100.0, 1.0, 0, others),), np.eye(1), 4.0, {})
-    found = searcher._restarted_elsewhere(stuck, nominal, screened)
+    found = searcher.restart_elsewhere(stuck, nominal, screened)
     assert not stuck.fit.is_noise and found.fit.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
-    assert searcher._restarted_elsewhere(found, nominal, screened) is found
+    assert searcher.restart_elsewhere(found, nominal, screened) is found
 
 
 @pytest.mark.parametrize("breakaway, sd, special", [(1.0, 0.03, "coulomb"), (1.4, 0.03, None), (1.4, 0.3, "coulomb")])
@@ -91,13 +91,15 @@ def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common(
     searcher = searcher_of(model)
     model.recording = replace(model.recording, records=(rubbed,))
     far, bare = {"force": 0.001, "reach": 3e-6, "smoothing": 1e-9}, Structure(AXIS)
-    begun = searcher._replaced(fit, 0, bare, Suspect(other, far, 100.0, 1.0, 0)).starts[0]
+    begun = searcher.replace_cause(fit, 0, bare, Suspect(other, far, 100.0, 1.0, 0)).starts[0]
     assert begun == {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
     elsewhere = Hypothesis("backlash", "stage:axis", "axis")
-    assert searcher._replaced(fit, 0, bare, Suspect(elsewhere, {"gap": 1e-8}, 100.0, 1.0, 0)).starts == ({"gap": 1e-8},)
+    assert searcher.replace_cause(fit, 0, bare, Suspect(elsewhere, {"gap": 1e-8}, 100.0, 1.0, 0)).starts == (
+        {"gap": 1e-8},
+    )
     near = {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
     wrong = replace(fit, theta=fit.theta * np.array([*np.ones(len(fit.theta) - 1), 100.0]))
-    assert searcher._replaced(wrong, 0, bare, Suspect(other, near, 100.0, 1.0, 0)).starts[0] == near
+    assert searcher.replace_cause(wrong, 0, bare, Suspect(other, near, 100.0, 1.0, 0)).starts[0] == near
 
 
 def test_the_price_of_a_number_is_what_the_fit_knows_of_it():
@@ -182,11 +184,16 @@ def test_three_at_once_are_sought_only_while_most_is_unexplained(monkeypatch, mi
     excess = current.fit.objective - searcher.selection.n_fit
     assert excess > 1e4
     searcher.mismatch, tried = mismatch, set()
-    monkeypatch.setattr(searcher, "_fit_if_buildable", lambda structure, *_: tried.add(len(structure.causes)) or [])
+
+    def refuse(structure, *_, **__):
+        tried.add(len(structure.causes))
+        raise ValueError("no such device can be built")
+
+    monkeypatch.setattr(searcher, "fit_candidate", refuse)
     starts = {BACKLASH: {"gap": 3e-8}, LATE: {"gain": 0.01, "tau": 1.0, "decades": 3.0}, LIMIT: {"level": 0.5}}
     three = tuple(Suspect(h, s, 100.0, 1.0, k) for k, (h, s) in enumerate(starts.items()))
     together = ((0.8 * excess, three[:2]), (0.9 * excess, three))
-    searcher._fit_subsets(current, Screened(tuple(three), np.eye(3), 4.0, {}, together), ())
+    searcher.fit_subsets(current, Screened(tuple(three), np.eye(3), 4.0, {}, together), ())
     assert tried == sizes
 
 

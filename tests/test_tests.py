@@ -19,3 +19,41 @@ def test_no_test_module_is_imported(path):
         elif isinstance(node, ast.ImportFrom):
             imported |= {node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)}
     assert not {name for name in imported if name.removeprefix("tests.").startswith("test_")}
+
+
+def private_names(tree: ast.AST) -> set[str]:
+    """Names with a leading underscore that a module takes from elsewhere: imported, by a dot, or as a text to replace."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            found |= {*(node.module or "").split("."), *(alias.name for alias in node.names)}
+        elif isinstance(node, ast.Import):
+            found |= {word for alias in node.names for word in alias.name.split(".")}
+        elif isinstance(node, ast.Attribute) and not (isinstance(node.value, ast.Name) and node.value.id == "self"):
+            found.add(node.attr)
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in PATCHING:
+            texts = [a.value for a in node.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+            found |= {word for text in texts for word in text.split(".")}
+    return {name for name in found if name.startswith("_") and not name.startswith("__")}
+
+
+PATCHING = ("setattr", "delattr")
+
+
+@pytest.mark.parametrize("path", TESTS, ids=lambda p: p.stem)
+def test_no_test_uses_a_private_name(path):
+    assert not private_names(ast.parse(path.read_text()))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from ctrlgen.a import _b",
+        "import ctrlgen._a",
+        "x._y",
+        'monkeypatch.setattr("ctrlgen.a._b", 1)',
+        'm.setattr(x, "_y", 1)',
+    ],
+)
+def test_a_private_name_is_found_wherever_it_is_used(text):
+    assert private_names(ast.parse(text))

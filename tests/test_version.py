@@ -12,8 +12,8 @@ import pytest
 from command_line import ctrlgen
 from conftest import ROOT, SCENARIOS
 
-from ctrlgen import __version__, _version, build_model, generate, load_scenario
-from ctrlgen._version import code_hash, commit, commit_of, program
+from ctrlgen import __version__, build_model, generate, load_scenario, version
+from ctrlgen.version import code_hash, commit, commit_of, program
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_without_git_there_is_the_version_alone(tmp_path, checkout, monkeypatch)
     assert commit_of(tmp_path / "plain") == ""  # a folder of a repository is no checkout of ctrlgen
     monkeypatch.setenv("PATH", str(tmp_path / "plain"))
     assert commit_of(checkout) == ""
-    monkeypatch.setattr(_version, "commit", lambda: "")
+    monkeypatch.setattr(version, "commit", lambda: "")
     assert program() == f"ctrlgen {__version__}"
 
 
@@ -58,7 +58,7 @@ def test_the_version_stands_in_one_place():
         for path in (ROOT / folder).rglob("*.*")
         if path.suffix in (".py", ".j2") and __version__ in path.read_text()
     ]
-    assert told == ["ctrlgen/_version.py"]
+    assert told == ["ctrlgen/version.py"]
     assert __version__ not in (ROOT / "pyproject.toml").read_text()
 
 

@@ -199,7 +199,7 @@ class Device(Section):
 
     def values(self, free: dict[str, ca.SX] | None = None) -> SimpleNamespace:
         """SI numbers as nested namespaces; `free` replaces chosen paths by symbols."""
-        return _namespace(self, "", free or {})
+        return si_namespace(self, "", free or {})
 
 
 def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Quantity]]:
@@ -216,18 +216,19 @@ def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Quantity]]:
             yield from _leaves(member, f"{prefix}[{index}]")
 
 
-def _namespace(node: Any, prefix: str, free: dict[str, ca.SX]) -> Any:
+def si_namespace(node: Any, prefix: str, free: dict[str, ca.SX]) -> Any:
+    """SI numbers of a section as nested namespaces; `free` (path, which begins with `prefix` -> symbol) replaces some of them."""
     if isinstance(node, Quantity):
         return free.get(prefix, node.si)
     if isinstance(node, Section):
         return SimpleNamespace(
             **{
-                key: _namespace(getattr(node, key), f"{prefix}.{key}" if prefix else key, free)
+                key: si_namespace(getattr(node, key), f"{prefix}.{key}" if prefix else key, free)
                 for key in type(node).model_fields
             }
         )
     if isinstance(node, Effect):
         return SimpleNamespace(**{k: free.get(f"{prefix}.{k}", q.si) for k, q in node.values.items()})
     if isinstance(node, tuple):
-        return tuple(_namespace(member, f"{prefix}[{i}]", free) for i, member in enumerate(node))
+        return tuple(si_namespace(member, f"{prefix}[{i}]", free) for i, member in enumerate(node))
     return node

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ctrlgen._version import code_hash
 from ctrlgen.core.files import read_toml, whole_folder, write_text
 from ctrlgen.core.to_json import plain
 from ctrlgen.devices import Device, load_device
@@ -25,6 +24,7 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.recordings.schema import FILE
+from ctrlgen.version import code_hash
 
 Progress = Callable[[str], None]
 Paths = Path | str | Sequence[Path | str]

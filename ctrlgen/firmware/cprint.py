@@ -219,7 +219,7 @@ class _Printer:
 
     def _root(self, k: int, operand: str, a: _Value) -> _Value:
         within = _range_of(a)
-        plan = _heron(within, self.real)
+        plan = heron_plan(within, self.real)
         if plan is None:
             return self._named(k, self._root_call(operand), self.between[k])
         if a.factor != 1.0:
@@ -306,7 +306,7 @@ def _uses(function: ca.Function) -> list[int]:
     return counts
 
 
-def _heron(within: Interval, real: Real) -> tuple[tuple[float, float], int] | None:
+def heron_plan(within: Interval, real: Real) -> tuple[tuple[float, float], int] | None:
     """(start, slope) of the line that is nearest to the root within a range, relatively, and the steps from there to rounding.
 
     The line y = s (a + sqrt(low high)) has equal relative errors at both ends and at the geometric mean; a step takes

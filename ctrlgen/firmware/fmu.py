@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen._version import __version__, program
 from ctrlgen.core.errors import CtrlgenError, Fault, InputError, ToolError
 from ctrlgen.core.files import whole_folder, write_bytes
 from ctrlgen.core.units import base_unit, exponents, from_si
@@ -31,6 +30,7 @@ from ctrlgen.firmware.templates import comment, write
 from ctrlgen.firmware.toolchains import compile_c, find_compilers
 from ctrlgen.model.feedforward import Controller
 from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.version import __version__, program
 
 VERSIONS = (3, 2)
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)  # of every file in an FMU, so that the same input gives the same bytes

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen._version import __version__, program
 from ctrlgen.core.units import base_unit, show
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
 from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
 from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.version import __version__, program
 
 FLOAT_SLACK = 4e-6  # as SLACK of the controller, in float: four roundings of a temperature, 0.4 mK
 

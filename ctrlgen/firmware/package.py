@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ctrlgen._version import __version__, commit
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
@@ -18,6 +17,7 @@ from ctrlgen.firmware.compression import Candidate
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.version import __version__, commit
 
 MANIFEST = "manifest.json"
 LICENCE = "The generated code belongs to the user of ctrlgen who generated it; no warranty."

@@ -17,7 +17,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ctrlgen._version import __version__, program
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
@@ -28,6 +27,7 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import balanced, held_step, one_step_map
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.version import __version__, program
 
 NEWTON_MOST = 50  # steps, as of the balance in `ctrlgen.model.simulation`
 ROUNDS = 100  # of state, then displacement, on the way to an equilibrium

@@ -54,7 +54,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
     heat, target = model.heat, ca.SX.sym("target", model.signals[follow].expr.numel())
     now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, ca.DM(model.p_nominal))
-    known = _Values.of(
+    known = ExpansionPoint.of(
         (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (target, np.zeros(target.numel()), np.zeros(target.numel())),
         (x_1, model.rest, model.x_scale), (z_1, 0 * model.z_scale, model.z_scale), (u_1, 0 * model.u_scale, model.u_scale),
         (heat, np.zeros(heat.numel()), np.ones(heat.numel())),
@@ -67,7 +67,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
         motion = rates[:]
         for i in (*model.stepped, *model.clocks):  # these have no equilibrium: they start anew, at zero
             motion[i] = x_1[i]
-        reached = ca.substitute(_solve(known, motion, x_1), z_1, z)  # the equilibrium states at the given z
+        reached = ca.substitute(solve_by_blocks(known, motion, x_1), z_1, z)  # the equilibrium states at the given z
         at_rest = ca.vertcat(reached, z, u_1, ca.DM(model.p_nominal))
         for i, value in model.stepped.items():
             reached[i] = ca.substitute(value, now, at_rest)
@@ -77,14 +77,16 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
         motion = x_1 - reached
         produced = ca.substitute(model.heat_of_drive, ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
     heating = heat - produced
-    wanted_z = _solve(known, ca.vertcat(followed - target, balance, motion, heating), ca.vertcat(z_1, x_1, u_1, heat))[
-        :n
-    ]
+    wanted_z = solve_by_blocks(
+        known, ca.vertcat(followed - target, balance, motion, heating), ca.vertcat(z_1, x_1, u_1, heat)
+    )[:n]
     # The later kernels take the earlier results as arguments, because the controller limits them in between.
-    later = _solve(known, ca.vertcat(balance, motion, heating), ca.vertcat(x_1, u_1, heat))
+    later = solve_by_blocks(known, ca.vertcat(balance, motion, heating), ca.vertcat(x_1, u_1, heat))
     wanted_state, memory = later[:n_s], later[n_s : x.numel()]
     drive_of_state = ca.substitute(ca.vertcat(motion[:n_s], heating), x_1[n_s:], memory)
-    wanted_u = _solve(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
+    wanted_u = (
+        solve_by_blocks(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
+    )
     advance = ca.substitute(reached, heat, ca.substitute(produced, x_1, reached) if sample_time is None else produced)
     return Inverse(
         _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
@@ -106,7 +108,7 @@ def _kernel(name: str, arguments: list[ca.SX], names: list[str], result: ca.SX) 
 
 
 @dataclass(frozen=True)
-class _Values:
+class ExpansionPoint:
     """Symbols with the point about which equations are expanded (`base`) and a typical distance from it (`scale`), SI."""
 
     symbols: ca.SX
@@ -114,7 +116,7 @@ class _Values:
     scale: np.ndarray
 
     @classmethod
-    def of(cls, *rows: tuple[ca.SX, np.ndarray, np.ndarray]) -> _Values:
+    def of(cls, *rows: tuple[ca.SX, np.ndarray, np.ndarray]) -> ExpansionPoint:
         """From (symbol, base, scale) of each vector."""
         symbols, bases, scales = zip(*rows, strict=True)
         return cls(ca.vertcat(*symbols), np.concatenate(bases), np.concatenate(scales))
@@ -132,7 +134,7 @@ class _Values:
         return ca.Function("f", [self.symbols], [unknowns])(self.base + self.scale)
 
 
-def _solve(known: _Values, equations: ca.SX, unknowns: ca.SX) -> ca.SX:
+def solve_by_blocks(known: ExpansionPoint, equations: ca.SX, unknowns: ca.SX) -> ca.SX:
     """The `unknowns` (n,) as expressions in the other symbols, such that equations (n,) = 0; block by block."""
     count, rows, columns, row_starts, column_starts, *_ = ca.jacobian(equations, unknowns).sparsity().btf()
     solution = [ca.SX(0)] * unknowns.numel()
@@ -148,7 +150,7 @@ def _solve(known: _Values, equations: ca.SX, unknowns: ca.SX) -> ca.SX:
     return ca.vertcat(*solution)
 
 
-def _solve_block(known: _Values, r: ca.SX, v: ca.SX) -> ca.SX:
+def _solve_block(known: ExpansionPoint, r: ca.SX, v: ca.SX) -> ca.SX:
     """One block, r(v) = 0: linear, quadratic in one unknown, or `NEWTON_STEPS` Newton steps."""
     base = known.base_of(v)
     slope = ca.jacobian(r, v)
@@ -178,7 +180,7 @@ def _has_corners(slope: ca.SX) -> bool:
     return any(f.instruction_id(k) in CORNERS for k in range(f.n_instructions()))
 
 
-def _rising_root(known: _Values, r: ca.SX, v: ca.SX, base: ca.DM, slope: ca.SX, curvature: ca.SX) -> ca.SX:
+def _rising_root(known: ExpansionPoint, r: ca.SX, v: ca.SX, base: ca.DM, slope: ca.SX, curvature: ca.SX) -> ca.SX:
     """The root of a quadratic on the side of `base` on which the device operates, free of cancellation.
 
     r(base + w) = C + B w + A w^2, its sign chosen so that r rises there: w = -2 C / (B + sqrt(B^2 - 4 A C)).

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ctrlgen._version import __version__, commit
+from ctrlgen.version import __version__, commit
 
 SCHEMAS = Path(__file__).parent / "schemas"
 SCHEMA_VERSION = 1  # raised when a key changes its name or meaning; one version for all three files

@@ -40,13 +40,14 @@ def rows() -> list[PrintedNumber]:
 
 
 @cache
-def _stage(case: int) -> Kinetostatics:
+def stage_of_case(case: int) -> Kinetostatics:
+    """Compliances and Jacobian of the stage of case 1 or 2, with the corrected lengths."""
     return stage(printed_device(case), corrected(case))
 
 
 def computed(case: int, symbol: str, i: int, j: int, k: Kinetostatics | None = None) -> float:
     """Entry (i, j), counted from 1, in the unit of the print; by default of the corrected stage."""
-    matrix = ca.DM(getattr(_stage(case) if k is None else k, symbol)).full()
+    matrix = ca.DM(getattr(stage_of_case(case) if k is None else k, symbol)).full()
     return float(from_si(matrix[i - 1, j - 1], unit(symbol, i, j)))
 
 
@@ -54,7 +55,7 @@ def _entry_row(where: str, case: int, symbol: str, i: int, j: int, text: str, re
     ours = computed(case, symbol, i, j)
     place, u = f"{where}, {symbol} ({i},{j})", unit(symbol, i, j)
     if text == "0":
-        rounding = 1e-9 * float(from_si(np.abs(ca.DM(getattr(_stage(case), symbol)).full()).max(), u))
+        rounding = 1e-9 * float(from_si(np.abs(ca.DM(getattr(stage_of_case(case), symbol)).full()).max(), u))
         return PrintedNumber("S3", place, text, u, ours, STRUCTURAL, rounding)
     return PrintedNumber("S3", place, text, u, ours, reason)
 
@@ -111,7 +112,7 @@ def _gap(symbol: str, i: int, j: int, text: str) -> str:
     gap = "finite elements; ours is case 2, rigid links on hinge equations: {:+.1f} %"
     reason = gap.format(100 * (computed(2, symbol, i, j) / float(text) - 1))
     if symbol in COMPLETE:
-        matrix = ca.DM(getattr(_stage(2), COMPLETE[symbol])).full()
+        matrix = ca.DM(getattr(stage_of_case(2), COMPLETE[symbol])).full()
         complete = float(from_si(matrix[i - 1, j - 1], unit(symbol, i, j)))
         reason += f", {100 * (complete / float(text) - 1):+.1f} % with the input compliance that (B.83) leaves out"
     return reason

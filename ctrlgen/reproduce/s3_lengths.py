@@ -57,7 +57,7 @@ def printed_device(case: int) -> RrrStage:
 
 
 @cache
-def _misfit() -> ca.Function:
+def table_4_misfit() -> ca.Function:
     """(l1 ... l6, frame angle) -> misfit of every entry of Table 4 in both cases, and its Jacobian.
 
     Left out: a bare 0, which is structural and tells nothing, and the entry that lost its sign.
@@ -77,13 +77,14 @@ def _misfit() -> ca.Function:
     return ca.Function("misfit", [x], [residual, ca.jacobian(residual, x)])
 
 
-def _printed() -> np.ndarray:
+def printed_lengths() -> np.ndarray:
+    """The lengths l1 ... l6 [m] and the frame angle [rad] of Table 1 as printed, (7,)."""
     p = printed_device(CASES[0]).values()
     return np.array([*(getattr(p.lengths, name) for name in LENGTHS), p.frame_angle])
 
 
 def _evaluated(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    misfit, jacobian = _misfit()(x)
+    misfit, jacobian = table_4_misfit()(x)
     return misfit.full().ravel(), jacobian.full()
 
 
@@ -113,7 +114,7 @@ def fit(*freed: str) -> LengthFit:
     columns = [LENGTHS.index(name) for name in freed]
     best: LengthFit | None = None
     for start in [()] + [(c, factor) for c in columns for factor in STARTS[1:]]:
-        x = _printed()
+        x = printed_lengths()
         if start:
             x[start[0]] *= start[1]
         x, misfit = _fitted(x, [*columns, 6])

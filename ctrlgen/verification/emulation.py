@@ -41,8 +41,8 @@ class Machine:
         self._arm, self._error = arm_const, unicorn.UcError
         model = arm_const.UC_CPU_ARM_MAX if core.unicorn is None else getattr(arm_const, core.unicorn)
         mode = unicorn.UC_MODE_THUMB | (unicorn.UC_MODE_MCLASS if core.unicorn else 0)
-        self._uc = unicorn.Uc(unicorn.UC_ARCH_ARM, mode)
-        self._uc.ctl_set_cpu_model(model)
+        self.emulator = unicorn.Uc(unicorn.UC_ARCH_ARM, mode)
+        self.emulator.ctl_set_cpu_model(model)
         with program.open("rb") as stream:
             elf = ELFFile(stream)
             table: Any = elf.get_section_by_name(
@@ -57,28 +57,30 @@ class Machine:
         self.code = sum(size for _, size, flags in loaded if flags & 4)  # with the constants between instructions
         self.tables = sum(size for name, size, flags in loaded if not flags & 4 and not name.startswith(".ARM"))
         self.writable = sum(size for _, size, flags, _ in sections if flags & 1 and flags & 2)
-        self._uc.mem_map(RAM, RAM_SIZE)
-        self._uc.mem_map(RETURN, PAGE)
-        self._uc.mem_write(RAM, bytes([PATTERN]) * (STACK - RAM))
-        self._uc.reg_write(arm_const.UC_ARM_REG_C1_C0_2, self._uc.reg_read(arm_const.UC_ARM_REG_C1_C0_2) | FPU_ON)
-        self._uc.reg_write(arm_const.UC_ARM_REG_FPEXC, 0x40000000)
+        self.emulator.mem_map(RAM, RAM_SIZE)
+        self.emulator.mem_map(RETURN, PAGE)
+        self.emulator.mem_write(RAM, bytes([PATTERN]) * (STACK - RAM))
+        self.emulator.reg_write(
+            arm_const.UC_ARM_REG_C1_C0_2, self.emulator.reg_read(arm_const.UC_ARM_REG_C1_C0_2) | FPU_ON
+        )
+        self.emulator.reg_write(arm_const.UC_ARM_REG_FPEXC, 0x40000000)
         self._lengths: dict[tuple[int, int], int] = {}
         self._executed = 0
-        self._uc.hook_add(unicorn.UC_HOOK_BLOCK, self._count)
+        self.emulator.hook_add(unicorn.UC_HOOK_BLOCK, self._count)
         self._next = STACK
 
     def _load(self, address: int, data: bytes) -> None:
         first, last = address // PAGE * PAGE, -(-(address + len(data)) // PAGE) * PAGE
-        mapped = [(begin, end + 1) for begin, end, _ in self._uc.mem_regions()]
+        mapped = [(begin, end + 1) for begin, end, _ in self.emulator.mem_regions()]
         for page in range(first, last, PAGE):
             if not any(begin <= page < end for begin, end in mapped):
-                self._uc.mem_map(page, PAGE)
-        self._uc.mem_write(address, data)
+                self.emulator.mem_map(page, PAGE)
+        self.emulator.mem_write(address, data)
 
     def _count(self, machine: object, address: int, size: int, _: object) -> None:
         """A block of Thumb code is about to run: instructions whose first half word is 0xE800 or more have four bytes."""
         if (address, size) not in self._lengths:
-            words = np.frombuffer(self._uc.mem_read(address, size), dtype="<u2")
+            words = np.frombuffer(self.emulator.mem_read(address, size), dtype="<u2")
             at, count = 0, 0
             while at < len(words):
                 at += 2 if words[at] >= 0xE800 else 1
@@ -86,7 +88,7 @@ class Machine:
             self._lengths[address, size] = count
         self._executed += self._lengths[address, size]
         if self._executed > MOST:
-            self._uc.emu_stop()
+            self.emulator.emu_stop()
 
     def reserve(self, count: int, real: Real) -> int:
         """Address of `count` numbers in RAM."""
@@ -96,35 +98,35 @@ class Machine:
 
     def write(self, address: int, values: np.ndarray, real: Real) -> None:
         """Numbers into RAM."""
-        self._uc.mem_write(address, np.asarray(values, dtype=_dtype(real)).tobytes())
+        self.emulator.mem_write(address, np.asarray(values, dtype=_dtype(real)).tobytes())
 
     def read(self, address: int, count: int, real: Real) -> np.ndarray:
         """Numbers from RAM, as they are there."""
-        return np.frombuffer(self._uc.mem_read(address, count * real.bytes), dtype=_dtype(real))
+        return np.frombuffer(self.emulator.mem_read(address, count * real.bytes), dtype=_dtype(real))
 
     def call(self, function: str, *arguments: int) -> tuple[int, int]:
         """(returned integer, instructions executed) of a call with addresses or integers as arguments."""
         arm, self._executed = self._arm, 0
         for i, argument in enumerate(arguments):
-            self._uc.reg_write(arm.UC_ARM_REG_R0 + i, argument)
-        self._uc.reg_write(arm.UC_ARM_REG_SP, STACK)
-        self._uc.reg_write(arm.UC_ARM_REG_LR, RETURN | 1)
+            self.emulator.reg_write(arm.UC_ARM_REG_R0 + i, argument)
+        self.emulator.reg_write(arm.UC_ARM_REG_SP, STACK)
+        self.emulator.reg_write(arm.UC_ARM_REG_LR, RETURN | 1)
         try:
-            self._uc.emu_start(self.symbols[function] | 1, RETURN)
+            self.emulator.emu_start(self.symbols[function] | 1, RETURN)
         except self._error as error:
-            place = self._uc.reg_read(arm.UC_ARM_REG_PC)
+            place = self.emulator.reg_read(arm.UC_ARM_REG_PC)
             raise ToolError(f"the emulated core stopped in {function} at {place:#x}: {error}") from error
-        if self._uc.reg_read(arm.UC_ARM_REG_PC) != RETURN:
+        if self.emulator.reg_read(arm.UC_ARM_REG_PC) != RETURN:
             raise ToolError(
                 f"{function} did not return within {MOST // 1000000} million instructions on the emulated core"
             )
-        returned = self._uc.reg_read(arm.UC_ARM_REG_R0)
+        returned = self.emulator.reg_read(arm.UC_ARM_REG_R0)
         return returned - (1 << 32) if returned >> 31 else returned, self._executed
 
     @property
     def stack(self) -> int:
         """Bytes of stack that the calls so far have touched at most, in whole double words."""
-        memory = np.frombuffer(self._uc.mem_read(RAM, STACK - RAM), dtype=np.uint8)
+        memory = np.frombuffer(self.emulator.mem_read(RAM, STACK - RAM), dtype=np.uint8)
         touched = np.flatnonzero(memory != PATTERN)
         return -(-int(len(memory) - touched[0]) // 8) * 8 if len(touched) else 0
 

@@ -40,7 +40,7 @@ REMARK = re.compile(
 
 
 @dataclass(frozen=True)
-class _Analyzer:
+class Analyzer:
     """A program called once a file: `words` before the file, `after` it; how it is installed."""
 
     tool: str
@@ -51,18 +51,18 @@ class _Analyzer:
 
 
 ANALYZERS = (
-    _Analyzer(
+    Analyzer(
         "clang-tidy", "clang-tidy",
         ("--quiet", "--config={" + ", ".join(f"{k}: '{v}'" for k, v in TIDY.items()) + "}"), ("--", *STRICT),
         "apt-get install clang-tidy",
     ),
-    _Analyzer(
+    Analyzer(
         "gcc -fanalyzer", "gcc",  # -O0: an optimiser removes what it should find; the rest lets it come to the end of a controller
         ("-fanalyzer", "-fanalyzer-call-summaries", "--param=analyzer-bb-explosion-factor=100",
          "--param=analyzer-max-enodes-per-program-point=64", f"-W{GAVE_UP}", *STRICT, "-O0", "-c", "-o", "/dev/null"), (),
         "apt-get install gcc",
     ),
-    _Analyzer(
+    Analyzer(
         "clang --analyze", "clang", ("--analyze", "--analyzer-output", "text", "-Xclang", "-analyzer-werror", *STRICT), (),
         "apt-get install clang",
     ),
@@ -77,7 +77,7 @@ def check_rules(
     checks = [not_run(MISRA, _subjects(folder), LEFT_OUT) if quick else _misra(folder)]
     for analyzer in ANALYZERS:
         progress(analyzer.tool)
-        checks.append(_analyzed(analyzer, folder))
+        checks.append(run_analyzer(analyzer, folder))
     return tuple(checks)
 
 
@@ -131,7 +131,7 @@ def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> C
     return CheckFinding(name, int(line), rule, rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name))
 
 
-def _analyzed(analyzer: _Analyzer, folder: CFolder) -> Check:
+def run_analyzer(analyzer: Analyzer, folder: CFolder) -> Check:
     """One analyzer over all files, `AT_ONCE` at a time."""
     subjects, version = _subjects(folder), version_of(analyzer.program)
     if version is None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ctrlgen._version import program
+from ctrlgen.version import program
 
 app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,

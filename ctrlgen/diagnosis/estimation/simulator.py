@@ -57,15 +57,16 @@ class Simulator:
         return ca.vertcat(*rows)
 
     @cached_property
-    def _equations(self) -> SampleEquations:
+    def equations(self) -> SampleEquations:
+        """F and H of one sample, symbolically."""
         return build_sample_equations(self.model, self._observed, self.sample_time, self.linear)
 
     def linearise(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
         """Along any motion, for the `chosen` m of the free numbers, at `p`."""
-        c, by_p = self._equations.constants(p)
+        c, by_p = self.equations.constants(p)
         given = self._symbols[:4]
         by_f = by_p[:, list(chosen)]
-        slopes = self._stepped(by_f.sparsity())(*given, c, by_f) if takes_several_steps(self._equations) else None
+        slopes = self._stepped(by_f.sparsity())(*given, c, by_f) if takes_several_steps(self.equations) else None
         if slopes is None:
             F_S, F_c, H_S, H_c = self._sloped(*given, c)
             slopes = [F_S, F_c @ by_f, H_S, H_c @ by_f]
@@ -74,7 +75,7 @@ class Simulator:
     @cached_property
     def _sloped(self) -> ca.Function:
         """`given` of the equations -> F_S, F_c, H_S, H_c."""
-        q = self._equations
+        q = self.equations
         slopes = [ca.jacobian(a, b) for a in (q.following, q.y) for b in (q.given[0], q.given[4])]
         return ca.Function("sloped", q.given, slopes)
 
@@ -86,7 +87,7 @@ class Simulator:
             m = pattern.size2()
             T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))  # dense: steps fill it
             seed = ca.vertcat(ca.MX(n_s, pattern.size1()), by_f.T)
-            _, T, _, Y = forward_sensitivities(self._equations, T, seed, self._symbols)
+            _, T, _, Y = forward_sensitivities(self.equations, T, seed, self._symbols)
             slopes = [part.T for values in (T, Y) for part in (values[:n_s, :], values[n_s:, :])]
             self._by_pattern[key] = ca.Function("stepped", [*self._symbols, by_f], slopes)
         return self._by_pattern[key]
@@ -114,39 +115,39 @@ class Simulator:
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y), SI."""
-        c = np.tile(self._equations.constants(p)[0].full().T, (len(record.time), 1))
-        return self._moving.run(self._start(record, p, start), *self._inputs(record), c)
+        c = np.tile(self.equations.constants(p)[0].full().T, (len(record.time), 1))
+        return self._moving.run(self.starting_state(record, p, start), *self.inputs(record), c)
 
     def sensitivities(
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None, by_free: bool = True
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings (n, n_y) and their derivatives (n, n_y, m) by `free`, where wanted, then by what the record starts with."""
-        c, by_p = self._equations.constants(p)
+        c, by_p = self.equations.constants(p)
         k, n_i, n_y, n = len(self.free) * by_free, len(self.free_initial_states), len(self.channels), len(record.time)
         T_0 = np.zeros((k + n_i, self.n_s))
         T_0[k + np.arange(n_i), list(self.free_initial_states)] = 1.0
-        begin = np.concatenate([self._start(record, p, start), T_0.ravel(order="F")])
+        begin = np.concatenate([self.starting_state(record, p, start), T_0.ravel(order="F")])
         slow = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(by_p.nonzeros())))
-        values = self._carrying(by_free).run(begin, *self._inputs(record), *slow)[1]
+        values = self._carrying(by_free).run(begin, *self.inputs(record), *slow)[1]
         return values[:, :n_y], values[:, n_y:].reshape(n, n_y, k + n_i)
 
     @cached_property
     def _moving(self) -> Recursion:
         """The sample map."""
-        q = self._equations
+        q = self.equations
         return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)]))
 
     def _carrying(self, by_free: bool) -> Recursion:
         """The sample map with its derivatives carried along; the nonzeros of dc/dp come as an argument."""
         if by_free not in self._with_sensitivities:
-            n_i, pattern = len(self.free_initial_states), self._equations.constants.sparsity_out(1)
+            n_i, pattern = len(self.free_initial_states), self.equations.constants.sparsity_out(1)
             by_p = ca.MX.sym("by_p", pattern.nnz())
             seed = ca.MX(n_i, pattern.size1())
             if by_free:
                 seed = ca.vertcat(ca.MX(pattern, by_p).T, seed)
             state, others = ca.MX.sym("state", self.n_s * (1 + seed.shape[0])), self._symbols[1:]
             S, T = state[: self.n_s], ca.reshape(state[self.n_s :], seed.shape[0], self.n_s)
-            after, T, y, Y = forward_sensitivities(self._equations, T, seed, [S, *others])
+            after, T, y, Y = forward_sensitivities(self.equations, T, seed, [S, *others])
             values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((after, T), (y, Y))]
             self._with_sensitivities[by_free] = Recursion(ca.Function("one", [state, *others, by_p], values))
         return self._with_sensitivities[by_free]
@@ -154,16 +155,17 @@ class Simulator:
     @cached_property
     def _symbols(self) -> list[ca.MX]:
         """S, u, u+, ambient, constants."""
-        n_u, n_c = self.model.u.numel(), self._equations.constants.size1_out(0)
+        n_u, n_c = self.model.u.numel(), self.equations.constants.size1_out(0)
         return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
 
-    def _start(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+    def starting_state(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+        """S (n_s,) before the first sample, `start` added at `free_initial_states`."""
         S = self.initial_state(record, p)
         if start is not None:
             S[list(self.free_initial_states)] += start
         return S
 
-    def _inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Drive now and at the next sample (n, n_u), ambient (n, 1); for settled poses the pose's own drive comes as the next."""
         u = record.drive
         following = np.vstack([u[1:], u[-1:]]) if np.isfinite(self.sample_time) else u

@@ -137,14 +137,14 @@ def simulate_motion(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """State before and after each sample (n, n_s), and the readings (n, n_y)."""
     after, y = r.simulate_states(record, p, start)
-    return np.vstack([r._start(record, p, start), after[:-1]]), after, y
+    return np.vstack([r.starting_state(record, p, start), after[:-1]]), after, y
 
 
 def _linearised(
     r: Simulator, record: Record, p: np.ndarray, chosen: list[int], before: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """F_S, F_f, H_S, H_f along the motion."""
-    linear, inputs = r.linearise(p, chosen), (before, *r._inputs(record))
+    linear, inputs = r.linearise(p, chosen), (before, *r.inputs(record))
     parts = [
         linear.evaluate_along(*(x[a : a + LTV_MODEL.block] for x in inputs))
         for a in range(0, len(before), LTV_MODEL.block)

@@ -141,7 +141,7 @@ def draw_spectrum(residuals: Residuals) -> Figure | None:
             (residuals.after, AFTER, "after" if residuals.changed else "residual"),
         )
         for parts, colour, label in curves[not residuals.changed :]:
-            f, density = _density(residuals, parts, records, i)
+            f, density = residual_density(residuals, parts, records, i)
             panel.loglog(f, density, color=colour, lw=1.1, label=label)
         noise = _noise_density(residuals, i, f)
         if noise is not None:
@@ -162,7 +162,7 @@ def _judged(values: np.ndarray) -> np.ndarray:
     return values[seen[0] : seen[-1] + 1] if len(seen) else values[:0]
 
 
-def _density(
+def residual_density(
     residuals: Residuals, parts: list[np.ndarray], records: list[int], i: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Welch's amplitude spectral density over the held-out records that have the longest one's sample time; marked samples

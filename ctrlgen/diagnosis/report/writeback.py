@@ -17,7 +17,6 @@ import numpy as np
 import tomlkit
 from tomlkit.items import AoT, Item, Table
 
-from ctrlgen._version import program
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
@@ -26,6 +25,7 @@ from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
 from ctrlgen.diagnosis.report.narrative import HARD_SPACE, channel_sentence, hard, sentence
 from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
+from ctrlgen.version import program
 
 DIGITS = 12  # nine would round by 5e-9, more than the predictions may differ by
 SD_DIGITS = 3

@@ -62,7 +62,7 @@ class Screen:
         sums: Sums | None = None
         columns: list[CandidateTerm] = []
         U, back = _directions(fit.J)
-        first, seen = 0, self._seen(fit)
+        first, seen = 0, self.data_hints(fit)
         for record, start in zip(
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
         ):
@@ -81,7 +81,7 @@ class Screen:
             columns, sums, U.T @ fit.residual, np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
         )
 
-    def _seen(self, fit: Fit) -> Callable[[Place, int], DataHints]:
+    def data_hints(self, fit: Fit) -> Callable[[Place, int], DataHints]:
         """What the records show at each place, after what `fit` explains."""
         if self.peaks is None:
             self.peaks = signal_peaks(self.fitter, fit)

@@ -101,7 +101,7 @@ class Searcher:
             candidates = self._fit_each(current.fit, self._significant(current, screened))
             if self.selection.parameters_may_mask_cause(current.fit):
                 candidates = (*candidates, *self._as_stated(current))
-            candidates = (*candidates, *self._fit_subsets(current, screened, candidates))
+            candidates = (*candidates, *self.fit_subsets(current, screened, candidates))
             candidates = tuple(sorted(self._converge_promising(current, candidates), key=lambda t: t.criterion))
             rounds.append(Round(screened, candidates, current))
             better = [t for t in candidates if self.selection.justified(current, t)]
@@ -127,10 +127,10 @@ class Searcher:
         """The plainest, once it and what takes away nearly as much so far are fitted to their end."""
         first = self.selection.most_parsimonious(better)
         near = self._close_contenders(current.fit.objective, first, [t for t in better if t is not first])
-        ends = [self._restarted_elsewhere(self._converged(t), current, screened) for t in (first, *near)]
+        ends = [self.restart_elsewhere(self._converged(t), current, screened) for t in (first, *near)]
         return self.selection.most_parsimonious(sorted(ends, key=lambda t: t.criterion))
 
-    def _restarted_elsewhere(
+    def restart_elsewhere(
         self, candidate: CandidateModel, before: CandidateModel, screened: Screened
     ) -> CandidateModel:
         """The trial, its causes that are new begun again in the most promising of the other shapes screened, where more than
@@ -219,7 +219,7 @@ class Searcher:
         except ValueError:
             return []
 
-    def _fit_subsets(
+    def fit_subsets(
         self, current: CandidateModel, screened: Screened, singles: tuple[CandidateModel, ...]
     ) -> list[CandidateModel]:
         """Sets of suspects that promise more than any single one gave; each size must promise more than the smaller."""
@@ -291,11 +291,11 @@ class Searcher:
         candidates = []
         for s in able[: SEARCH.most_rivals]:
             self.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
-            candidates += self._fit_if_buildable(self._replaced(current.fit, k, others, s), s.hypothesis)
+            candidates += self._fit_if_buildable(self.replace_cause(current.fit, k, others, s), s.hypothesis)
         near = self._close_contenders(without, current, sorted(candidates, key=lambda t: t.criterion))
         return sorted((self._converged(t) if t in near else t for t in candidates), key=lambda t: t.criterion)
 
-    def _replaced(self, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:
+    def replace_cause(self, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:
         """The suspect beside the `others` in place of cause k of a fit; of its family, begun with that one's numbers where
         that is better: what they have in common means the same."""
         structure = others.with_cause(suspect.hypothesis, suspect.start)
