@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar
 
 import casadi as ca
 import numpy as np
-from pydantic import create_model
+from pydantic import ConfigDict, create_model
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
@@ -34,6 +34,7 @@ ASKS = {
     "force": "uxdvp", "restoring_force": "dp", "damping_force": "vp", "mass": "p", "acceleration": "uxdvp", "rates": "uxdvp", "pose": "dp",
 }  # fmt: skip
 UNREAD = Quantity(1.0, "1")  # stands for what could not be read, so that all else is judged too
+NO_SOURCE = ConfigDict(use_attribute_docstrings=False)  # classes made at run time: looking for their text takes 30 ms
 MOVING = ("damping_force", "acceleration")  # laws that need a mass
 
 
@@ -69,8 +70,16 @@ class Recipe:
         return rows
 
 
+class UserNumbers(Section):
+    """A table of a user's parameters."""
+
+    model_config = NO_SOURCE
+
+
 class UserDevice(Device):
     """A device whose physics is its user's functions; made by `user_device`, never read from a file."""
+
+    model_config = NO_SOURCE
 
     kind: str = "user"
     recipe: ClassVar[Recipe]
@@ -192,7 +201,7 @@ def _class(recipe: Recipe) -> type[UserDevice]:
         numbers: dict[str, Any] = {
             n: (Annotated[Quantity, In(recipe.units[n])], ...) for n, where in recipe.domains.items() if where == domain
         }
-        section = create_model(f"{domain.title()}Numbers", __base__=Section, **numbers)
+        section = create_model(f"{domain.title()}Numbers", __base__=UserNumbers, **numbers)
         section.domain = domain
         fields[SECTIONS[domain]] = (section, ...)
     made = create_model("NamedUserDevice", __base__=UserDevice, **fields)
