@@ -33,13 +33,11 @@ FEWEST_STEPS = 20  # successive differences that tell how often the sign changes
 SIGN_CHANGES = 0.25  # share of successive differences that change sign: two thirds in white noise, few in motion
 
 
-def outliers(
-    values: np.ndarray, drive: np.ndarray | None = None, threshold: float = THRESHOLD, widest: int = WIDEST
-) -> np.ndarray:
-    """Where one channel `values` (n,) leaves for at most `widest` samples and comes back: (n,) bool.
+def outliers(values: np.ndarray, drive: np.ndarray) -> np.ndarray:
+    """Where one channel `values` (n,) leaves for at most `WIDEST` samples and comes back: (n,) bool.
 
-    A stretch of w = 1 ... `widest` samples is an outlier where each of them lies off the chord between the samples before
-    and after the stretch by more than `threshold` sigma, all on one side, and the samples around continue on a straight
+    A stretch of w = 1 ... `WIDEST` samples is an outlier where each of them lies off the chord between the samples before
+    and after the stretch by more than `THRESHOLD` sigma, all on one side, and the samples around continue on a straight
     line. sigma is the local median absolute value of the same statistic (w = 1: half the second difference), so it holds
     for coloured noise too. Nothing next to a jump of the `drive` (n, n_u) is marked, nor within ten samples after it: there
     the device itself may move so. NaN is no outlier.
@@ -51,13 +49,13 @@ def outliers(
         return marked
     y = np.interp(np.arange(n), np.flatnonzero(finite), values[finite])  # for the statistic only
     floor = max(quantisation_step(values[finite], fewest=2), ROUNDING * np.ptp(y)) / 2
-    near_jump = marked.copy() if drive is None else _near_jump(drive)
-    for width in range(1, widest + 1):
+    near_jump = _near_jump(drive)
+    for width in range(1, WIDEST + 1):
         off = _off_chord(y, width)
         sigma = MAD * scipy.ndimage.median_filter(np.abs(off.mean(1)), min(WINDOW, len(off)), mode="reflect")
         size = np.abs(off).min(1)
         one_sided = np.abs(np.sign(off).sum(1)) == width
-        for start in (np.flatnonzero(one_sided & (size > threshold * np.maximum(sigma, floor))) + 1).tolist():
+        for start in (np.flatnonzero(one_sided & (size > THRESHOLD * np.maximum(sigma, floor))) + 1).tolist():
             stretch = slice(start, start + width)
             if not near_jump[stretch].any() and finite[stretch].all() and _isolated(y, start, width, size[start - 1]):
                 marked[stretch] = True

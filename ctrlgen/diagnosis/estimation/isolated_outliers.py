@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 
-from ctrlgen.diagnosis.settings import OUTLIERS
-from ctrlgen.recordings.outliers import outliers
+from ctrlgen.diagnosis.settings import OUTLIERS, STATISTICS
 from ctrlgen.recordings.recording import Record, Recording
 
 
@@ -28,7 +28,8 @@ def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray
         if record.role == "rest":
             records.append(record)
             continue
-        marked = isolated_outliers(np.where(record.valid, record.observed - predicted(record), np.nan))
+        residual = np.where(record.valid, record.observed - predicted(record), 0.0)
+        marked = record.valid & isolated_outliers(np.nan_to_num(residual))
         count += int(marked.sum())
         records.append(replace(record, valid=record.valid & ~marked) if marked.any() else record)
     note = f"{count} samples lie off the model's prediction alone, without their neighbours: taken for sensor faults, not used."
@@ -36,9 +37,26 @@ def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray
 
 
 def isolated_outliers(residual: np.ndarray) -> np.ndarray:
-    """Isolated outliers (n, n_y) of the `residual` (n, n_y), NaN where a sample is not valid.
+    """Isolated outliers (n, n_y) of the `residual` (n, n_y): large deviations e from the median of the samples around.
 
-    A channel with more than `OUTLIERS.largest_share` of them has none.
+    |e| must exceed `OUTLIERS.threshold` standard deviations, the larger of the whole channel's and the local one, for at most
+    `OUTLIERS.widest` samples, and the samples on either side must have little of it. A channel with more than
+    `OUTLIERS.largest_share` of them has none.
+
+    `ctrlgen.recordings.outliers` compares with the chord between the neighbours instead, because a recorded channel moves. A
+    residual hardly moves, and the noise in it is often filtered: the chord then follows the noise, and samples of a smooth
+    residual that the model merely does not explain would be taken out.
     """
-    marked = [outliers(column, threshold=OUTLIERS.threshold, widest=OUTLIERS.widest) for column in residual.T]
-    return np.column_stack([m & (m.mean() <= OUTLIERS.largest_share) for m in marked])
+    e = np.abs(residual - median_filter(residual, size=(OUTLIERS.around, 1), mode="nearest"))
+    whole, local = np.median(e, axis=0), median_filter(e, size=(OUTLIERS.local, 1))
+    marked = e > OUTLIERS.threshold * STATISTICS.mad_to_sd * np.maximum(whole, local)
+    marked[:, marked.mean(axis=0) > OUTLIERS.largest_share] = False
+    for column, size in zip(marked.T, e.T, strict=True):
+        at = np.flatnonzero(column)
+        for run in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1):
+            if not len(run):
+                continue
+            neighbours = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)]
+            if len(run) > OUTLIERS.widest or max(neighbours, default=0.0) > OUTLIERS.neighbour_share * size[run].max():
+                column[run] = False  # a mass that is pushed moves before and after, too
+    return marked

@@ -101,15 +101,21 @@ class NoiseUpdateSettings:
 
 @dataclass(frozen=True)
 class OutlierSettings:
-    """Isolated outliers of the residual; how they are found is in `ctrlgen.recordings.outliers`."""
+    """Isolated outliers of the residual."""
 
-    threshold: float = 6.0
-    """Local standard deviations of the deviation from the chord between the neighbours. In white noise that is sqrt(1.5)
-    of its own, so an outlier of 7.3 standard deviations; normal noise does that once in 1e9 samples."""
+    threshold: float = 7.0
+    """Standard deviations, by the median absolute deviation, of the deviation from the median of the samples around. Normal
+    noise does that once in 4e11 samples."""
+    around: int = 7
+    """Samples whose median an outlier deviates from: three on either side."""
+    local: int = 51
+    """Samples over which the local deviation is taken: its median is known to 17 %."""
     largest_share: float = 0.01
     """Share of a channel's samples; where more stand out, they are no isolated faults and all are kept. Judgement."""
     widest: int = 2
     """Samples of one outlier. A mechanism cannot leave and return within two samples."""
+    neighbour_share: float = 0.3
+    """Share of an outlier that the samples beside it may have: a mass that is pushed moves before and after. Judgement."""
 
 
 @dataclass(frozen=True)
