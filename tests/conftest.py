@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,6 +30,12 @@ def rng() -> np.random.Generator:
 @pytest.fixture(scope="session")
 def device():
     return load_device(DEVICE)
+
+
+@pytest.fixture(scope="module")
+def p(device) -> SimpleNamespace:
+    """The numbers of `device`, SI; a module may have a `device` of its own."""
+    return device.values()
 
 
 @pytest.fixture(scope="session")

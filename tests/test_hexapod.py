@@ -10,10 +10,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import DEVICE
 from direct_stiffness import Frame, assemble, section_loads
+from matrices import array, numbers, replaced
 
-from ctrlgen.devices import load_device
 from ctrlgen.physics import hexapod, screw, thermal_actuator, xy_stage
 
 MICRO = 1e-6
@@ -37,27 +36,10 @@ TABLE_3 = (
 )  # S1 Table 3, T_A: rad and um
 
 
-def numbers(text: str) -> np.ndarray:
-    return np.array([[float(word) for word in line.split()] for line in text.strip().splitlines()])
-
-
-def array(matrix: Any) -> np.ndarray:
-    return ca.DM(matrix).full()
-
-
 def block_error(J: np.ndarray, reference: np.ndarray) -> float:
     """Largest difference, rotation and translation rows each relative to their largest entry."""
     error, size = (np.abs(M).reshape(2, -1).max(1) for M in (J - reference, reference))
     return float((error / size).max())
-
-
-def replaced(values: SimpleNamespace, **changes: Any) -> SimpleNamespace:
-    return SimpleNamespace(**{**vars(values), **changes})
-
-
-@pytest.fixture(scope="module")
-def p() -> SimpleNamespace:
-    return load_device(DEVICE).values()
 
 
 @pytest.fixture(scope="module")

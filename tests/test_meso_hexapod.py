@@ -25,11 +25,6 @@ def device():
 
 
 @pytest.fixture(scope="module")
-def p(device) -> SimpleNamespace:
-    return device.values()
-
-
-@pytest.fixture(scope="module")
 def rows():
     return s0.rows()
 

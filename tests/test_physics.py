@@ -11,9 +11,8 @@ import casadi as ca
 import direct_stiffness as direct
 import numpy as np
 import pytest
-from conftest import DEVICE
+from matrices import array, numbers, replaced
 
-from ctrlgen.devices import load_device
 from ctrlgen.physics import flexure, hexapod, screw, thermal_actuator, xy_stage
 
 MICRO = 1e-6
@@ -42,10 +41,6 @@ FORCE_TABLE = """
 """  # PHYSICS.md: d [um], F_l [N], F [N]
 
 
-def numbers(text: str) -> np.ndarray:
-    return np.array([[float(word) for word in line.split()] for line in text.strip().splitlines()])
-
-
 def half_units(text: str) -> np.ndarray:
     """Half a unit of the last digit of every number; 0 for a bare 0, which is a structural zero."""
 
@@ -53,10 +48,6 @@ def half_units(text: str) -> np.ndarray:
         return 0.0 if word == "0" else 0.5 * 10.0 ** int(Decimal(word).as_tuple().exponent)
 
     return np.array([[half(word) for word in line.split()] for line in text.strip().splitlines()])
-
-
-def array(matrix: Any) -> np.ndarray:
-    return ca.DM(matrix).full()
 
 
 def in_newton_micrometre(K: np.ndarray) -> np.ndarray:
@@ -70,15 +61,6 @@ def by_work(matrix: Any) -> np.ndarray:
     work = np.hstack([M[:, 3:], M[:, :3]])
     scale = np.sqrt(np.abs(np.diag(work)))
     return work / np.outer(scale, scale)
-
-
-def replaced(values: SimpleNamespace, **changes: Any) -> SimpleNamespace:
-    return SimpleNamespace(**{**vars(values), **changes})
-
-
-@pytest.fixture(scope="module")
-def p() -> SimpleNamespace:
-    return load_device(DEVICE).values()
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -31,11 +30,6 @@ DEG, UM = np.pi / 180, 1e-6
 @pytest.fixture(scope="module")
 def device():
     return load_device(MESO_FILE)
-
-
-@pytest.fixture(scope="module")
-def p(device) -> SimpleNamespace:
-    return device.values()
 
 
 @pytest.fixture(scope="module")

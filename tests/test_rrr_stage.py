@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import rrr_direct as direct
 from conftest import DEVICES
+from matrices import array
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices import rrr_stage as device_module
@@ -21,10 +22,6 @@ from ctrlgen.trajectory.workspace import Workspace
 
 CASES = (1, 2)
 ROTATION_SCALE = np.array([1.0, 1.0, 30e-3])  # rotations as motion of a point 30 mm away
-
-
-def array(matrix: Any) -> np.ndarray:
-    return ca.DM(matrix).full()
 
 
 def whole(k: rrr_stage.Kinetostatics, C_in: Any) -> np.ndarray:
