@@ -8,8 +8,12 @@ AREAS: dict[str, tuple[str, ...]] = {  # globs below the root of the tree
     "model": ("ctrlgen/model/*.py", "ctrlgen/numerics/*.py", "ctrlgen/physics/*.py"),
     "effects": ("ctrlgen/effects/*.py",),
     "recordings": ("ctrlgen/recordings/*.py", "ctrlgen/core/units.py"),
-    "estimation": ("ctrlgen/diagnosis/estimation/*.py",),
-    "selection": ("ctrlgen/diagnosis/selection/*.py", "ctrlgen/diagnosis/hypotheses/*.py"),
+    "estimation": ("ctrlgen/diagnosis/estimation/*.py", "ctrlgen/diagnosis/settings/estimation.py"),
+    "selection": (
+        "ctrlgen/diagnosis/selection/*.py",
+        "ctrlgen/diagnosis/hypotheses/*.py",
+        "ctrlgen/diagnosis/settings/selection.py",
+    ),
     "firmware": ("ctrlgen/firmware/*.py",),
 }
 

@@ -91,7 +91,7 @@ class Seen:
         found: set[str] = set()
         for name in names:
             word = re.compile(rf"\b{re.escape(name)}\b")
-            attribute = re.compile(rf"\.{re.escape(name)}\b") if name in inside else None
+            attribute = re.compile(rf"\.{re.escape(name)}\b") if name in inside else self._field(file, first, name)
             own = any(word.search(text) for k, text in enumerate(self._texts[file], 1) if not first <= k <= last)
             for other in [file] if own and name.startswith("_") else self._texts:
                 sought = word if other == file or self._imports(other, file) else attribute
@@ -105,6 +105,14 @@ class Seen:
         classes = (n for n in ast.walk(ast.parse((self.root / file).read_text())) if isinstance(n, ast.ClassDef))
         rows = (row for c in classes for row in c.body if isinstance(row, ast.Assign))
         return {t.id for row in rows for t in row.targets if isinstance(t, ast.Name)}
+
+    def _field(self, file: str, line: int, name: str) -> re.Pattern[str] | None:
+        """What reads a field of a group of settings, such as NOISE.line_ratio where some module has NOISE = NoiseSettings()."""
+        classes = (n for n in ast.walk(ast.parse((self.root / file).read_text())) if isinstance(n, ast.ClassDef))
+        group = next((c.name for c in classes if c.lineno <= line <= c.end_lineno), None)
+        instance = re.compile(rf"^(\w+) = {group}\(\)")
+        owners = {m[1] for texts in self._texts.values() for text in texts if (m := instance.match(text))}
+        return re.compile(rf"\b(?:{'|'.join(sorted(owners))})\.{re.escape(name)}\b") if owners else None
 
     def _imports(self, other: str, file: str) -> bool:
         module = file.removesuffix(".py").replace("/", ".")

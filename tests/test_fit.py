@@ -11,6 +11,7 @@ from conftest import DEVICES
 
 from ctrlgen import load_device
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.robust_covariance import sandwich_over_model
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 
@@ -80,3 +81,38 @@ def test_a_number_stands_once_in_a_structure_and_a_fringe_as_often_as_there_are_
     creep = Hypothesis("creep", "stage:axis", "axis")
     second = cyclic.beside([cyclic])
     assert second.count == 1 and cyclic.beside([cyclic, second]).count == 2 and creep.beside([creep]) is None
+
+
+@pytest.mark.parametrize("objective, steps", [(2 * N * (1 - 1e-9), 4), (2 * N * (1 + 1e-9), 1)])
+def test_a_fit_that_leaves_less_than_twice_the_noise_is_refitted_to_the_held_out_records_in_four_steps(
+    objective, steps
+):
+    tried = []
+    fitter = SimpleNamespace(
+        refitted_to_held_out=lambda fit, steps: tried.append(steps) or (fit, 3.0, 2.0), held_out_squares=lambda fit: 7.0
+    )
+    assert Fitter.held_out_deviance(fitter, SimpleNamespace(objective=objective, n=N)) == 12.0 and tried == [steps]
+
+
+def test_of_a_cause_that_starts_at_nothing_an_amplitude_is_scaled_by_a_millionth_of_its_range_a_shape_by_the_whole():
+    """An amplitude is expected small; a phase of zero says nothing of how far the phase may go."""
+    hum = Hypothesis("vibration", "disturbance:axis", "axis")
+    structure = Structure(AXIS).with_cause(hum, {"amplitude": 0.0, "frequency": 50.0, "phase": 0.0})
+    size = {u.path.rpartition(".")[2]: u.size / (u.high - u.low) for u in structure.free_parameters if u.cause == 0}
+    (frequency,) = (u for u in structure.free_parameters if u.path.endswith("frequency"))
+    assert (size["amplitude"], size["phase"], frequency.size) == pytest.approx((1e-6, 1.0, 50.0))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e6])
+def test_the_sandwich_of_each_number_is_by_the_record_that_shows_it(scale):
+    """Of three records one shows the first number by two channels with white residuals, one the second, each of whose residuals
+    stands ten times: sqrt(10) of the deviation by curvature. A hundred blocks or so tell it to some 7 %."""
+    n, rng = 4000, np.random.default_rng(2)
+    J = np.zeros((4 * n, 2))
+    J[: 2 * n, 0], J[3 * n :, 1] = 1.0, scale
+    residual = rng.standard_normal(4 * n)
+    residual[3 * n :] = np.repeat(residual[3 * n : 3 * n + n // 10], 10)
+    ratio = sandwich_over_model(
+        SimpleNamespace(J=J, residual=residual, shapes=((n, 2), (n, 1), (n, 1)), theta=np.zeros(2))
+    )
+    assert ratio == pytest.approx([1.0, np.sqrt(10)], rel=0.3)

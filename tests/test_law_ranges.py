@@ -46,3 +46,15 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
     if p.off is None:
         either = p.name in ("moment", "position", "reference", "phase", "lean", "gap", "level", "taper", "skew")
         assert either or p.bounds[0] >= 0.0
+
+
+@pytest.mark.parametrize("law", Effect.library.values(), ids=Effect.library)
+def test_a_memory_has_a_typical_size_and_a_way_over_which_it_settles_may_be_a_hundredth_of_the_travel(law):
+    assert all(state.scale > 0 for state in law.states)
+    reach = [p for p in law.params if p.name == "reach" and p.unit == "travel"]
+    assert all(p.bounds[0] <= 0.01 for p in reach)
+
+
+def test_what_bends_or_moves_a_scale_acts_before_the_fringes_are_counted_along_it_in_the_order_of_the_file():
+    orders = {Effect.library[kind].order for kind in ("bow", "cubic_sensor", "drift", "temperature_sensitivity")}
+    assert len(orders) == 1 and max(orders) < Effect.library["cyclic"].order

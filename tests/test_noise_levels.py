@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.estimation.noise import estimate_noise, ljung_box, stationary_deviation
+from ctrlgen.diagnosis.estimation.noise import estimate_noise, ljung_box, stationary_deviation, without_lines
+from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
 from ctrlgen.recordings.recording import Record, Recording
 
 SIGMAS = 4.0  # once in 16 000
@@ -194,3 +195,25 @@ def test_the_test_of_whiteness_rejects_as_often_as_it_says(rng):
     p = [ljung_box(rng.standard_normal(500)) for _ in range(400)]
     assert stats.kstest(p, "uniform").pvalue > 1e-3
     assert ljung_box(noise(rng, 5000, 1.0, (0.1,))) < 1e-4
+
+
+def test_a_line_is_taken_out_of_a_stretch_and_noise_is_left():
+    """Of a line of 2.1 times the noise some 3 % of the power stay, as the frequency is sought among eight a bin; white noise
+    alone stays as it is, to the last bit."""
+    n = 4000
+    white = np.random.default_rng(11).standard_normal(n)
+    hum = 3 * np.sin(2 * np.pi * 2339 / 8 * np.arange(n) / n + 0.3)
+    assert np.array_equal(without_lines(white), white)
+    assert np.var(without_lines(white + hum)) == pytest.approx(np.var(white), abs=0.05 * np.var(hum))
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.6])
+def test_a_residual_tells_the_noise_beside_a_line_and_white_noise_has_no_pole(pole):
+    """A line of ten times the noise, at a frequency at which the device does not move."""
+    n = 4000
+    rng, t = np.random.default_rng(5), np.arange(4000)
+    motion = noise(rng, n, 1.0, (0.99,))
+    left = noise(rng, n, 1.0, (pole,)) + 10 * np.sin(2 * np.pi * 0.31 * t)
+    sd, ar, worth = noise_from_residual(left, motion)
+    assert sd == pytest.approx(1.0, abs=SIGMAS / np.sqrt(2 * worth))
+    assert ar.size == 0 if pole == 0 else ar == pytest.approx([pole], abs=SIGMAS / np.sqrt(worth))

@@ -66,6 +66,11 @@ def test_derivatives_scale_and_shift_give_what_was_meant(loaded):
     assert not held.valid[:495].any() and held.valid[500:].all() and np.isfinite(held.drive).all()
 
 
+def test_what_was_done_to_the_columns_is_said_in_one_sentence(loaded):
+    said = [note for note in loaded("keep_every = 4").notes if note.startswith("Before anything else")]
+    assert len(said) == 1 and said[0].endswith("; one row in 4 kept.") and "'reading.force'" not in said[0]
+
+
 def test_a_cut_off_that_the_kept_rows_cannot_hold_is_refused(loaded):
     with pytest.raises(InputError, match="too high for the rows that are kept"):
         loaded('low_pass = "100 Hz"\nkeep_every = 10')

@@ -90,6 +90,15 @@ def test_a_sensor_driven_out_of_the_adc_is_refused():
         SENSORS["3316"].read(move(101 * UM, 20 * UM, 5e3), np.random.default_rng(0), CELSIUS + 25)
 
 
+def test_noise_alone_may_drive_a_sensor_out_of_the_adc_at_its_lower_end():
+    """Half of it peak to peak fits between the signal and the end, or it does not."""
+    sensor, still = replace(SENSORS["3316"], noise=0.05, filtered_noise=0.03), np.zeros(1000)
+    ends = [replace(sensor, low=sensor.adc.low + share * sensor.noise) for share in (0.1, 0.6)]
+    with pytest.raises(ValueError, match="leaves the ADC"):
+        ends[0].read(still, np.random.default_rng(0))
+    assert ends[1].read(still, np.random.default_rng(0)).size == 1000
+
+
 @pytest.mark.parametrize("phase", [0.1, 1.5, 3.0, 4.5, 6.0])
 @pytest.mark.parametrize("noise", [0.0, 0.2])
 def test_fringes_count_the_distance_to_a_quarter_wave(phase, noise):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -205,6 +206,24 @@ def lines(*frequencies: float | None, accepted=(), path=10.0) -> bool:
 def test_two_lines_are_told_apart_by_half_a_period_over_the_path():
     assert lines(5.0, 5.051) and not lines(5.0, 5.049) and not lines(5.049, 5.0)
     assert lines(5.0, 5.026, path=20.0)
+
+
+@pytest.mark.parametrize("begin", [0.0, 5.0])
+def test_two_frequencies_are_told_apart_by_half_a_period_over_the_time_of_the_record(begin):
+    """Ten seconds of it, whenever it begins, of a law that may act more than once at a place."""
+    hum = Hypothesis("vibration", "disturbance:axis", "axis")
+    prior = replace(hum.prior, repeatable=True)
+    causes = [
+        SimpleNamespace(effect=hum.effect, location=hum.location, at=hum.at, law=hum.law, prior=prior, k=k)
+        for k in range(2)
+    ]
+    record = SimpleNamespace(role="fit", time=begin + np.arange(11), valid=np.ones((11, 1), bool))
+    recording = SimpleNamespace(records=[record], channels=())
+    for apart, told in ((0.049, False), (0.051, True)):
+        fit = SimpleNamespace(
+            structure=SimpleNamespace(causes=causes), values=lambda k, apart=apart: {"frequency": 2.0 + k * apart}
+        )
+        assert lines_resolved(recording, fit, ()) == told
 
 
 def test_all_pairs_of_lines_are_looked_at_whatever_stands_between():

@@ -1,0 +1,59 @@
+"""The screen: sets of candidates in the order of what they explain, and what it says of a cause that nothing can show."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_diagnosis_evidence import AXIS, axis_fitter
+
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.evidence.detectability import detectability
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.subset_search import SubsetSearch
+from ctrlgen.effects import Channel
+
+DRIVE_GAIN = Hypothesis("drive_gain", "actuator:axis", "axis")
+SENSOR_GAIN = Hypothesis("sensor_gain", "sensor:axis", "axis")
+
+
+def sets_of(*z: float) -> list[tuple[float, set[str]]]:
+    """The sets of candidates whose terms are independent and have these scores."""
+    n = len(z)
+    columns = [SimpleNamespace(hypothesis=f"h{k}", range=(-100.0, 100.0)) for k in range(n)]
+    found = SubsetSearch(
+        columns, np.arange(n), np.array(z), np.ones(n), np.ones(n), np.eye(n), lambda column, *_: column.hypothesis
+    ).search()
+    return [(gain, set(names)) for gain, names in found]
+
+
+def test_sets_come_in_the_order_of_what_they_explain_and_none_has_one_member():
+    """Of independent terms the squares of the scores add up."""
+    gains, members = zip(*sets_of(3.0, 4.0, 5.0), strict=True)
+    assert gains == pytest.approx((50.0, 41.0, 34.0, 25.0), rel=1e-6)  # the ridge is far below
+    assert members == ({"h0", "h1", "h2"}, {"h1", "h2"}, {"h0", "h2"}, {"h0", "h1"})
+
+
+def test_of_a_linear_device_the_gain_of_the_drive_hides_the_gain_of_the_sensor():
+    """Either scales the reading; the numbers of the device are stated, hence not free to take the gain over."""
+    fitter = axis_fitter()
+    fit = fitter.fit(Structure(AXIS).with_cause(DRIVE_GAIN, {"gain": 0.0}), steps=3)
+    (hidden,) = detectability(fit, Screen(fitter, [SENSOR_GAIN]).run(fit), fit.n).undetectable
+    assert hidden.effect == "sensor_gain" and hidden.masked_by == "drive_gain at actuator:axis"
+
+
+def test_a_gain_of_a_drive_that_is_never_used_affects_no_reading():
+    fitter = axis_fitter(u=np.zeros(600))
+    fit = fitter.fit(Structure(AXIS))
+    (hidden,) = detectability(fit, Screen(fitter, [DRIVE_GAIN]).run(fit), fit.n).undetectable
+    assert hidden.effect == "drive_gain" and hidden.masked_by.startswith("nothing")
+
+
+def test_a_frequency_ends_where_the_sampling_shows_no_higher_one_and_a_ratio_does_not():
+    channel, highest = Channel("axis", "N", 1.0, "m", 1.0), 0.3  # Hz, below the upper bound of the ratio
+    hum, late = (Hypothesis(effect, "", "axis", highest=highest) for effect in ("vibration", "second_pole"))
+    frequency, share = next(p for p in hum.law.params if p.unit == "Hz"), late.law.amplitude()
+    assert hum.bounds(frequency, channel) == (frequency.bounds[0], highest)
+    assert share.unit == "1" and late.bounds(share, channel) == share.bounds and share.bounds[1] > highest
