@@ -2,7 +2,8 @@
 
 A line that runs at import (a constant, a parameter of a law) belongs to no test: it is seen by the tests that execute a line which
 names what it defines (`.name` of what a class defines, in any file), and where there is none, by those that execute anything else
-of its file. What a class assigns is seen by both.
+of its file. What a class assigns is seen by both, and by the tests whose parameters name its file; a setting by those that
+execute what reads it of its group.
 """
 
 from __future__ import annotations
@@ -59,12 +60,18 @@ class Seen:
         named = self._ranked(self._through_names(file, first, last))
         if named and not self._assigned(file, first) & self._attributes(file):
             return named
+        by_name = self._ranked(self._parametrised(file)) if self._assigned(file, first) & self._attributes(file) else []
         return list(
-            dict.fromkeys([*self._ranked(set().union(*lines.values())), *named])
+            dict.fromkeys([*by_name, *self._ranked(set().union(*lines.values())), *named])
         )  # of a law its own tests first
 
+    def _parametrised(self, file: str) -> set[str]:
+        """The tests whose parameters name the file: they may read its class without executing a line of it."""
+        word = re.compile(rf"\[(?:.*-)?{re.escape(Path(file).stem)}(?:-.*)?\]$")
+        return {test for test in self.seconds if word.search(test)}
+
     def _ranked(self, tests: set[str]) -> list[str]:
-        return sorted(tests, key=lambda t: ((self.seconds[t] + 0.01) * self.breadth[t], t))
+        return sorted(tests, key=lambda t: ((self.seconds[t] + 0.01) * self.breadth.get(t, 0), t))
 
     def _statement(self, file: str, line: int) -> tuple[int, int]:
         """First and last line of the innermost statement; of a compound one, its head."""
@@ -91,10 +98,11 @@ class Seen:
         found: set[str] = set()
         for name in names:
             word = re.compile(rf"\b{re.escape(name)}\b")
-            attribute = re.compile(rf"\.{re.escape(name)}\b") if name in inside else self._field(file, first, name)
+            attribute = re.compile(rf"\.{re.escape(name)}\b") if name in inside else None
+            setting = self._field(file, first, name)
             own = any(word.search(text) for k, text in enumerate(self._texts[file], 1) if not first <= k <= last)
             for other in [file] if own and name.startswith("_") else self._texts:
-                sought = word if other == file or self._imports(other, file) else attribute
+                sought = setting or (word if other == file or self._imports(other, file) else attribute)
                 for k, text in enumerate(self._texts[other] if sought else (), 1):
                     if sought.search(text) and not (other == file and first <= k <= last):
                         found |= self.by_line.get(other, {}).get(k, set())

@@ -129,10 +129,39 @@ def test_lines_are_seen_by_the_tests_that_run_them_and_constants_by_those_that_u
     assert seen(tree, [tree / "tests" / "test_small.py"], tmp_path / "cache", 1, lambda: None).seconds == {}
 
 
+def test_a_setting_is_seen_by_the_tests_that_execute_what_reads_it_of_its_group(tree, tmp_path):
+    (tree / "ctrlgen" / "settings.py").write_text(
+        "from dataclasses import dataclass\n\n\n@dataclass\nclass GateSettings:\n    most: int = 3\n\n\nGATE = GateSettings()\n"
+    )
+    (tree / "ctrlgen" / "gate.py").write_text(
+        "from ctrlgen.settings import GATE\n\n\ndef shut(n):\n    return n > GATE.most\n\n\ndef most(x):\n    return x.most\n"
+    )
+    test = tree / "tests" / "test_gate.py"
+    test.write_text(
+        "from ctrlgen.gate import GATE, most, shut\n\n\ndef test_shut():\n    assert shut(4) and not shut(3)\n\n\n"
+        "def test_most():\n    assert most(GATE)\n"
+    )
+    found = seen(tree, [test], tmp_path / "cache", 1, lambda: None)
+    assert found.tests("ctrlgen/settings.py", 6) == ["tests/test_gate.py::test_shut"]
+
+
+def test_a_number_of_a_law_is_seen_by_the_tests_that_the_law_names():
+    """They may read the class alone, and execute no line of its file."""
+    file, named = "ctrlgen/effects/creep.py", "tests/test_laws.py::test_bounds[creep-gain]"
+    seconds = {"t.py::test_all": 0.1, named: 0.1, "tests/test_laws.py::test_bounds[log_creep-gain]": 0.1}
+    line = 1 + next(k for k, row in enumerate((ROOT / file).read_text().splitlines()) if "params = (" in row)
+    known = Seen(ROOT, {file: {1000: {"t.py::test_all"}}}, seconds, {"t.py::test_all": 30})
+    assert known.tests(file, line) == [named, "t.py::test_all"]
+
+
 def test_the_most_specific_and_fastest_tests_come_first_and_as_many_as_fit():
-    known = Seen(ROOT, {"ctrlgen/phi.py": {1: {"slow", "wide", "quick"}}}, {"slow": 9.0, "wide": 0.1, "quick": 0.1})
+    known = Seen(
+        ROOT,
+        {"ctrlgen/numerics/phi_functions.py": {1: {"slow", "wide", "quick"}}},
+        {"slow": 9.0, "wide": 0.1, "quick": 0.1},
+    )
     known.breadth = {"slow": 3, "wide": 5000, "quick": 30}
-    assert known.tests("ctrlgen/phi.py", 1) == ["quick", "slow", "wide"]
+    assert known.tests("ctrlgen/numerics/phi_functions.py", 1) == ["quick", "slow", "wide"]
     assert fitting(["quick", "slow", "wide"], known.seconds, 1.0) == ["quick"]
     assert fitting(["slow", "quick"], known.seconds, 1.0) == ["slow"]
 

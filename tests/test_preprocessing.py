@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import ROOT
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
+from ctrlgen.devices.base import Limit
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings import preprocessing
 from ctrlgen.recordings.reader import load_recordings
@@ -47,10 +50,11 @@ def loaded(tmp_path):
     np.savetxt(tmp_path / "r.csv", np.column_stack([q, u]), delimiter=",", header="q,u", comments="")
     model = build_model(ctrlgen.load_device(ROOT / "scenarios" / "emps" / "device.toml"))
 
-    def load(top: str):
+    def load(top: str, model=model):
         (tmp_path / "recording.toml").write_text(FILE.format(top=top))
         return load_recordings([tmp_path / "recording.toml"], model)
 
+    load.model = model
     return load
 
 
@@ -69,6 +73,19 @@ def test_derivatives_scale_and_shift_give_what_was_meant(loaded):
 def test_what_was_done_to_the_columns_is_said_in_one_sentence(loaded):
     said = [note for note in loaded("keep_every = 4").notes if note.startswith("Before anything else")]
     assert len(said) == 1 and said[0].endswith("; one row in 4 kept.") and "'reading.force'" not in said[0]
+
+
+def test_a_limit_on_one_side_alone_is_kept_to_a_millionth_of_itself(loaded):
+    """The position goes to 50 mm; what lies beyond by less is the rounding of the file."""
+    model = loaded.model
+
+    def limited(upper: float):
+        limit = Limit("travel", "travel", ("position",), "m", model.u[0], None, upper)
+        return loaded("", replace(model, limits=(limit,)))
+
+    assert limited(50e-3 * (1 - 0.5e-6)).records
+    with pytest.raises(InputError, match="the device allows no limit to"):
+        limited(50e-3 * (1 - 4e-6))
 
 
 def test_a_cut_off_that_the_kept_rows_cannot_hold_is_refused(loaded):
