@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_diagnosis_evidence import AXIS, axis_fitter
+from axis_records import AXIS, axis_fitter
 
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence.detectability import detectability
