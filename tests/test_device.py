@@ -37,8 +37,8 @@ def test_all_faults_are_listed_at_once_each_with_its_place_and_a_remedy(tmp_path
     assert "wrong unit" in found["actuator.young"] and "GPa" in found["actuator.young"]
     assert "did you mean 'lever_short'" in found["stage.lever_shrot"]
     assert "missing" in found["stage.lever_short"]
-    assert "impossible" in found["hexapod.poisson"]
-    assert "impossible" in found["hexapod.wire_length"]
+    assert "out of bounds; it must be >= 0 and <= 0.5" in found["hexapod.poisson"]
+    assert "out of bounds; it must be > 0 um" in found["hexapod.wire_length"]
     assert "no unit" in found["stage.stroke"]
     assert "'power' or 'voltage'" in found["actuator.drive"]
     assert len(found) == 7

@@ -212,9 +212,9 @@ def test_every_fault_is_said_at_once():
         )  # fmt: skip
     text = str(caught.value)
     for part in (
-        "parameters.a b: is a name", "parameters.odd: 'flub' is not a unit", "parameters.weight", "domain = 'moon'",
-        "axes.slide: '1 um' is not of the dimension of '60 deg'", "drive.motor: '0 V' is no size", "state.hot",
-        "force: asks for 'q'", "p has no 'wieght'; did you mean 'weight'?",
+        "parameters.a b: is not a name", "parameters.odd: 'flub' is not a unit", "parameters.weight", "domain = 'moon'",
+        "axes.slide: '1 um' is not of the dimension of '60 deg'", "drive.motor: '0 V' is not a size", "state.hot",
+        "force: has an argument 'q'", "p has no 'wieght'; did you mean 'weight'?",
         "damping_force: returns 'z'", "damping_force: returns no 'slide'",
         "mass: contains the symbol 'strange'", "pose: is missing", "'nope' is not a known effect",
     ):  # fmt: skip
@@ -226,7 +226,7 @@ def test_every_fault_is_said_at_once():
     [
         ({"mass": None}, "mass: is missing: damping_force needs"),
         ({"force": None}, "force: is missing"),
-        ({"acceleration": rhs()}, "force: and acceleration are given"),
+        ({"acceleration": rhs()}, "force: and acceleration are both given"),
         ({"force": lambda u: [u.motor, 1]}, "force: returns 2 numbers; 1 needed: swing"),
         ({"force": lambda u: "much"}, "force: returns str"),
         ({"force": lambda u: ca.MX.sym("m")}, "force: returns MX"),

@@ -1,4 +1,4 @@
-"""A single-axis stage of second order: m q'' + c q' + k q = k_f u, open loop or closed."""
+"""A stage with one axis and inertia, m q'' + c q' + k q = k_f u, open loop or closed loop."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ForceConstant = Annotated[Quantity, In("N/V", positive=True)] | Annotated[Quanti
 
 
 class Mechanics(Section):
-    """The moving part and its flexures; a stiffness of zero makes an axis that integrates."""
+    """The moving mass and its flexures; with zero stiffness the axis integrates."""
 
     domain: ClassVar[str] = "stage"
     tolerance: ClassVar[float | None] = 0.1
@@ -44,7 +44,7 @@ class Actuator(Section):
 class Loop(Section):
     """The position controller, u = k_p k_v (r - y) - k_v q' + k_i int(r - y) dt, clipped at the drive limit.
 
-    Computed at every sample and held until the next, as a digital controller does.
+    It is evaluated at every sample and its output held until the next, as in a digital controller.
     """
 
     domain: ClassVar[str] = "actuator"
@@ -61,7 +61,7 @@ class Loop(Section):
 
 
 class Axis(Device):
-    """Drive (or, in closed loop, reference) -> force -> displacement of one moving mass on flexures."""
+    """Drive, or reference of the closed loop -> force -> displacement of one mass on flexures."""
 
     kind: Literal["axis"]
     """Newton's second law of one moving mass."""

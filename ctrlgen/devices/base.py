@@ -1,4 +1,4 @@
-"""What every device description has: validated sections, quantities with sources, values in SI."""
+"""The parts of every device description: signals, limits, the physics of each kind of device, quantities in SI."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from ctrlgen.effects import Effect, EffectTable
 
 @dataclass(frozen=True)
 class Signal:
-    """A named vector of the model, in SI inside.
+    """A named vector of the model.
 
-    `channels` are its components' names, `units` the units a reader sees, `column` the
-    prefix of its columns in a CSV, `expr` (n,) the symbolic value, `scale` a typical size in SI per channel.
+    `label` is its name in reports, `channels` the names of its components, `units` those of reports, `column` the prefix
+    of its columns in a CSV file, `expr` (n,) the symbolic value in SI, `scale` a typical size of each channel in SI.
     """
 
     name: str
@@ -40,10 +40,10 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """lower <= expr <= upper, channel by channel; SI. None where a side is free.
+    """lower <= expr <= upper for each channel, SI; None where there is no bound.
 
-    A limit on anything but a model variable itself must be convex in the displacement, never negative, and zero
-    at home: the online controller restores it by shrinking the displacement toward home.
+    A limit on an expression that is not a variable of the model itself must be convex in the displacement, never negative,
+    and zero at home: the controller keeps it by scaling the displacement toward home.
     """
 
     name: str
@@ -160,7 +160,7 @@ class ImposedPhysics(DevicePhysics):
 
 
 class Device(Section):
-    """Base of every device: one subclass, one file, named by `kind` in the device file."""
+    """Base of every device: one subclass in one file, chosen by `kind` in the device file."""
 
     library: ClassVar[dict[str, type[Device]]] = {}
 
@@ -190,7 +190,7 @@ class Device(Section):
         raise NotImplementedError
 
     def remarks(self) -> list[str]:
-        """What a reader should know of the description, such as an equation used beyond its range."""
+        """Remarks on the description for the reader, such as an equation that is used outside its range."""
         return []
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
@@ -198,7 +198,7 @@ class Device(Section):
         yield from _leaves(self, "")
 
     def values(self, free: dict[str, ca.SX] | None = None) -> SimpleNamespace:
-        """SI numbers as nested namespaces; `free` replaces chosen paths by symbols."""
+        """SI numbers as nested namespaces; `free` gives symbols for some paths in place of their numbers."""
         return si_namespace(self, "", free or {})
 
 

@@ -1,4 +1,4 @@
-"""A flexure hinge as a section of any device file, such as
+"""A flexure hinge: a section that any device file may use, such as
 
 hinge = { kind = "circular", R = "1.1 mm", t = "0.84 mm", equation = "auto" }
 """
@@ -31,7 +31,7 @@ Group = Literal[
 
 
 class HingeEquations(Section):
-    """Whose equation gives each compliance, as in S3 Table 2; one name in place of the table means all three."""
+    """The authors whose equation gives each compliance, named as in S3 Table 2; one name instead of the table means all three."""
 
     alpha_z_per_M_z: Group = "auto"
     """Rotation per moment: authors of the equation."""
@@ -98,25 +98,28 @@ class Hinge(Section):
 
     @property
     def equations(self) -> dict[str, str]:
-        """The group asked for, per compliance."""
+        """The chosen group of authors for each compliance."""
         return {key: getattr(self.equation, key) for key in table.PLANAR}
 
     def notes(self) -> list[str]:
-        """What to know of each compliance whose equation S3 Table 3 does not recommend at this t/R."""
-        asked = self.equations.items()
-        return [note for key, group in asked if (note := table.pedigree(key, self.ratio, group, self.outside)[1])]
+        """One sentence on each compliance whose equation S3 Table 3 does not recommend at this t/R."""
+        chosen = self.equations.items()
+        return [note for key, group in chosen if (note := table.pedigree(key, self.ratio, group, self.outside)[1])]
 
     def geometry(
         self, p: SimpleNamespace, b: Scalar | None = None, E: Scalar | None = None, nu: Scalar | None = None
     ) -> table.Geometry:
-        """The hinge's numbers or symbols `p`, completed by the device's width `b` and material `E`, `nu`, SI."""
+        """The hinge with the numbers or symbols `p`, completed by the device's width `b` and material `E`, `nu`; SI. Raises
+        ValueError where one is missing."""
         own = {"b": p.b, "young": p.young, "poisson": p.poisson}
         given = {"b": b, "young": E, "poisson": nu}
-        whole = {key: given[key] if value is None else value for key, value in own.items()}
-        missing = [key for key, value in whole.items() if value is None]
+        complete = {key: given[key] if value is None else value for key, value in own.items()}
+        missing = [key for key, value in complete.items() if value is None]
         if missing:
             raise ValueError(f"hinge: {missing[0]} is missing; give it in the hinge or in the device")
-        return table.Geometry(p.R, p.t, whole["b"], whole["young"], whole["poisson"], p.shear_factor, at=self.ratio)
+        return table.Geometry(
+            p.R, p.t, complete["b"], complete["young"], complete["poisson"], p.shear_factor, at=self.ratio
+        )
 
     def planar(
         self, p: SimpleNamespace, b: Scalar | None = None, E: Scalar | None = None, nu: Scalar | None = None

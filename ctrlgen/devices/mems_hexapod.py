@@ -154,7 +154,7 @@ class Hexapod(Section):
 
 
 class MemsHexapod(Device):
-    """Heater power -> temperature -> bar force == stage force of the displacement -> pose.
+    """Heater power -> temperature -> bar force = restoring force of the stage at its displacement -> pose.
 
     Displacements and forces count positive in the direction in which the actuators push.
     """
@@ -196,11 +196,11 @@ class MemsHexapod(Device):
         return np.asarray(values) * np.array(self.push)
 
     def remarks(self) -> list[str]:
-        """Where the paper counts the other way."""
-        turned = [axis for axis, sign in zip(self.axes, self.push, strict=True) if sign < 0]
+        """Names the axes that the paper counts in the opposite direction."""
+        opposite = [axis for axis, sign in zip(self.axes, self.push, strict=True) if sign < 0]
         return (
-            [f"S1 eq. (19) counts {', '.join(turned)} against the push; here all count positive along it"]
-            if turned
+            [f"S1 eq. (19) counts {', '.join(opposite)} against the push; here all count positive along it"]
+            if opposite
             else []
         )
 

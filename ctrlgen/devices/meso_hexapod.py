@@ -18,7 +18,7 @@ Six = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
 
 class Hexapod(Section):
-    """Strut ends and platform, S0 Table 1. The four spacings follow from radii and angles; none enters an equation."""
+    """Strut ends and platform, S0 Table 1. The four spacings follow from radii and angles and enter no equation."""
 
     platform_radius: Length
     """r_a: radius of the circle of strut ends on the platform."""
@@ -45,7 +45,7 @@ class Hexapod(Section):
 
 
 class Directions(Section):
-    """The direction of each actuator's motion, as the constraint (S0 eq. 4) and as the Jacobian (eq. 9) has it."""
+    """Direction of each actuator's motion in the constraint (S0 eq. 4) and in the Jacobian (eq. 9)."""
 
     constraint: Six
     """As the position constraint has them (S0 eq. 4); the model does not use them."""
@@ -54,14 +54,14 @@ class Directions(Section):
 
 
 class Cube(Section):
-    """The reflective cube below the platform, which the instruments look at."""
+    """The reflective cube below the platform, at which the instruments measure."""
 
     depth: Length
     """h: the cube's centre stands h below the platform's (S0 eq. 16)."""
 
 
 class RatedTravel(Section):
-    """Largest rotation and translation of any axis that the paper states; no limit of the model, `travel` is."""
+    """Largest rotation and translation about any axis that the paper states; the model's limit is `travel`."""
 
     rotation: Annotated[Quantity, In("deg", positive=True)]
     """Largest rotation about any axis, either sign."""
@@ -88,7 +88,7 @@ class MesoHexapod(Device):
     """Largest displacement of an actuator, either sign; the limit of drives and stages."""
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
-        """Commanded actuator travel == stage displacement -> pose by the kinematic Jacobian (6)-(10), as printed."""
+        """Commanded actuator travel = stage displacement -> pose by the kinematic Jacobian (6)-(10), as printed."""
         J = meso_hexapod.kinematic_jacobian(p.hexapod, p.directions.jacobian)
         travel = self.travel.si
         drive = Signal("travel", "actuator travel", self.axes, ("um",) * 6, "u_", ca.SX.sym("u", 6), (travel,) * 6)

@@ -1,4 +1,4 @@
-"""Named vectors that a user's functions read, and what those functions return: asked, and checked with every fault."""
+"""Vectors with named components for the functions of a user's device, and the evaluation of those functions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Law: TypeAlias = Callable[..., Any] | ca.Function
 
 
 class Ports:
-    """A vector whose components have names: `u.motor`, `u["motor"]` and `u[0]`; `u.vector` is all of it (n,), SI."""
+    """A vector with named components, SI: `u.motor`, `u["motor"]` and `u[0]` are one, `u.vector` (n,) is all of them."""
 
     def __init__(self, what: str, names: Sequence[str], vector: ca.SX) -> None:
         self.what, self.names, self.vector = what, tuple(names), vector
@@ -24,7 +24,7 @@ class Ports:
         if name.startswith("__") or name in ("names", "what", "vector"):
             raise AttributeError(name)
         if name not in self.names:
-            raise AttributeError(f"{self.what} has no {name!r}; {near(name, self.names)}")
+            raise AttributeError(f"{self.what} has no {name!r}; {suggestion(name, self.names)}")
         return self.vector[self.names.index(name)]
 
     def __getitem__(self, key: str | int) -> ca.SX:
@@ -37,55 +37,55 @@ class Ports:
         return len(self.names)
 
 
-def near(name: str, names: Sequence[str]) -> str:
-    """'did you mean ...?', or what there is."""
+def suggestion(name: str, names: Sequence[str]) -> str:
+    """'did you mean ...?' for a name that is not one of `names`, or the list of them."""
     like = difflib.get_close_matches(name, names, n=1)
     return f"did you mean {like[0]!r}?" if like else f"it has {', '.join(names) or 'nothing'}"
 
 
-def ask(where: str, law: Law, offered: Mapping[str, Ports], names: Sequence[str]) -> tuple[ca.SX, list[Fault]]:
-    """What `law` returns for the vectors `offered`, one component for each of `names`; zeros with faults where it cannot.
+def evaluate_law(where: str, law: Law, offered: Mapping[str, Ports], names: Sequence[str]) -> tuple[ca.SX, list[Fault]]:
+    """(vector, faults): what `law` returns for the vectors `offered`, one component for each of `names`; zeros where it has faults.
 
-    A Python function is given the vectors that its arguments name; a `ca.Function` those that its inputs name, where
-    the name of a single parameter will do too.
+    A Python function is given the vectors that its arguments name, a `ca.Function` those that its inputs name; an input
+    may also have the name of one parameter. `where` is the law's name in the faults.
     """
     nothing = ca.SX.zeros(len(names), 1)
     try:
         read: Callable[..., tuple[list[ca.SX], list[Fault]]] = _inputs if isinstance(law, ca.Function) else _arguments
         given, faults = read(where, law, offered)
     except (TypeError, ValueError) as error:
-        return nothing, [Fault(where, f"is no function: {error}")]
+        return nothing, [Fault(where, f"is not a function that can be called: {error}")]
     if faults:
         return nothing, faults
     try:
         value = law(*given)
-    except Exception as error:  # a user's code may raise anything; it is told with its name and place
-        said = str(error).strip().splitlines()
-        return nothing, [Fault(where, f"raised {type(error).__name__}: {said[-1] if said else 'no message'}")]
+    except Exception as error:  # a user's code may raise anything
+        lines = str(error).strip().splitlines()
+        return nothing, [Fault(where, f"raised {type(error).__name__}: {lines[-1] if lines else 'no message'}")]
     if isinstance(law, ca.Function) and law.n_out() != 1:
         return nothing, [Fault(where, f"{law.name()} has {law.n_out()} outputs; give a function with one")]
     rows, faults = _rows(where, value, names)
     if not faults:
         known = {s.element_hash() for ports in offered.values() for s in ca.symvar(ports.vector)}
-        strange = sorted({s.name() for s in ca.symvar(rows) if s.element_hash() not in known})
-        faults = [Fault(where, f"contains the symbol {name!r}, which is none of its arguments") for name in strange]
+        foreign = sorted({s.name() for s in ca.symvar(rows) if s.element_hash() not in known})
+        faults = [Fault(where, f"contains the symbol {name!r}, which is not one of its arguments") for name in foreign]
     return (nothing, faults) if faults else (rows, [])
 
 
 def _arguments(where: str, law: Callable[..., Any], offered: Mapping[str, Ports]) -> tuple[list[Ports], list[Fault]]:
-    """The vectors that a Python function's arguments name."""
-    kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    """(vectors, faults): the vectors that the arguments of a Python function name."""
+    refused = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     wanted = [
         q for q in inspect.signature(law).parameters.values() if q.default is inspect.Parameter.empty or q.name in offered
     ]  # fmt: skip
-    unknown = [q.name for q in wanted if q.name not in offered or q.kind in kinds]
-    may = ", ".join(offered)
-    faults = [Fault(where, f"asks for {name!r}; its arguments may be {may}, by name and position") for name in unknown]
+    unknown = [q.name for q in wanted if q.name not in offered or q.kind in refused]
+    known = ", ".join(offered)
+    faults = [Fault(where, f"has an argument {name!r}; its arguments may be {known}") for name in unknown]
     return [offered[q.name] for q in wanted if q.name in offered], faults
 
 
 def _inputs(where: str, law: ca.Function, offered: Mapping[str, Ports]) -> tuple[list[ca.SX], list[Fault]]:
-    """The values that a CasADi function's inputs name."""
+    """(values, faults): the vectors or parameters that the inputs of a CasADi function name."""
     given, faults, numbers = [], [], offered["p"]
     for i in range(law.n_in()):
         name, size = law.name_in(i), law.size_in(i)
@@ -105,11 +105,11 @@ def _inputs(where: str, law: ca.Function, offered: Mapping[str, Ports]) -> tuple
 
 
 def _rows(where: str, value: Any, names: Sequence[str]) -> tuple[ca.SX, list[Fault]]:
-    """A vector (len(names),) from a mapping by name, a vector, a list or one number."""
+    """(vector (len(names),), faults) from what a law returned: a mapping by name, a vector, a list or one number."""
     nothing = ca.SX.zeros(len(names), 1)
     if isinstance(value, Mapping):
         faults = [
-            Fault(where, f"returns {k!r}, which is no name here; {near(str(k), names)}")
+            Fault(where, f"returns {k!r}, which is not one of its components; {suggestion(str(k), names)}")
             for k in set(value) - set(names)
         ]
         faults += [Fault(where, f"returns no {name!r}") for name in names if name not in value]
@@ -119,7 +119,7 @@ def _rows(where: str, value: Any, names: Sequence[str]) -> tuple[ca.SX, list[Fau
     if isinstance(value, Ports):
         value = value.vector
     if isinstance(value, ca.MX):
-        return nothing, [Fault(where, "returns MX; build it from the arguments it is given, which are SX")]
+        return nothing, [Fault(where, "returns MX; build the expression from its arguments, which are SX")]
     try:
         parts = [value] if isinstance(value, (ca.SX, ca.DM, int, float)) else list(value)
         rows = ca.densify(ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.SX(part)) for part in parts)))

@@ -63,7 +63,7 @@ class Piezo(Section):
 
 
 class RrrStage(Device):
-    """Stack voltage -> force on the input == stiffness of the input -> output displacement."""
+    """Stack voltage -> force on the input = restoring force of the input -> output displacement."""
 
     kind: Literal["rrr_stage"]
     """A planar stage of three links with three circular hinges each (S3)."""
@@ -106,20 +106,20 @@ class RrrStage(Device):
         return {"hinge1": self.hinge1, "hinge2": self.hinge2, "hinge3": self.hinge3}
 
     def remarks(self) -> list[str]:
-        """Which hinge equations stand outside their t/R range."""
+        """Remarks on hinge equations used outside their t/R range."""
         return [f"{name}: {note}" for name, hinge in self.hinges.items() for note in hinge.notes()]
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """Equations of `ctrlgen.physics` with this device's numbers.
 
-        The stack's own stiffness counts as the stage's, so that its force depends on the voltage alone:
-        F_b V/V_max = (C_in^-1 + k_p) d. The voltage limit keeps it below F_b. Stacks are taken as preloaded: that
-        none pulls on its input is not checked.
+        The stiffness of the stack counts as the stage's, so that its force depends on the voltage alone:
+        F_b V/V_max = (C_in^-1 + k_p) d. The voltage limit keeps it below F_b. The stacks are taken to be preloaded; it is
+        not checked that none pulls on its input.
         """
         k = stage(self, p)
         K_in, J = input_stiffness(self, k), (k.complete_J if self.inputs == "whole" else k.J)
         limit, stroke = self.piezo.voltage_limit.si, self.piezo.stroke.si
-        # The least that any voltages give: an input is pushed back a little when the others push.
+        # The lowest displacement under any voltages: an input moves back a little when the others push.
         lowest = float(np.minimum(input_per_voltage(self), 0).sum(axis=1).min()) * limit
         drive = Signal("voltage", "amplifier input", self.axes, ("V",) * 3, "u_", ca.SX.sym("u", 3), (limit,) * 3)
         state = Signal("stack_voltage", "stack voltage", self.axes, ("V",) * 3, "V_", ca.SX.sym("V", 3), (limit,) * 3)
@@ -158,7 +158,7 @@ class RrrStage(Device):
 def hinge_compliance(device: RrrStage, name: str, p: SimpleNamespace) -> Matrix:
     """[C] of one hinge by the equations that `device` names and the values `p`, (3, 3). Width and material are the sheet's.
 
-    Raises ValueError where some load would take energy out of it.
+    Raises ValueError where it is not positive definite: a load would gain energy from it.
     """
     m = p.material
     return device.hinges[name].planar(getattr(p, name), m.width, m.young, m.poisson)

@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict
 class Section(BaseModel):
     """A table of a device file. Unknown keys are faults; nothing changes after loading. The docstring below a key describes it.
 
-    `domain` is where a report places its numbers; `tolerance` is how far they may be off, relative, where the file
-    states no standard deviation: None where a number off its nominal would be a finding.
+    `domain` is the part of the device to which a report assigns its numbers; `tolerance` their relative standard deviation
+    where the file states none; None where any deviation from the file would be a finding.
     """
 
     domain: ClassVar[str] = "mechanism"

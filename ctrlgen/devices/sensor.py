@@ -1,9 +1,9 @@
-"""What reads a channel of the pose, as [[sensor]] tables of any device file, such as
+"""Sensors that read a channel of the pose: [[sensor]] tables of any device file, such as
 
 [[sensor]]
 kind = "displacement"
 at = "delta_x"
-model = "3316" # one of S2's sensors; any of its numbers may be given anew beside it
+model = "3316" # one of S2's sensors; any of its numbers can be overridden beside it
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from pydantic import Field, model_validator
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import In, Quantity, from_si, same_dimension
 from ctrlgen.devices.section import Section
-from ctrlgen.physics import sensor_models as chain
+from ctrlgen.physics import sensor_models
 
 NUMBERS = (
     "sensitivity", "gain", "bandwidth", "noise", "filtered_noise", "filter_cutoff", "offset_rate", "calibrated_at",
     "low", "high",
 )  # fmt: skip
 Volt = Annotated[Quantity, In("V")]
-Positive = Annotated[Quantity, In("V", positive=True)]
+PositiveVolt = Annotated[Quantity, In("V", positive=True)]
 
 
 def _given(section: Section) -> dict[str, Any]:
-    """The quantities that are written, in SI."""
+    """The quantities that the file gives, in SI."""
     fields = ((key, getattr(section, key)) for key in type(section).model_fields)
     return {key: value.si for key, value in fields if hasattr(value, "si")}
 
@@ -53,18 +53,16 @@ class Converter(Section):
             raise ValueError(f"low = {adc.low:g} V must be below high = {adc.high:g} V")
         return self
 
-    def adc(self) -> chain.Adc:
-        """The converter of the measuring chain."""
+    def adc(self) -> sensor_models.Adc:
+        """The converter of the measuring sensor_models."""
         given = _given(self)
-        return chain.Adc(**given | ({"bits": round(given["bits"])} if "bits" in given else {}))
+        return sensor_models.Adc(**given | ({"bits": round(given["bits"])} if "bits" in given else {}))
 
 
 @dataclass(frozen=True)
-class Figures:
-    """What a sensor gives, in the channel's SI unit: ADC step, peak-to-peak noise, the same filtered, range of readings.
-
-    `filtered` is None where no filter is known, `low` and `high` where the range has no end.
-    """
+class SensorFigures:
+    """Resolution and range of a sensor in the channel's SI unit: ADC step, peak-to-peak noise, the same `filtered`, the lowest
+    and highest reading. None where there is no filter or no limit of the range."""
 
     name: str
     step: float
@@ -75,7 +73,7 @@ class Figures:
 
 
 class _Mounted(Section):
-    """What every sensor has: where it stands, and the converter behind it."""
+    """What every sensor has: the channel that it reads, and the converter behind it."""
 
     at: str
     """Channel of the pose that is read, such as `delta_x`."""
@@ -100,7 +98,7 @@ class DisplacementSensor(_Mounted):
     be given.
     """
     home: Annotated[Quantity, In("um", low=0.0)] | None = None
-    """Where pose 0 stands, counted from the end of the range at which the voltage begins. Left out: in the middle."""
+    """Position of pose 0 in the measuring range, counted from the end of the range at which the voltage begins. Left out: in the middle."""
     sensitivity: Annotated[Quantity, In("um/V")] | None = None
     """Displacement per voltage at the ADC, amplifier included; negative where the voltage falls as the displacement
     grows.
@@ -109,9 +107,9 @@ class DisplacementSensor(_Mounted):
     """Gain of the amplifier, which `sensitivity` contains."""
     bandwidth: Annotated[Quantity, In("Hz", positive=True)] | None = None
     """Cut-off frequency of the analogue filter."""
-    noise: Positive | None = None
+    noise: PositiveVolt | None = None
     """Noise at the ADC, peak to peak, without the digital filter."""
-    filtered_noise: Positive | None = None
+    filtered_noise: PositiveVolt | None = None
     """Noise at the ADC, peak to peak, after the digital filter."""
     filter_cutoff: Annotated[Quantity, In("Hz", positive=True)] | None = None
     """Cut-off frequency of the digital low-pass filter."""
@@ -129,7 +127,9 @@ class DisplacementSensor(_Mounted):
         given = self._numbers()
         missing = [key for key in NUMBERS if key not in given]
         if self.model is None and missing:
-            raise ValueError(f"{', '.join(missing)} missing; give them, or model = one of {', '.join(chain.SENSORS)}")
+            raise ValueError(
+                f"{', '.join(missing)} missing; give them, or model = one of {', '.join(sensor_models.SENSORS)}"
+            )
         sensor, faults = self.sensor(), []
         if sensor.sensitivity == 0:
             faults.append("sensitivity must not be zero")
@@ -137,11 +137,11 @@ class DisplacementSensor(_Mounted):
             faults.append(f"low = {sensor.low:g} V must be below high = {sensor.high:g} V")
         elif sensor.low < sensor.adc.low or sensor.high > sensor.adc.high:
             faults.append(
-                f"the linear range {sensor.low:g} ... {sensor.high:g} V leaves the ADC's {sensor.adc.low:g} ... {sensor.adc.high:g} V"
+                f"the linear range {sensor.low:g} ... {sensor.high:g} V exceeds the ADC's {sensor.adc.low:g} ... {sensor.adc.high:g} V"
             )
-        elif self.start() > sensor.usable_range():
+        elif self.home_position() > sensor.usable_range():
             faults.append(
-                f"home = {self.start() * 1e6:.4g} um lies beyond the range of {sensor.usable_range() * 1e6:.4g} um"
+                f"home = {self.home_position() * 1e6:.4g} um is beyond the measuring range of {sensor.usable_range() * 1e6:.4g} um"
             )
         if given.keys() & {"noise", "filtered_noise", "filter_cutoff", "bandwidth"} or self.adc != Converter():
             try:
@@ -155,32 +155,32 @@ class DisplacementSensor(_Mounted):
     def _numbers(self) -> dict[str, float]:
         return {key: value for key, value in _given(self).items() if key in NUMBERS}
 
-    def sensor(self) -> chain.Sensor:
-        """The sensor of the measuring chain with these numbers."""
+    def sensor(self) -> sensor_models.Sensor:
+        """The model of the sensor with these numbers."""
         given: dict[str, Any] = self._numbers() | {"adc": self.adc.adc()}
         if self.model is not None:
-            return replace(chain.SENSORS[self.model], **given)
-        return chain.Sensor(name="sensor", **given)
+            return replace(sensor_models.SENSORS[self.model], **given)
+        return sensor_models.Sensor(name="sensor", **given)
 
-    def start(self) -> float:
-        """Place of pose 0 in the range [m]."""
+    def home_position(self) -> float:
+        """Position of pose 0 in the measuring range [m]."""
         return self.sensor().usable_range() / 2 if self.home is None else self.home.si
 
-    def figures(self) -> Figures:
-        """What this sensor gives at its calibration temperature."""
-        sensor, lever, start = self.sensor(), self.lever, self.start()
-        return Figures(
+    def figures(self) -> SensorFigures:
+        """Resolution and range at the calibration temperature."""
+        sensor, lever, home = self.sensor(), self.lever, self.home_position()
+        return SensorFigures(
             sensor.name,
             sensor.resolution_adc() / lever,
             sensor.resolution_noise(filtered=False) / lever,
             sensor.resolution_noise(filtered=True) / lever,
-            -start / lever,
-            (sensor.usable_range() - start) / lever,
+            -home / lever,
+            (sensor.usable_range() - home) / lever,
         )
 
 
 class InterferometerSensor(_Mounted):
-    """Michelson interferometer with a photodiode, S2 A.3.4; what is not given is S2's. Its reading is the fringe voltage."""
+    """Michelson interferometer with a photodiode, S2 A.3.4, with S2's numbers unless given. Its reading is the fringe voltage."""
 
     kind: Literal["interferometer"]
     """An interferometer whose fringe voltage is read."""
@@ -188,52 +188,56 @@ class InterferometerSensor(_Mounted):
     """Wavelength of the laser; half of it is one fringe. Left out: 632.8 nm."""
     mean: Volt | None = None
     """Mean of the fringe voltage. Left out: 5 V."""
-    amplitude: Positive | None = None
+    amplitude: PositiveVolt | None = None
     """Amplitude of the fringe voltage. Left out: 4 V."""
     noise: Annotated[Quantity, In("V", low=0.0)] | None = None
     """Standard deviation of the voltage's noise. Left out: 0.02 V."""
 
-    def interferometer(self) -> chain.Interferometer:
-        """The interferometer of the measuring chain with these numbers."""
+    def interferometer(self) -> sensor_models.Interferometer:
+        """The model of the interferometer with these numbers."""
         keys = ("wavelength", "mean", "amplitude", "noise")
-        return chain.Interferometer(**{key: value for key, value in _given(self).items() if key in keys})
+        return sensor_models.Interferometer(**{key: value for key, value in _given(self).items() if key in keys})
 
-    def figures(self) -> Figures:
-        """What the steepest part of a fringe gives: dV = 4 pi/lambda * amplitude * dd."""
+    def figures(self) -> SensorFigures:
+        """Resolution at the steepest part of a fringe, dV = 4 pi/lambda * amplitude * dd."""
         laser = self.interferometer()
         slope = 4 * pi * laser.amplitude / laser.wavelength * self.lever
-        noise = chain.PEAK_TO_PEAK * laser.noise / slope
-        return Figures("interferometer", self.adc.adc().step / slope, noise, None, None, None)
+        noise = sensor_models.PEAK_TO_PEAK * laser.noise / slope
+        return SensorFigures("interferometer", self.adc.adc().step / slope, noise, None, None, None)
 
 
 AnySensor = Annotated[DisplacementSensor | InterferometerSensor, Field(discriminator="kind")]
 
 
 def mounting_faults(sensors: Sequence[_Mounted], channels: Sequence[str], units: Sequence[str]) -> list[Fault]:
-    """What is wrong with where the sensors stand: a channel that is none, an arm too few or too many."""
-    faults, unit = [], dict(zip(channels, units, strict=True))
+    """Faults of the sensors' mounting: an unknown channel, an arm that is missing or has no meaning."""
+    faults, unit_of = [], dict(zip(channels, units, strict=True))
     for k, sensor in enumerate(sensors):
         where = f"sensor[{k}]"
-        if sensor.at not in unit:
+        if sensor.at not in unit_of:
             faults.append(Fault(f"{where}.at", f"{sensor.at!r} is not one of {', '.join(channels)}"))
             continue
-        turns = same_dimension(unit[sensor.at], "rad")
-        if turns and sensor.arm is None:
+        is_rotation = same_dimension(unit_of[sensor.at], "rad")
+        if is_rotation and sensor.arm is None:
             faults.append(
                 Fault(f"{where}.arm", f'is missing: {sensor.at} is a rotation; write for example arm = "20 mm"')
             )
-        if not turns and sensor.arm is not None:
+        if not is_rotation and sensor.arm is not None:
             faults.append(Fault(f"{where}.arm", f"has no meaning: {sensor.at} is a translation; leave it out"))
     return faults
 
 
 def describe(sensor: DisplacementSensor | InterferometerSensor, unit: str) -> str:
-    """One line of `sensor.figures()` in the channel's `unit`."""
-    found = sensor.figures()
+    """One line of text with `sensor.figures()` in the channel's `unit`."""
+    figures = sensor.figures()
 
     def text(value: float) -> str:
         return f"{from_si(value, unit):.4g}"
 
-    filtered = "" if found.filtered is None else f" ({text(found.filtered)} filtered)"
-    span = "no end of range" if found.low is None or found.high is None else f"{text(found.low)} ... {text(found.high)}"
-    return f"{sensor.at} [{unit}] by {found.name}: step {text(found.step)}, noise {text(found.noise)}{filtered} peak to peak, {span}"
+    filtered = "" if figures.filtered is None else f" ({text(figures.filtered)} filtered)"
+    span = (
+        "unlimited range"
+        if figures.low is None or figures.high is None
+        else f"{text(figures.low)} ... {text(figures.high)}"
+    )
+    return f"{sensor.at} [{unit}] by {figures.name}: step {text(figures.step)}, noise {text(figures.noise)}{filtered} peak to peak, {span}"

@@ -1,4 +1,4 @@
-"""An axis that is believed to go where it is told: reading = command."""
+"""An axis without dynamics, whose position is its command: reading = command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Travel = Annotated[Quantity, In("deg", positive=True)] | Annotated[Quantity, In(
 
 
 class Servo(Device):
-    """Command -> position, without force or time; linear or rotary by the unit of `travel`, the largest excursion."""
+    """Command -> position, without force or time; linear or rotary as the unit of `travel`, the largest excursion, says."""
 
     kind: Literal["servo"]
     """An axis whose reading equals its command."""

@@ -1,4 +1,4 @@
-"""An axis that is moved by a test machine (or followed in its own motion) while the force is read."""
+"""An axis whose motion is imposed by a test machine, or measured, while the force is read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ctrlgen.devices.base import Device, ImposedPhysics, Limit, Section, Signal
 
 
 class Mechanics(Section):
-    """What resists the motion; each may be zero."""
+    """Mass, damping and stiffness, each of which may be zero, and typical sizes of the test."""
 
     domain: ClassVar[str] = "stage"
     tolerance: ClassVar[float | None] = 1.0
@@ -40,7 +40,7 @@ class TestedAxis(Device):
     """What resists the motion."""
 
     def physics(self, p: SimpleNamespace) -> ImposedPhysics:
-        """Newton's second law, read for the force."""
+        """Newton's second law, solved for the force."""
         m, own = p.mechanics, self.mechanics
         stroke, speed, force = own.stroke.si, own.speed.si, own.force.si
         names = ("position", "velocity", "acceleration")

@@ -50,7 +50,7 @@ def simulate_sensors(
             volts = sensor.interferometer().read(reading * sensor.lever, rng, sensor.adc.adc())
             records.append(SensorReadings(sensor.at, time, volts, None))
             continue
-        s, start = sensor.sensor(), sensor.start()
+        s, start = sensor.sensor(), sensor.home_position()
         d = reading * sensor.lever + start
         if d.min() < 0 or d.max() > s.usable_range(temperature):
             unit, ends = signal.units[channel], (0.0 - start, s.usable_range(temperature) - start)

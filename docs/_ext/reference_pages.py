@@ -61,7 +61,7 @@ def type_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     if "x-unit" in schema:
         unit = schema["x-unit"]
         number = "count" if schema.get("x-whole") else "number" if unit == "1" else f'quantity, such as `"1 {unit}"`'
-        bounds = re.sub(r"(?<=\d) 1\b", "", schema.get("x-bounds", "")) if unit == "1" else schema.get("x-bounds", "")
+        bounds = schema.get("x-bounds", "")
         return number + (f", {bounds}" if bounds else "")
     if "const" in schema:
         return f"`{json.dumps(schema['const'])}`"

@@ -1,0 +1,148 @@
+"""The physics of a user's device from the laws that its user wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.errors import Fault
+from ctrlgen.core.units import Quantity, same_dimension, written_unit
+from ctrlgen.devices.base import BalancedPhysics, DevicePhysics, InertialPhysics, Limit, Signal
+from ctrlgen.devices.ports import Law, Ports, evaluate_law
+
+ARGUMENTS = {  # of each law
+    "force": "uxdvp", "restoring_force": "dp", "damping_force": "vp", "mass": "p", "acceleration": "uxdvp", "rates": "uxdvp", "pose": "dp",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class UserDescription:
+    """What the user gave: components {name: largest size} of each vector, domains and units of the parameters, the laws by
+    name, the typical `force` if any. Faults of the laws are collected as they are evaluated."""
+
+    name: str
+    axes: dict[str, Quantity]
+    drive: dict[str, Quantity]
+    reading: dict[str, Quantity]
+    state: dict[str, Quantity]
+    domains: dict[str, str]
+    units: dict[str, str]
+    laws: dict[str, Law]
+    force: Quantity | None = None
+    faults: list[Fault] = field(default_factory=list)
+
+    def components(self, law: str) -> tuple[str, ...]:
+        """Names of the components of what a law returns."""
+        return tuple({"rates": self.state, "pose": self.reading}.get(law, self.axes))
+
+    def evaluate(self, law: str, p: Ports, **vectors: ca.SX) -> ca.SX:
+        """The vector that `law` returns; zeros where the law is not given or has faults, which are collected."""
+        names = {"u": self.drive, "x": self.state, "d": self.axes, "v": self.axes}
+        what = {"u": "the drive", "x": "the state", "d": "the displacement", "v": "the velocity"}
+        if law not in self.laws:
+            return ca.SX.zeros(len(self.components(law)), 1)
+        allowed = [key for key in ARGUMENTS[law] if key == "p" or (key in vectors and vectors[key].numel())]
+        offered = {key: p if key == "p" else Ports(what[key], tuple(names[key]), vectors[key]) for key in allowed}
+        value, faults = evaluate_law(law, self.laws[law], offered, self.components(law))
+        self.faults.extend(fault for fault in faults if fault not in self.faults)
+        return value
+
+
+class PhysicsBuilder:
+    """Builds a device's physics from the user's laws with the parameters `p`."""
+
+    def __init__(self, description: UserDescription, p: Ports) -> None:
+        self.given, self.p = description, p
+        self.inertial = "mass" in description.laws
+        self.x = ca.SX.sym("x", len(description.state))
+        self.mass = description.evaluate("mass", p)
+
+    def applied_force(self, u: ca.SX, x: ca.SX, d: ca.SX, v: ca.SX) -> ca.SX:
+        """Force on the axes apart from restoring and damping force; an acceleration is taken as a force on the mass."""
+        if "acceleration" not in self.given.laws:
+            return self.given.evaluate("force", self.p, u=u, x=x, d=d, v=v)
+        return self.mass * self.given.evaluate("acceleration", self.p, u=u, x=x, d=d, v=v) + self.restoring_force(d)
+
+    def restoring_force(self, d: ca.SX) -> ca.SX:
+        """Force that pulls the axes home; of an acceleration its part at standstill without drive."""
+        if "acceleration" not in self.given.laws:
+            return self.given.evaluate("restoring_force", self.p, d=d)
+        n = len(self.given.axes)
+        still = {
+            "u": ca.SX.zeros(len(self.given.drive), 1),
+            "x": ca.SX.zeros(len(self.given.state), 1),
+            "v": ca.SX.zeros(n, 1),
+        }
+        displaced, home = (self.given.evaluate("acceleration", self.p, d=at, **still) for at in (d, ca.SX.zeros(n, 1)))
+        return self.mass * (home - displaced)
+
+    def size(self) -> float:
+        """Typical force: that of full drive and state at home, or the restoring force of full travel, or 1."""
+        n, given = len(self.given.axes), self.given
+        u, d, still = ca.SX.sym("u", len(given.drive)), ca.SX.sym("d", n), ca.SX.zeros(n if self.inertial else 0, 1)
+        laws = [self.applied_force(u, self.x, d, still), self.restoring_force(d)]
+        if given.faults:
+            return 1.0
+        law = ca.Function("law", [u, self.x, d], laws)
+        applied = (law(_sizes(given.drive), _sizes(given.state), 0)[0] - law(0, 0, 0)[0]).full()
+        restoring = law(0, 0, _sizes(given.axes))[1].full()
+        return float(next((size for f in (applied, restoring) if 0 < (size := np.abs(f).max()) < np.inf), 1.0))
+
+    def physics(self, size: float) -> DevicePhysics:
+        """The laws as a device's physics, `size` the typical force; faults of the laws are collected in the description."""
+        given, n, axes = self.given, len(self.given.axes), tuple(self.given.axes)
+        u, d, v = ca.SX.sym("u", len(given.drive)), ca.SX.sym("d", n), ca.SX.sym("v", n if self.inertial else 0)
+        for law, vectors in {
+            "damping_force": {"v": v},
+            "rates": {"u": u, "x": self.x, "d": d, "v": v},
+            "pose": {"d": d},
+        }.items():
+            given.evaluate(law, self.p, **vectors)  # collects its faults, so that all are listed together
+        self.applied_force(u, self.x, d, v), self.restoring_force(d)
+        travel = max(q.si for q in given.axes.values())
+        unit = written_unit(next(iter(given.axes.values())).text)
+        state = Signal("state", "state", tuple(given.state), _units(given.state), "x_", self.x, _sizes(given.state))
+        common: dict[str, Any] = dict(
+            axes=axes, components=tuple(given.reading), pose_units=_units(given.reading), pose_scale=_sizes(given.reading),
+            drive=Signal("drive", "drive", tuple(given.drive), _units(given.drive), "u_", u, _sizes(given.drive)),
+            state=state if given.state else None,
+            rest=(0.0,) * len(given.state), displacement_scale=travel, travel_unit=unit, force_scale=size,
+            force_unit=written_unit(given.force.text) if given.force else "N*m" if same_dimension(unit, "rad") else "N",
+            restoring_force=self.restoring_force, limits=self.limits,
+            pose=(lambda d: given.evaluate("pose", self.p, d=d)) if "pose" in given.laws else (lambda d: d),
+        )  # fmt: skip
+        if not self.inertial:
+            return BalancedPhysics(
+                **common, force=lambda u, x, d: self.applied_force(u, x, d, d[:0]),
+                rates=lambda x, u: given.evaluate("rates", self.p, u=u, x=x),
+            )  # fmt: skip
+        return InertialPhysics(
+            **common, mass=tuple(ca.vertsplit(self.mass)),
+            damping_force=(lambda v: given.evaluate("damping_force", self.p, v=v)) if "damping_force" in given.laws else None,
+            dynamics=lambda u, x, d, v: (self.applied_force(u, x, d, v), given.evaluate("rates", self.p, u=u, x=x, d=d, v=v)),
+        )  # fmt: skip
+
+    def limits(self, signal: SimpleNamespace) -> list[Limit]:
+        """Drives and displacements stay within their largest sizes."""
+        found = []
+        for what, ports, expr in (
+            ("drive", self.given.drive, signal.drive),
+            ("travel", self.given.axes, signal.displacement),
+        ):
+            for i, (name, q) in enumerate(ports.items()):
+                label, unit = f"{what} of {name}", written_unit(q.text)
+                found.append(Limit(f"{what}_{name}", label, (name,), unit, expr[i], -q.si, q.si))
+        return found
+
+
+def _units(ports: Mapping[str, Quantity]) -> tuple[str, ...]:
+    return tuple(written_unit(q.text) for q in ports.values())
+
+
+def _sizes(ports: Mapping[str, Quantity]) -> tuple[float, ...]:
+    return tuple(q.si for q in ports.values())
