@@ -290,7 +290,7 @@ def test_bode_draws_a_picture(tmp_path, suffix):
 @pytest.mark.parametrize(
     ("words", "says"),
     [(("--out", "b.pdf"), ".svg or .png"), (("--out", "b.svg", "--at", "delta_z"), "channel=value"),
-     (("--out", "b.svg", "--at", "delta_q=1um"), "delta_q"), (("--out", "b.svg", "--at", "delta_z=900um"), "not an admissible"),
+     (("--out", "b.svg", "--at", "delta_q=1um"), "delta_q"), (("--out", "b.svg", "--at", "delta_z=900um"), "not an equilibrium"),
      (("--out", "b.svg", "--at", "delta_z=3V"), "wrong unit")],
 )  # fmt: skip
 def test_bode_refuses_what_it_cannot_draw(words, says):
