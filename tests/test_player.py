@@ -129,6 +129,8 @@ def test_the_choice_is_the_shortest_within_tolerance_and_budget_and_both_are_rec
         and x.length <= TOLERANCE_SHARE * LENGTH_TOLERANCE and x.angle <= TOLERANCE_SHARE * ANGLE_TOLERANCE
     ]  # fmt: skip
     assert c.chosen.bytes == min(x.bytes for x in good) == c.curve.bytes(real)
+    assert c.chosen.remark == "fewest bytes"
+    assert all(x.chosen or x.remark == f"more bytes than the {c.chosen.kind}" for x in good)
 
 
 def test_a_smooth_circle_takes_a_thirtieth_of_the_table_and_a_short_path_the_table(compressions):
@@ -302,3 +304,4 @@ def test_more_drives_pieces_and_limits_cost_more_instructions():
     bent = spline.fit(np.hstack([np.abs(k - 77.5)] * 2), *free, np.full(2, 1e-3), False)
     assert len(one.pieces) == len(two.pieces) == 1 < len(bent.pieces)
     assert instructions(one, 0) < instructions(two, 0) < instructions(bent, 0) < instructions(bent, 1)
+    assert one.operations + 7 == two.operations < bent.operations
