@@ -213,7 +213,7 @@ def test_s3_case_2_without_shear_is_refused_by_name(ratio):
 def test_a_stretch_that_is_negative_is_refused():
     """C.7 falls below zero at t/R = 1.49, C.9 and C.6 stay positive."""
     mixed = {ALPHA: "smith", DELTA_Y: "paros_weisbord_simplified", DELTA_X: "paros_weisbord_simplified"}
-    with pytest.raises(ValueError, match=r"delta_x_per_F_x by S2 C\.7.*is -.*no compliance"):
+    with pytest.raises(ValueError, match=r"delta_x_per_F_x by S2 C\.7.*is -.*must be positive"):
         table.planar(geometry(1.6), mixed, "accept")
 
 

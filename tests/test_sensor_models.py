@@ -86,7 +86,7 @@ def test_noise_no_filter_could_leave_is_refused():
 
 
 def test_a_sensor_driven_out_of_the_adc_is_refused():
-    with pytest.raises(ValueError, match=r"leaves the ADC.*stay within 99\.9"):
+    with pytest.raises(ValueError, match=r"exceeds the ADC.*stay within 99\.9"):
         SENSORS["3316"].read(move(101 * UM, 20 * UM, 5e3), np.random.default_rng(0), CELSIUS + 25)
 
 
@@ -94,7 +94,7 @@ def test_noise_alone_may_drive_a_sensor_out_of_the_adc_at_its_lower_end():
     """Half of it peak to peak fits between the signal and the end, or it does not."""
     sensor, still = replace(SENSORS["3316"], noise=0.05, filtered_noise=0.03), np.zeros(1000)
     ends = [replace(sensor, low=sensor.adc.low + share * sensor.noise) for share in (0.1, 0.6)]
-    with pytest.raises(ValueError, match="leaves the ADC"):
+    with pytest.raises(ValueError, match="exceeds the ADC"):
         ends[0].read(still, np.random.default_rng(0))
     assert ends[1].read(still, np.random.default_rng(0)).size == 1000
 

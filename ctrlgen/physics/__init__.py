@@ -1,9 +1,7 @@
-"""The equations of the papers, one file per component, symbolic. Nothing here knows a device file.
+"""The equations of the papers, symbolic, one file per component; independent of device files.
 
-Order of reading: `screw` and `flexure` (the algebra and the elements), then the parts of the
-NIST MEMS hexapod from the heater to the platform: `thermal_actuator`, `xy_stage`, `hexapod`.
-`meso_hexapod` is S0's; `circular_hinge` has the equations of S2, `circular_hinge_table` where each holds; S3's stage is
-`piezo_stack` and `rrr_stage`.
-Arguments named `a`, `s`, `h` are namespaces of SI numbers or CasADi symbols with the names of
-the device file's sections.
+`screw` and `flexure` hold the algebra and the elements. The MEMS hexapod of S1, from the heater to the platform:
+`thermal_actuator`, `xy_stage`, `hexapod`. S0: `meso_hexapod`. S2: `circular_hinge`, with the range of each equation in
+`circular_hinge_table`; `sensor_models`. S3: `piezo_stack`, `rrr_stage`. `reference_models` are independent of all these.
+Arguments named `a`, `s`, `h` are namespaces of SI numbers or CasADi symbols with the names of the device file's sections.
 """

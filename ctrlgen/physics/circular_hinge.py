@@ -1,9 +1,9 @@
-"""In-plane compliances of a circular flexure hinge: equations C.1-C.24 of S2, each as printed or as mended.
+"""In-plane compliances of a circular flexure hinge: equations C.1-C.24 of S2, each as printed or as corrected.
 
-Radius `R`, neck thickness `t`, width `b` [m], `E` [Pa], `nu` [1]. The hinge reaches from x = -R to x = +R; the left
-end is held, forces act and displacements are read at (R, 0): delta_y/F_y therefore holds R^2 alpha_z/M_z, and
-delta_y/M_z = alpha_z/F_y = R alpha_z/M_z by symmetry. `circular_hinge_table` says where each may be used.
-Shear parts are what is to be added to delta_y/F_y.
+Radius `R`, neck thickness `t`, width `b` [m], `E` [Pa], `nu` [1]. The hinge extends from x = -R to x = +R; the left
+end is fixed, loads act and displacements are read at (R, 0): delta_y/F_y therefore contains R^2 alpha_z/M_z, and
+delta_y/M_z = alpha_z/F_y = R alpha_z/M_z by symmetry. `circular_hinge_table` gives the range of each.
+The shear parts are to be added to delta_y/F_y.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def c2(R: Scalar, t: Scalar, b: Scalar, E: Scalar, alpha: Scalar | None = None) 
     """delta_y/F_y without shear, C.2: R^2 (alpha_z/M_z) - 3/(2 E b) {1/(1+beta) - ... - pi}.
 
     {...} = (1+beta)/(1+beta)^2 - (2 + (1+beta)^2/k)/(1+beta) + [4(1+beta)/sqrt(k) - 2(1+beta)/k^(3/2)] A - pi.
-    `alpha` puts another alpha_z/M_z into the first term; the rest is the deflection with the rotation locked.
-    The print leaves open whether tan(theta_m/2) stands inside the arctangent (it does); at theta_m = pi/2 both agree.
+    `alpha` replaces alpha_z/M_z in the first term; the rest is the deflection with the rotation locked.
+    The print leaves open whether tan(theta_m/2) is inside the arctangent (it is); at theta_m = pi/2 both agree.
     Paros and Weisbord, full.
     """
     beta, k, A = _paros(R, t)
@@ -64,7 +64,7 @@ def c5(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
 def c6(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
     """delta_y/F_y, C.6: 9 pi/(2 E b) (R/t)^(5/2); C.2 as t/R -> 0, R^2 times C.5. Paros and Weisbord, simplified.
 
-    The locked deflection is lost in the limit: C.5 and C.6 together give a singular compliance matrix.
+    The deflection with locked rotation vanishes in the limit: C.5 and C.6 together give a singular compliance matrix.
     """
     return 9 * ca.pi / (2 * E * b) * (R / t) ** 2.5
 
@@ -160,7 +160,7 @@ def c15(R: Scalar, t: Scalar, b: Scalar, E: Scalar, nu: Scalar) -> Scalar:
     """alpha_z/M_z, C.15, t/R <= 0.07: 4 {1 + [1 + 0.1986 (2R/t)]^(1/2)}/[E b (t/2)^2] (1 - nu^2)/0.889. Tseytlin.
 
     The equation has 0.1986, the sentence below it 0.1984; the two differ by less than 0.05 %. That sentence's 0.215
-    for theta_m within +-0.9 rad is a hinge that is no half circle.
+    for theta_m within +-0.9 rad is a hinge that is not a half circle.
     """
     return _tseytlin(R, t, b, E, nu, 0.1986, 1.0)
 
@@ -176,7 +176,7 @@ def c17(R: Scalar, t: Scalar, b: Scalar, E: Scalar, nu: Scalar) -> Scalar:
 
 
 def _tseytlin(R: Scalar, t: Scalar, b: Scalar, E: Scalar, nu: Scalar, c: float, stiffer: float) -> Scalar:
-    # 0.889 is 1 - 0.333^2: the printed equations hold for nu = 0.333, the factor carries them to another.
+    # 0.889 is 1 - 0.333^2: the printed equations hold for nu = 0.333, the factor converts them to another.
     poisson = (1 - nu**2) / 0.889
     return 4 * (1 + (1 + c * 2 * R / t) ** 0.5) / (stiffer * E * b * (t / 2) ** 2) * poisson
 
@@ -240,8 +240,8 @@ def c22(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
 def c23(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
     """delta_y/F_y with the rotation locked, C.23: 1/{E b [0.0040 - 0.0727 q + 0.3417 q^2]}. Schotborgh et al.
 
-    Not the compliance of the other authors: theirs is this one plus R^2 alpha_z/M_z. The fit loses its meaning near
-    its minimum: at t/R = 0.05 it is twice the locked compliance of finite elements, from t/R = 0.2 on within 10 %.
+    The compliance of the other authors is this one plus R^2 alpha_z/M_z. The fit fails near the minimum of its
+    denominator: at t/R = 0.05 it is twice the locked compliance of finite elements, from t/R = 0.2 on within 10 %.
     """
     q = (t / (2 * R)) ** 0.5
     return 1 / (E * b * (0.0040 - 0.0727 * q + 0.3417 * q**2))
@@ -250,8 +250,8 @@ def c23(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
 def c24(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
     """delta_x/F_x, C.24: 1/{E b [0.0010 + 0.4256 q + 0.0824 q^2]}. Schotborgh et al.
 
-    Softer than the others by 20 % (t/R = 0.05) to 80 % (0.8): it counts in the
-    stretch of the links. Finite elements read on the outer faces of links of length R agree within 2 % up to t/R = 0.2,
+    More compliant than the others by 20 % (t/R = 0.05) to 80 % (0.8), because it includes the extension of the links.
+    Finite elements read on the outer faces of links of length R agree within 2 % up to t/R = 0.2,
     within 11 % at 0.8.
     """
     q = (t / (2 * R)) ** 0.5

@@ -1,6 +1,6 @@
-"""Which circular-hinge equation holds where: S3 Table 3, and one function that gives a compliance with its source.
+"""The range of t/R in which each circular-hinge equation holds, S3 Table 3, and compliances with their source.
 
-The t/R ranges are those in which S3 found an equation within about 5 % of finite elements.
+In these ranges S3 found an equation within about 5 % of finite elements.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from ctrlgen.physics.screw import Matrix, Scalar
 ALPHA, DELTA_Y, DELTA_X, LOCKED = "alpha_z_per_M_z", "delta_y_per_F_y", "delta_x_per_F_x", "delta_y_per_F_y_locked"
 PLANAR = (ALPHA, DELTA_Y, DELTA_X)
 UNITS = {ALPHA: "rad/(N*m)", DELTA_Y: "m/N", DELTA_X: "m/N", LOCKED: "m/N"}
-RECTANGLE = 6 / 5  # shear factor of a rectangular section
-LARGEST, SMALLEST = 0.8, 0.05  # t/R of the comparison in S3
+RECTANGULAR_SHEAR = 6 / 5  # shear factor of a rectangular section
+LARGEST, SMALLEST = 0.8, 0.05  # t/R that S3 compares with finite elements
+ROUNDING = 1e-12  # relative: a quotient or a difference this close to a bound counts as equal to it
 
 Range = tuple[float, float]
 Outside = Literal["refuse", "warn", "accept"]
 
 
 class HingeRangeError(ValueError):
-    """An equation was asked for outside the t/R in which it holds."""
+    """An equation is requested at a t/R outside the range in which it holds."""
 
 
 class HingeRangeWarning(UserWarning):
-    """An equation is used outside the t/R in which it is known to hold."""
+    """An equation is used at a t/R outside the range in which it is known to hold."""
 
 
 @dataclass(frozen=True)
@@ -64,16 +65,16 @@ class Geometry:
         return float(self.t) / float(self.R)
 
     def shear(self, own: float) -> Scalar:
-        """The shear factor asked for, else the equation's `own`."""
+        """The shear factor of the geometry if it gives one, else the equation's `own`."""
         return own if self.shear_factor is None else self.shear_factor
 
 
 @dataclass(frozen=True)
 class Equation:
-    """One compliance by one group of authors: its law, its number in S2, its t/R range and the range's source.
+    """One compliance by one group of authors: its law, its number in S2, its range of t/R and the source of the range.
 
-    `errors` are S3 Table 3's smallest, largest and mean difference to finite elements within the range, percent.
-    `within` None: no range is recommended.
+    `errors` are the smallest, largest and mean difference from finite elements within the range in S3 Table 3, percent.
+    `within` is None where no range is recommended.
     """
 
     compliance: str
@@ -87,12 +88,12 @@ class Equation:
     open_end: bool = False  # the range's upper end is excluded
 
     def holds(self, ratio: float) -> bool:
-        """Whether `ratio` = t/R lies in the range; the last bit of a quotient does not decide."""
+        """Whether `ratio` = t/R is in the range, up to the rounding of the quotient."""
         if self.within is None:
             return False
         low, high = self.within
-        below = ratio < high * (1 - 1e-12) if self.open_end else ratio <= high * (1 + 1e-12)
-        return low * (1 - 1e-12) <= ratio and below
+        below = ratio < high * (1 - ROUNDING) if self.open_end else ratio <= high * (1 + ROUNDING)
+        return low * (1 - ROUNDING) <= ratio and below
 
     @property
     def range_text(self) -> str:
@@ -104,7 +105,7 @@ class Equation:
 
 @dataclass(frozen=True)
 class Compliance:
-    """A compliance with its pedigree. `value` in SI; `note` says what to know when `holds` is False."""
+    """A compliance with its source: `value` in SI; `note` tells the reader why `holds` is False."""
 
     value: Scalar
     equation: Equation
@@ -118,14 +119,14 @@ class Compliance:
 
     @property
     def within(self) -> Range | None:
-        """The equation's t/R range."""
+        """The equation's range of t/R."""
         return self.equation.within
 
 
 def _tseytlin(g: Geometry) -> Scalar:
-    if g.ratio > c.TSEYTLIN_END * (1 + 1e-12):
+    if g.ratio > c.TSEYTLIN_END * (1 + ROUNDING):
         raise HingeRangeError(
-            f"C.15-C.17 (Tseytlin) end at t/R = {c.TSEYTLIN_END}, this hinge has {g.ratio:.4g}; "
+            f"C.15-C.17 (Tseytlin) end at t/R = {c.TSEYTLIN_END}, but this hinge has {g.ratio:.4g}; "
             f'use equation = "schotborgh" or "auto"'
         )
     branch = c.c15 if g.ratio <= c.TSEYTLIN_THIN else c.c16 if g.ratio <= c.TSEYTLIN_THICK else c.c17
@@ -142,15 +143,15 @@ def _with_shear(bending: Callable[..., Scalar], shear: Callable[..., Scalar]) ->
 
 
 def _lobontiu_y(g: Geometry) -> Scalar:
-    return c.c19(g.R, g.t, g.b, g.E) + c.c21(g.R, g.t, g.b, g.E, g.G, g.shear(RECTANGLE))
+    return c.c19(g.R, g.t, g.b, g.E) + c.c21(g.R, g.t, g.b, g.E, g.G, g.shear(RECTANGULAR_SHEAR))
 
 
 def _composed_y(g: Geometry) -> Scalar:
     bending = c.c2(g.R, g.t, g.b, g.E, alpha=c.c22(g.R, g.t, g.b, g.E))
-    return bending + c.c21(g.R, g.t, g.b, g.E, g.G, g.shear(RECTANGLE))
+    return bending + c.c21(g.R, g.t, g.b, g.E, g.G, g.shear(RECTANGULAR_SHEAR))
 
 
-OWN = "our finite elements, S3 gives none"
+OWN = "our finite elements; S3 gives no range"
 _PW, _WU, _LO, _SC = (
     "Paros and Weisbord (1965)",
     "Wu and Zhou (2002)",
@@ -177,27 +178,28 @@ EQUATIONS = (
     Equation(DELTA_X, "paros_weisbord_simplified", "C.7", _PW, _plain(c.c7), None, "S3 Table 3: not recommended"),
     Equation(DELTA_X, "lobontiu", "C.20", _LO, _plain(c.c20), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
     Equation(DELTA_X, "wu_zhou", "C.13", _WU, _plain(c.c13), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
-    Equation(DELTA_X, "schotborgh", "C.24", _SC, _plain(c.c24), None, "not in S3 Table 3; counts in the links' stretch"),
+    Equation(DELTA_X, "schotborgh", "C.24", _SC, _plain(c.c24), None, "not in S3 Table 3; includes the extension of the links"),
     Equation(LOCKED, "schotborgh", "C.23", _SC, _plain(c.c23), (0.2, 0.8), OWN),
 )  # fmt: skip
 BY_NAME = {(e.compliance, e.group): e for e in EQUATIONS}
 
 
 def best(compliance: str, ratio: float) -> Equation:
-    """The equation for this t/R with the smallest mean error in S3 Table 3.
+    """The equation with the smallest mean error in S3 Table 3 at this t/R.
 
-    Where the table recommends nothing that is printed: below t/R = 0.05 the closed forms, which finite elements
-    approach; above, the neighbouring range's best, and for delta_y/F_y C.2 with the better alpha_z/M_z in it (within
-    2.7 % of our finite elements). None of these `holds` by S3. Above t/R = 0.8 nobody has compared: refused.
+    Where the table recommends no printed equation: below t/R = 0.05 the closed forms, which finite elements approach;
+    above, the best of the neighbouring range, and for delta_y/F_y C.2 with a better alpha_z/M_z in it (within 2.7 % of our
+    finite elements). None of these `holds` according to S3. Raises HingeRangeError above t/R = 0.8, where there is no
+    comparison.
     """
     if compliance not in PLANAR:
         raise ValueError(f'there is no choice for {compliance}; name the equation, "schotborgh"')
     fitting = [(e.errors[2], e) for e in EQUATIONS if e.compliance == compliance and e.errors and e.holds(ratio)]
     if fitting:
         return min(fitting, key=lambda pair: pair[0])[1]
-    if ratio > LARGEST * (1 + 1e-12):
+    if ratio > LARGEST * (1 + ROUNDING):
         raise HingeRangeError(
-            f"no equation for {compliance} is known to hold at t/R = {ratio:.4g}; the comparison ends at {LARGEST}: "
+            f"no equation for {compliance} is known to hold at t/R = {ratio:.4g}; S3's comparison ends at {LARGEST}: "
             f"make the neck thinner or the radius larger"
         )
     if ratio < SMALLEST or compliance == DELTA_X:
@@ -206,12 +208,12 @@ def best(compliance: str, ratio: float) -> Equation:
 
 
 def named(compliance: str, group: str) -> Equation:
-    """The equation of one group of authors. Raises ValueError naming those who give this compliance."""
+    """The equation of one group of authors. Raises ValueError that names the groups which give this compliance."""
     if (compliance, group) in BY_NAME:
         return BY_NAME[compliance, group]
     known = ", ".join(e.group for e in EQUATIONS if e.compliance == compliance)
-    asked_locked = compliance == DELTA_Y and (LOCKED, group) in BY_NAME
-    locked = f" (C.23 has the rotation locked: {LOCKED})" if asked_locked else ""
+    only_locked = compliance == DELTA_Y and (LOCKED, group) in BY_NAME
+    locked = f" (C.23 has the rotation locked: {LOCKED})" if only_locked else ""
     raise ValueError(f"{group!r} gives no {compliance}{locked}; known here: auto, {known}")
 
 
@@ -221,44 +223,44 @@ def choose(compliance: str, ratio: float, equation: str = "auto", outside: Outsi
         raise ValueError(f"t/R = {ratio:.4g} must be positive")
     if equation == "auto":
         return best(compliance, ratio)
-    found = named(compliance, equation)
-    if outside == "refuse" and not found.holds(ratio):
+    chosen = named(compliance, equation)
+    if outside == "refuse" and not chosen.holds(ratio):
         raise HingeRangeError(
-            f"{found.number} ({found.authors}) for {compliance} holds at {found.range_text}, this hinge has "
-            f't/R = {ratio:.4g}; use equation = "auto", or outside = "warn" to use it all the same'
+            f"{chosen.number} ({chosen.authors}) for {compliance} holds at {chosen.range_text}, but this hinge has "
+            f't/R = {ratio:.4g}; use equation = "auto", or outside = "warn" to use it nevertheless'
         )
-    return found
+    return chosen
 
 
 def pedigree(name: str, ratio: float, equation: str = "auto", outside: Outside = "refuse") -> tuple[Equation, str]:
-    """The equation chosen for compliance `name` at this t/R, and what to know of it: '' where S3 Table 3 recommends it.
+    """(equation, note) for compliance `name` at this t/R; the note is '' where S3 Table 3 recommends the equation.
 
     Raises as `choose` does.
     """
-    found = choose(name, ratio, equation, outside)
-    if found.holds(ratio) and (equation != "auto" or found.errors is not None):
-        return found, ""
+    chosen = choose(name, ratio, equation, outside)
+    if chosen.holds(ratio) and (equation != "auto" or chosen.errors is not None):
+        return chosen, ""
     why = "the nearest; S3 Table 3 recommends no printed equation here" if equation == "auto" else "outside its range"
-    return found, f"{name} at t/R = {ratio:.4g} by {found.number} ({found.authors}), {why}: {found.range_text}"
+    return chosen, f"{name} at t/R = {ratio:.4g} by {chosen.number} ({chosen.authors}), {why}: {chosen.range_text}"
 
 
 def compliance(name: str, geometry: Geometry, equation: str = "auto", outside: Outside = "refuse") -> Compliance:
     """One compliance of the hinge, `name` of PLANAR or LOCKED, with its range and source.
 
-    A named equation outside its range raises, warns when `outside` is "warn", and is silent when that is "accept";
-    "auto" where the table recommends nothing warns unless that is accepted.
+    A named equation outside its range raises HingeRangeError, warns if `outside` is "warn", and is used without a warning
+    if it is "accept". "auto" warns where the table recommends no equation, unless `outside` is "accept".
     """
-    found, note = pedigree(name, geometry.ratio, equation, outside)
+    chosen, note = pedigree(name, geometry.ratio, equation, outside)
     if note and outside != "accept":
         warnings.warn(note, HingeRangeWarning, stacklevel=2)
-    return Compliance(found.law(geometry), found, not note, note)
+    return Compliance(chosen.law(geometry), chosen, not note, note)
 
 
 def end_compliance(x: Scalar, y: Scalar, alpha: Scalar, R: Scalar) -> Matrix:
     """Compliance of a hinge about its free end (R, 0), (delta_x, delta_y, alpha_z) per (F_x, F_y, M_z), shape (3, 3).
 
-    A notch of length 2R turns about its middle: a force across the end turns it by R alpha, a moment moves
-    the end by as much. Positive definite only where y > R^2 alpha. Source: S3 eq. (B.9), (B.13), (B.21).
+    A notch of length 2R rotates about its middle: a force across the end rotates it by R alpha, a moment displaces
+    the end by R alpha. Positive definite only where y > R^2 alpha. Source: S3 eq. (B.9), (B.13), (B.21).
     """
     return ca.vertcat(ca.horzcat(x, 0, 0), ca.horzcat(0, y, R * alpha), ca.horzcat(0, R * alpha, alpha))
 
@@ -266,23 +268,24 @@ def end_compliance(x: Scalar, y: Scalar, alpha: Scalar, R: Scalar) -> Matrix:
 def planar(geometry: Geometry, equation: str | Mapping[str, str] = "auto", outside: Outside = "refuse") -> Matrix:
     """Compliance (delta_x, delta_y, alpha_z) per (F_x, F_y, M_z) at the hinge's end (R, 0), shape (3, 3).
 
-    `equation` is one name for all three or a name for each of PLANAR. Refused when it is not positive definite,
-    that is when delta_y/F_y <= R^2 alpha_z/M_z: the two then come from theories that contradict each other.
+    `equation` is one name for all three or a name for each of PLANAR. Raises ValueError where the matrix is not positive
+    definite, delta_y/F_y <= R^2 alpha_z/M_z: the two then come from theories that contradict each other.
     """
-    asked = {key: equation if isinstance(equation, str) else equation.get(key, "auto") for key in PLANAR}
-    found = {key: compliance(key, geometry, asked[key], outside) for key in PLANAR}
+    chosen = {key: equation if isinstance(equation, str) else equation.get(key, "auto") for key in PLANAR}
+    found = {key: compliance(key, geometry, chosen[key], outside) for key in PLANAR}
     faults = [
-        f"{key} by {one.source} is {float(one.value):.4g} {UNITS[key]} at t/R = {geometry.ratio:.4g}, which is no compliance"
+        f"{key} by {one.source} is {float(one.value):.4g} {UNITS[key]} at t/R = {geometry.ratio:.4g}; "
+        "a compliance must be positive and finite"
         for key, one in found.items()
         if not isinstance(one.value, ca.SX) and not 0 < float(one.value) < float("inf")
     ]
     alpha, y, x = (found[key].value for key in PLANAR)
-    turned: Any = geometry.R**2 * alpha
-    # C.6 is R^2 C.5 but for shear; rounding must not decide whether a compliance is positive.
-    if not faults and not isinstance(y - turned, ca.SX) and float(y - turned) <= 1e-12 * float(y):
+    by_rotation: Any = geometry.R**2 * alpha
+    # Without shear C.6 is exactly R^2 C.5: rounding must not decide whether the matrix is positive definite.
+    if not faults and not isinstance(y - by_rotation, ca.SX) and float(y - by_rotation) <= ROUNDING * float(y):
         faults.append(
             f"the compliance is not positive definite: delta_y/F_y by {found[DELTA_Y].source} is {float(y):.4g} m/N, at "
-            f"least {float(turned):.4g} m/N follows from alpha_z/M_z by {found[ALPHA].source} at "
+            f"least {float(by_rotation):.4g} m/N follows from alpha_z/M_z by {found[ALPHA].source} at "
             f't/R = {geometry.ratio:.4g}; include shear (shear_factor), use equation = "auto", or take both from one source'
         )
     if faults:

@@ -1,6 +1,6 @@
 """The hexapod on three X-Y stages: geometry, strut stiffness, Jacobian, wire stress.
 
-Source: S1 section 5. The global frame stands at the centre of the platform's top face at home.
+Source: S1 section 5. The origin of the global frame is the centre of the platform's top face at home.
 Actuator order: d = (1X, 1Y, 2X, 2Y, 3X, 3Y) [m]; pose order: the twist (theta, delta).
 """
 
@@ -32,20 +32,20 @@ class Geometry:
     """Strut ends and stage frames, lengths in m.
 
     `platform` A_i and `base` B_i: six points each; `centre`: the three stage centres, midway
-    between the two B_i on a stage; `turn`: the three rotations from stage to global frame.
+    between the two B_i on a stage; `rotation`: the three rotations from stage to global frame.
     """
 
     platform: list[Matrix]
     base: list[Matrix]
     centre: list[Matrix]
-    turn: list[Matrix]
+    rotation: list[Matrix]
 
 
 def geometry(h: Any) -> Geometry:
     """A_i = Z(alpha_i) (r_a, 0, -t), B_i = Z(beta_i) (r_b, 0, -(H + t)). Source: S1 eq. (13), Table 2.
 
-    Printed B_z = -H would make the struts 5.077 mm long; H as the strut's vertical run gives the printed
-    5.4 mm.
+    The printed B_z = -H would make the struts 5.077 mm long; with H as the vertical extent of a strut they have the
+    printed 5.4 mm.
     """
     A = [
         ca.mtimes(rotation_z(angle), ca.vertcat(h.platform_radius, 0, -h.platform_thickness))
@@ -94,18 +94,18 @@ def _global_struts(g: Geometry, h: Any) -> list[Matrix]:
 
 
 def _pairs(struts: list[Matrix]) -> list[Matrix]:
-    """Stiffness of the two struts of each stage in parallel."""
+    """Stiffness of the two struts on each stage, in parallel."""
     return [parallel(struts[i] for i in range(6) if STAGE_OF_STRUT[i] == j) for j in range(3)]
 
 
 def _travel(g: Geometry, j: int) -> Matrix:
     """[M_j]: twist of stage j, at the global origin, per unit (d_jX, d_jY), shape (6, 2). Source: S1 eq. (15)."""
-    return ca.vertcat(ca.DM.zeros(3, 2), g.turn[j][:, :2])
+    return ca.vertcat(ca.DM.zeros(3, 2), g.rotation[j][:, :2])
 
 
 def _global_stages(g: Geometry, C_XY: Matrix) -> list[Matrix]:
     """The three stage compliances [C_j^XY] in the global frame."""
-    return [move(C_XY, g.turn[j], g.centre[j]) for j in range(3)]
+    return [move(C_XY, g.rotation[j], g.centre[j]) for j in range(3)]
 
 
 def kinematic_jacobian(h: Any) -> Matrix:
@@ -120,39 +120,39 @@ def kinematic_jacobian(h: Any) -> Matrix:
         n = _strut_frame(g, i)[0][:, 0]
         rows_p.append(ca.horzcat(ca.cross(g.platform[i], n).T, n.T))
         j = STAGE_OF_STRUT[i]
-        stage = ca.mtimes(n.T, g.turn[j][:, :2])
+        stage = ca.mtimes(n.T, g.rotation[j][:, :2])
         rows_d.append(ca.horzcat(*(stage if k == j else ca.DM.zeros(1, 2) for k in range(3))))
     return ca.solve(ca.vertcat(*rows_p), ca.vertcat(*rows_d))
 
 
 def second_order(d: Matrix, h: Any) -> Matrix:
-    """What finite turns of struts and platform add to the twist (6,) of `kinematic_jacobian`, to second order in `d` (6,) [m].
+    """What finite rotations of struts and platform add to the twist (6,) of `kinematic_jacobian`, second order in `d` (6,) [m].
 
-    A strut between the middles of its wires keeps its length l. With the first-order twist (theta, delta), a = A_i and
-    w = delta + theta x a - b_i, which lies across n_i: n_i . (delta' + theta' x a) = -n_i . theta x (theta x a)/2 - w.w/(2 l).
-    Left out: third order, (d/l)^2 of the motion. Source: |A_i + delta + ... - B_i - b_i| = l, expanded.
+    A strut keeps its length l between the middles of its wires. With the first-order twist (theta, delta), a = A_i and
+    w = delta + theta x a - b_i, normal to n_i: n_i . (delta' + theta' x a) = -n_i . theta x (theta x a)/2 - w.w/(2 l).
+    Neglected: third order, (d/l)^2 of the motion. Source: |A_i + delta + ... - B_i - b_i| = l, expanded.
     """
     g = geometry(h)
     first = ca.mtimes(kinematic_jacobian(h), d)
     theta, delta = first[:3], first[3:]
-    rows, rest = [], []
+    rows, right = [], []
     for i in range(6):
         R, length = _strut_frame(g, i)
         n, j = R[:, 0], STAGE_OF_STRUT[i]
         a = g.platform[i] - n * h.wire_length / 2
-        w = delta + ca.cross(theta, a) - ca.mtimes(g.turn[j][:, :2], d[2 * j : 2 * j + 2])
-        turned = ca.cross(theta, ca.cross(theta, a)) / 2
+        w = delta + ca.cross(theta, a) - ca.mtimes(g.rotation[j][:, :2], d[2 * j : 2 * j + 2])
+        second = ca.cross(theta, ca.cross(theta, a)) / 2
         rows.append(ca.horzcat(ca.cross(g.platform[i], n).T, n.T))
-        rest.append(-ca.dot(n, turned) - ca.dot(w, w) / (2 * (length - h.wire_length)))
-    return solve(ca.vertcat(*rows), ca.vertcat(*rest))
+        right.append(-ca.dot(n, second) - ca.dot(w, w) / (2 * (length - h.wire_length)))
+    return solve(ca.vertcat(*rows), ca.vertcat(*right))
 
 
 def jacobian(h: Any, C_XY: Matrix) -> Matrix:
     """J = [C_j^T (C_j^Hex + C_j^XY)^-1 M_j], j = 1..3: twist of the platform per stage displacement, shape (6, 6).
 
     C_j^T is the platform's compliance on the other two blocks (strut pair in series with its
-    stage), C_j^Hex = C_j^T + C_j^pair the same seen from stage j. All in the global frame, so
-    that the adjoints of eq. (17) are already applied. Source: S1 eq. (14)-(18).
+    stage), C_j^Hex = C_j^T + C_j^pair the compliance at stage j. All matrices are in the global frame, so that the
+    adjoints of eq. (17) are already applied. Source: S1 eq. (14)-(18).
     """
     g = geometry(h)
     pair = [inverse(K) for K in _pairs(_global_struts(g, h))]
@@ -169,7 +169,7 @@ def jacobian(h: Any, C_XY: Matrix) -> Matrix:
 def stage_loads(h: Any, C_XY: Matrix, J: Matrix) -> Matrix:
     """Force of the struts against each actuated axis per stage displacement [N/m], shape (6, 6).
 
-    In-plane components of W_j of `wire_loads`; the stage yields to them by C_j^XY W_j. Source: S1 eq. (16).
+    In-plane components of W_j of `wire_loads`; they deflect the stage by C_j^XY W_j. Source: S1 eq. (16).
     """
     g = geometry(h)
     pair, stage = [inverse(K) for K in _pairs(_global_struts(g, h))], _global_stages(g, C_XY)
@@ -177,7 +177,7 @@ def stage_loads(h: Any, C_XY: Matrix, J: Matrix) -> Matrix:
     for j in range(3):
         travel = ca.horzcat(*(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)))
         W = solve(series((pair[j], stage[j])), travel - J)
-        rows.append(ca.mtimes(g.turn[j][:, :2].T, W[:3, :]))
+        rows.append(ca.mtimes(g.rotation[j][:, :2].T, W[:3, :]))
     return ca.vertcat(*rows)
 
 
@@ -185,7 +185,7 @@ def stage_loads(h: Any, C_XY: Matrix, J: Matrix) -> Matrix:
 class WireLoads:
     """Section loads of the wires per unit of stage displacement.
 
-    `tension` (6, 6) [N/m] and `torque` (6, 6) [N m/m] are constant along a strut, one row a strut.
+    `tension` (6, 6) [N/m] and `torque` (6, 6) [N m/m] are constant along a strut, one row per strut.
     `bending_y`, `bending_z` (24, 6) [N m/m] at both ends of all twelve wires; row order: strut 1
     base wire (lower end, upper end), strut 1 platform wire (lower, upper), strut 2 ...
     """
@@ -228,8 +228,8 @@ def wire_loads(h: Any, C_XY: Matrix, J: Matrix) -> WireLoads:
 def wire_stress(d: Matrix, loads: WireLoads, h: Any) -> Matrix:
     """Von Mises stress sqrt((32 M/(pi d^3) + |N|/A)^2 + 3 (16 T/(pi d^3))^2) at 24 wire sections [Pa].
 
-    M = |(M_y, M_z)|, N the tension, T the torque; `d`: (6,) [m]. M^2 carries a floor of (1e-9 of the
-    allowed stress)^2, so that the derivative exists at home; it errs on the safe side.
+    M = |(M_y, M_z)|, N the tension, T the torque; `d`: (6,) [m]. (1e-9 of the allowed stress)^2 is added under
+    the root of the bending stress, so that its derivative exists at home; the stress is overestimated by that.
     """
     section = ca.pi * h.wire_diameter**3 / 32
     floor = (1e-9 * h.stress_limit) ** 2

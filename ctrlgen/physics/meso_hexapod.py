@@ -1,11 +1,11 @@
 """The meso-scale hexapod on three planar stages: strut ends, constraint, kinematic Jacobian, cube and platform.
 
-Source: S0 sections 2 and 4. The global frame stands at the geometrical centre of the platform at home.
+Source: S0 sections 2 and 4. The origin of the global frame is the geometrical centre of the platform at home.
 Actuator order, S0 eq. (6): U = (1x, 2x, 2y, 3x, 3y, 1y) [m]; pose order: the twist (theta, delta) [rad, m].
 
-Damaged in print: eq. (8) is the negative of the cross-product matrix, which the minus of eq. (7) would then undo,
-and its entry (3, 2) reads -A_y for -A_x; here [a x] b = a x b. Eq. (9) exchanges the two inputs of stage 3 against
-eq. (4). The numbers of eq. (10) and (15) are lost.
+Misprints: eq. (8) is the negative of the cross-product matrix, which would cancel the minus of eq. (7), and its entry
+(3, 2) reads -A_y instead of -A_x; here [a x] b = a x b. Eq. (9) exchanges the two inputs of stage 3 against eq. (4).
+The numbers of eq. (10) and (15) cannot be read.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def geometry(h: Any) -> tuple[Matrix, Matrix]:
 
 
 def home_lengths(h: Any) -> Matrix:
-    """|A_i^0 - B_i^0| [m], shape (6, 1): the strut lengths with which home meets eq. (2). Printed L = 240 mm."""
+    """|A_i^0 - B_i^0| [m], shape (6, 1): the strut lengths with which home fulfils eq. (2). Printed L = 240 mm."""
     A, B = geometry(h)
     return ca.sqrt(ca.sum1((A - B) ** 2)).T
 
@@ -56,7 +56,7 @@ def travel(directions: Sequence[Scalar], strut: int) -> Matrix:
 def spans(pose: Matrix, u: Matrix, h: Any, directions: Sequence[Scalar]) -> Matrix:
     """A_i - B_i [m], shape (3, 6), with A_i = R(theta) A_i^0 + delta and B_i = B_i^0 + M_i U.
 
-    R(theta) is the exact rotation by the vector theta, of which S0 eq. (3) keeps the first order.
+    R(theta) is the exact rotation by the vector theta, S0 eq. (3) its first order.
     """
     A, B = geometry(h)
     R = rotation_vector(pose[:3])
@@ -99,8 +99,8 @@ def commands(J: Matrix, T: Matrix) -> Matrix:
 def cube_to_platform(h: Scalar) -> Matrix:
     """[Ad]: T = [Ad] ^cT, hence [J^c] = [Ad] [J_cube], shape (6, 6). Source: S0 eq. (15), (16).
 
-    The cube's centre stands `h` [m] below the platform's, at (0, 0, -h). The printed matrix says the same;
-    the printed t = (0, 0, h) would give it the other sign.
+    The cube's centre is `h` [m] below the platform's, at (0, 0, -h), as in the printed matrix; the printed t = (0, 0, h)
+    has the opposite sign.
     """
     return adjoint(None, (0, 0, -h))
 
@@ -108,9 +108,9 @@ def cube_to_platform(h: Scalar) -> Matrix:
 def pose_from_actuators(
     U: np.ndarray, h: Any, directions: Sequence[float], lengths: Matrix | None = None
 ) -> np.ndarray:
-    """The pose at which every strut keeps its length: eq. (2) solved for (theta, delta), from home. U: (n, 6) [m].
+    """The poses (n, 6) [rad, m] at which every strut keeps its length: eq. (2) solved for (theta, delta). U: (n, 6) [m].
 
-    `lengths` are those at home unless given. Of the constraint's many solutions Newton finds the one next to home.
+    `lengths` are those at home unless given. Of the constraint's solutions Newton's method from home finds the nearest.
     Raises ValueError where it finds none.
     """
     pose, u, f = _symbols(h, directions, lengths)
@@ -120,16 +120,16 @@ def pose_from_actuators(
 def actuators_from_pose(
     T: np.ndarray, h: Any, directions: Sequence[float], lengths: Matrix | None = None
 ) -> np.ndarray:
-    """The actuator displacements that hold a pose: eq. (2) solved for U [m], from home. T: (n, 6) [rad, m].
+    """The actuator displacements (n, 6) [m] of given poses: eq. (2) solved for U. T: (n, 6) [rad, m].
 
-    The counterpart of `pose_from_actuators`. Raises ValueError where Newton finds none.
+    The inverse of `pose_from_actuators`. Raises ValueError where Newton's method from home finds no solution.
     """
     pose, u, f = _symbols(h, directions, lengths)
     return _solved(f, u, pose, np.atleast_2d(T), ("actuator inputs", "pose"))
 
 
 def _symbols(h: Any, directions: Sequence[float], lengths: Matrix | None) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Pose, input, and the constraint as a strut's excess length [m]: (|A-B|^2 - L^2) / 2L."""
+    """Symbols of pose and input, and the constraint as the excess length of each strut [m], (|A-B|^2 - L^2) / 2L."""
     pose, u = ca.SX.sym("pose", 6), ca.SX.sym("u", 6)
     L = home_lengths(h) if lengths is None else lengths
     return pose, u, constraint(pose, u, h, directions, L) / (2 * L)

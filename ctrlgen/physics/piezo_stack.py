@@ -1,4 +1,4 @@
-"""A piezo stack against a stiffness: blocked force, and the force it loses with its travel."""
+"""A piezo stack that works against a stiffness: blocked force, own stiffness, voltage. Linear, without hysteresis and creep."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ctrlgen.physics.screw import Scalar
 
 
 def stiffness(a: Any) -> Scalar:
-    """k_p = F_b/s [N/m]: blocking force over free stroke."""
+    """k_p = F_b/s [N/m]: blocking force divided by free stroke."""
     return a.blocking_force / a.stroke
 
 
 def blocked_force(V: Scalar, a: Any) -> Scalar:
-    """F_b V/V_max [N] at zero travel, `V` [V]. Linear: no hysteresis, no creep."""
+    """F_b V/V_max [N] at zero travel, `V` [V]."""
     return a.blocking_force / a.voltage_limit * V
 
 

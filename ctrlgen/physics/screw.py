@@ -2,9 +2,9 @@
 
 Order (S1 section 2.2): twist ``T = (theta_x, theta_y, theta_z, delta_x, delta_y, delta_z)``
 [rad, m], wrench ``W = (F_x, F_y, F_z, M_x, M_y, M_z)`` [N, N m], ``W = K T``, ``T = C W``.
-Because force stands before moment, the same adjoint carries twists and wrenches.
+Because force comes before moment, the same adjoint transforms twists and wrenches.
 
-Every function takes CasADi SX, DM or plain numbers, so the same line serves symbols and values.
+Every function takes CasADi SX, DM or plain numbers.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ def rotation_z(angle: Scalar) -> Matrix:
 def rotation_to(axis: Matrix) -> Matrix:
     """A rotation whose first column is the unit vector `axis`, shape (3, 3).
 
-    The other two columns are any right-handed completion; a body of revolution does not
-    care which. `axis` must not be parallel to x.
+    The other two columns are any right-handed completion, which makes no difference for a body of revolution.
+    `axis` must not be parallel to x.
     """
     y = ca.cross(axis, ca.DM([1, 0, 0]))
     y = y / ca.norm_2(y)
@@ -38,8 +38,8 @@ def rotation_to(axis: Matrix) -> Matrix:
 def rotation_vector(theta: Matrix) -> Matrix:
     """R = I + (sin a/a) S + (1 - cos a)/a^2 S^2, a = |theta| [rad], S = [theta x], shape (3, 3).
 
-    The turn by a about theta (Rodrigues). a^2 carries 1e-30, so that value and derivative stand at theta = 0;
-    1 - cos a = 2 sin^2(a/2) does not cancel.
+    The rotation by a about theta (Rodrigues). 1e-30 is added to a^2, so that value and derivative exist at theta = 0;
+    1 - cos a is written 2 sin^2(a/2), which does not cancel.
     """
     S = ca.skew(theta)
     a = ca.sqrt(ca.sumsqr(theta) + 1e-30)
@@ -50,7 +50,7 @@ def rotation_vector(theta: Matrix) -> Matrix:
 def adjoint(rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:
     """[Ad] = [[R, 0], [D R, R]], D the cross-product matrix of `position`, shape (6, 6).
 
-    Carries a twist or wrench from the local frame to the reference frame in which
+    Transforms a twist or wrench from the local frame to the reference frame in which
     `rotation` and `position` [m] are given. Source: S1 eq. (2).
     """
     R = ca.DM.eye(3) if rotation is None else rotation
@@ -66,7 +66,7 @@ def inverse_adjoint(rotation: Matrix | None = None, position: Sequence[Scalar] |
 
 
 def move(matrix: Matrix, rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:
-    """[Ad] [C] [Ad]^-1: a compliance or stiffness seen from another frame. Source: S1 eq. (1), (3)."""
+    """[Ad] [C] [Ad]^-1: a compliance or stiffness expressed in another frame. Source: S1 eq. (1), (3)."""
     return ca.mtimes([adjoint(rotation, position), matrix, inverse_adjoint(rotation, position)])
 
 
@@ -77,7 +77,7 @@ _PER_LENGTH = ca.diag(ca.DM([1, 1, 1, 1e-3, 1e-3, 1e-3]))
 def solve(matrix: Matrix, right: Matrix) -> Matrix:
     """x with `matrix` x = `right`, for a compliance or stiffness, shape (6, n).
 
-    Lengths in mm make forces and moments alike in size; in m, float64 keeps only half of its digits.
+    It is solved with lengths in mm, where forces and moments are of similar size; in m half of the digits are lost.
     """
     scaled = ca.mtimes([_LENGTH, matrix, _PER_LENGTH])
     return ca.mtimes(_PER_LENGTH, ca.solve(scaled, ca.mtimes(_LENGTH, right)))

@@ -1,4 +1,4 @@
-"""Displacement sensor, amplifier, ADC and interferometer of S2 Appendix A: simulate a recording, calibrate from one.
+"""Models of displacement sensor, amplifier, ADC and interferometer, S2 Appendix A: simulated recordings, calibration.
 
 reading [V] = displacement/sensitivity + offset rate (temperature - calibration temperature) + noise, then quantised.
 """
@@ -13,8 +13,9 @@ import numpy as np
 
 from ctrlgen.core.units import parse
 
-PEAK_TO_PEAK = 6.0  # standard deviations in a peak-to-peak figure; S2 does not say for how long it was watched
-BLOCKS = 10  # stretches of a recording; sensor noise must not be correlated much longer than one
+PEAK_TO_PEAK = 6.0  # standard deviations in a peak-to-peak figure; S2 does not state the duration of the measurement
+CLUSTERS = 10  # of a recording, between which sensor noise counts as uncorrelated
+SLOW_NOISE = 10.0  # cut-off frequency of the digital filter over the bandwidth of the noise that it passes whole
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Adc:
         return (self.high - self.low) / 2**self.bits
 
     def read(self, volts: np.ndarray) -> np.ndarray:
-        """Rounded to the step and clipped to the range [V]."""
+        """`volts` rounded to the step and clipped to the range [V]."""
         return np.clip(np.round(volts / self.step) * self.step, self.low, self.high - self.step)
 
 
@@ -40,8 +41,8 @@ class Adc:
 class Sensor:
     """A calibrated displacement sensor with its amplifier, SI; voltages are those at the ADC.
 
-    `sensitivity` Delta d/Delta V [m/V], negative where the voltage falls, with the amplifier's `gain` in it;
-    `bandwidth` [Hz] of the analogue filter;
+    `sensitivity` Delta d/Delta V [m/V] including the amplifier's `gain`, negative where the voltage falls as the
+    displacement grows; `bandwidth` [Hz] of the analogue filter;
     `noise`, `filtered_noise` [V] peak to peak without and with the digital low-pass of `filter_cutoff` [Hz];
     `offset_rate` Delta V/Delta T [V/K] against `calibrated_at` [K]; `low`, `high` [V] the linear range.
     """
@@ -77,38 +78,39 @@ class Sensor:
         return self.offset_rate * (temperature - self.calibrated_at)
 
     def usable_range(self, temperature: float | None = None) -> float:
-        """S2 eq. (A.4): [high - offset] sensitivity, counted from the shifted zero [m]; all of it when not warmer.
+        """S2 eq. (A.4): [high - offset] sensitivity, counted from the shifted zero [m]; all of it at lower temperatures.
 
-        S2 lets 22 to 22.5 degC pass as no change, which costs up to 0.8 % of the range. A colder room shifts the
-        zero below `low`; the ADC still reads it and the range is whole.
+        S2 neglects a change from 22 to 22.5 degC, which costs up to 0.8 % of the range. In a colder room the zero shifts
+        below `low`; the ADC still reads it and the whole range is usable.
         """
         lost = 0.0 if temperature is None else max(0.0, self.offset(temperature))
         return max(0.0, self.high - self.low - lost) * abs(self.sensitivity)
 
     def noise_parts(self) -> tuple[float, float]:
-        """Standard deviations [V] of the part the digital filter keeps whole and of the broadband part.
+        """Standard deviations [V] of the slow part of the noise, which passes the digital filter, and of the broadband part.
 
-        The two printed figures fix both: u^2 = s^2 + w^2, f^2 = s^2 k_s + w^2 k_w, with k what the digital filter
-        keeps of each part's variance. Noise that is all broadband would shrink nearly tenfold from 1 kHz to 10 Hz;
-        the eddy-current sensors' shrinks threefold, so most of what is left is slow.
+        Two figures determine them: u^2 = s^2 + w^2 without and f^2 = s^2 k_s + w^2 k_w with the filter, k the share of each
+        variance that the filter passes. Broadband noise alone would fall nearly tenfold from 1 kHz to 10 Hz; that of the
+        eddy-current sensors falls threefold, so most of the rest is slow. Raises ValueError where the figures contradict
+        each other.
         """
-        keep_slow, keep_broad = (self._kept(cutoff) for cutoff in (self._slow_cutoff, self.bandwidth))
+        pass_slow, pass_broad = (self._passed(cutoff) for cutoff in (self._slow_cutoff, self.bandwidth))
         u, f = self.noise / PEAK_TO_PEAK, self.filtered_noise / PEAK_TO_PEAK
-        slow = (f**2 - u**2 * keep_broad) / (keep_slow - keep_broad)
+        slow = (f**2 - u**2 * pass_broad) / (pass_slow - pass_broad)
         if not 0 <= slow <= u**2:
-            least, most = (PEAK_TO_PEAK * u * sqrt(keep) for keep in (keep_broad, keep_slow))
+            least, most = (PEAK_TO_PEAK * u * sqrt(passed) for passed in (pass_broad, pass_slow))
             raise ValueError(
                 f"{self.name}: filtered noise {self.filtered_noise:.3g} V must lie between {least:.3g} V and {most:.3g} V, "
-                f"what a {self.filter_cutoff:g} Hz filter leaves of {self.noise:.3g} V"
+                f"which is what a {self.filter_cutoff:g} Hz filter passes of {self.noise:.3g} V"
             )
         return sqrt(slow), sqrt(u**2 - slow)
 
     @property
     def _slow_cutoff(self) -> float:
-        return self.filter_cutoff / 10  # well inside the filter's band; S2 gives no spectrum
+        return self.filter_cutoff / SLOW_NOISE  # well inside the filter's band; S2 gives no spectrum
 
-    def _kept(self, cutoff: float) -> float:
-        """Share of the variance of first-order noise of bandwidth `cutoff` that the digital filter lets through."""
+    def _passed(self, cutoff: float) -> float:
+        """Share of the variance of first-order noise of bandwidth `cutoff` [Hz] that passes the digital filter."""
         impulse = np.zeros(round(20 * self.adc.rate / self._slow_cutoff))
         impulse[0] = 1.0
         response = _first_order(impulse, cutoff, self.adc.rate)
@@ -121,9 +123,10 @@ class Sensor:
         temperature: float | None = None,
         filtered: bool = False,
     ) -> np.ndarray:
-        """What the ADC records [V] of a displacement [m] sampled at its rate, from the near end of the linear range.
+        """The recording of the ADC [V] of a `displacement` (n,) [m] sampled at its rate, counted from the end of the linear range
+        where the voltage begins.
 
-        Raises ValueError where displacement or offset carry the signal out of the ADC.
+        Raises ValueError where the signal exceeds the ADC's range.
         """
         start = self.low if self.sensitivity > 0 else self.high
         true = start + self.gain * displacement / self.bare_sensitivity
@@ -132,7 +135,7 @@ class Sensor:
         margin = PEAK_TO_PEAK / 2 * sqrt(slow**2 + broad**2)
         if true.max() + margin > self.adc.high or true.min() - margin < self.adc.low:
             raise ValueError(
-                f"{self.name}: {true.min():.3g} to {true.max():.3g} V leaves the ADC's {self.adc.low:g} to {self.adc.high:g} V; "
+                f"{self.name}: {true.min():.3g} to {true.max():.3g} V exceeds the ADC's {self.adc.low:g} to {self.adc.high:g} V; "
                 f"move the sensor or stay within {1e6 * self.usable_range(temperature):.4g} um"
             )
         noise = slow * _low_pass_noise(true.size, self._slow_cutoff, self.adc.rate, rng)
@@ -152,14 +155,14 @@ class Interferometer:
     phase: float = 0.0
 
     def read(self, displacement: np.ndarray, rng: np.random.Generator, adc: Adc) -> np.ndarray:
-        """Photodiode voltage; one bright fringe per half wavelength, because the beam travels the way twice."""
+        """Photodiode voltage [V]; one bright fringe per half wavelength, because the beam travels the path twice."""
         angle = 4 * pi * displacement / self.wavelength + self.phase
         return adc.read(self.mean + self.amplitude * np.cos(angle) + self.noise * rng.standard_normal(angle.size))
 
 
 @dataclass(frozen=True)
 class CalibrationRun:
-    """Sensor and photodiode sampled together [V] at `rate` [Hz] while the target moved one way."""
+    """Voltages of sensor and photodiode, sampled together at `rate` [Hz] while the target moves in one direction."""
 
     sensor: np.ndarray
     photodiode: np.ndarray
@@ -168,7 +171,7 @@ class CalibrationRun:
 
 @dataclass(frozen=True)
 class Fringes:
-    """Sample numbers of the photodiode's extrema in order, and how many are bright and dark."""
+    """Sample numbers `at` of the photodiode's extrema, in order, and the numbers of bright and dark ones."""
 
     at: np.ndarray
     bright: int
@@ -201,7 +204,7 @@ class SensitivityStatistics:
 
     @property
     def sd(self) -> float:
-        """Standard deviation of one recording's sensitivity, with N - 1. S2 sums to n and divides by N - 1; n = N."""
+        """Standard deviation of the sensitivity of one recording, with N - 1."""
         return float(np.std([s.sensitivity for s in self.slopes], ddof=1))
 
     @property
@@ -211,7 +214,7 @@ class SensitivityStatistics:
 
     @property
     def max_deviation(self) -> float:
-        """S2 eq. (A.3) as a share, not percent."""
+        """S2 eq. (A.3), as a fraction."""
         return max_deviation(self.mean, self.sd)
 
 
@@ -242,8 +245,8 @@ def record(
 def find_fringes(photodiode: np.ndarray) -> Fringes:
     """Extrema of the fringe signal, each midway between two crossings of the mid level.
 
-    A crossing counts once the signal has gone on by a quarter of its amplitude, so that noise makes no fringe.
-    Raises ValueError where fewer than three extrema are found. The direction of motion cannot be told from it.
+    A crossing counts once the signal has passed the level by a quarter of its amplitude, so that noise makes no fringe.
+    The signal does not tell the direction of motion. Raises ValueError where fewer than three extrema are found.
     """
     low, high = np.percentile(photodiode, [2, 98])
     middle, margin = (low + high) / 2, (high - low) / 8
@@ -257,7 +260,9 @@ def find_fringes(photodiode: np.ndarray) -> Fringes:
         slope, level = np.polyfit(between - last, photodiode[between] - middle, 1)
         crossings.append(last + np.clip(-level / slope, 0, first - last))
     if len(crossings) < 4:
-        raise ValueError(f"{len(crossings)} half fringes are too few; move the mirror by at least two wavelengths")
+        raise ValueError(
+            f"{len(crossings)} half fringes in the photodiode's signal are too few, 4 are needed; move the mirror by at least two wavelengths"
+        )
     at = (np.array(crossings[1:]) + np.array(crossings[:-1])) / 2
     signs = state[decided[flips + 1]][:-1]
     return Fringes(at, int(np.sum(signs > 0)), int(np.sum(signs < 0)))
@@ -266,14 +271,14 @@ def find_fringes(photodiode: np.ndarray) -> Fringes:
 def calibrate_sensor(recording: CalibrationRun, wavelength: float) -> Slope:
     """Sensitivity from one recording: sensor voltage at each extremum against the distance counted in fringes.
 
-    Voltage is fitted on distance, since the voltage carries the noise. The uncertainty lets residuals be correlated
-    within 1/BLOCKS of the recording (cluster-robust), because sensor noise is slow. A recording must last a hundred
-    correlation times of that noise: one of three seconds understates the uncertainty by half.
+    Voltage is regressed on distance, because the voltage is the noisy one. The uncertainty is cluster-robust: residuals
+    may be correlated within 1/CLUSTERS of the recording, because sensor noise is slow. A recording must last a hundred
+    correlation times of that noise: one of three seconds underestimates the uncertainty by half.
     """
     fringes = find_fringes(recording.photodiode)
     d = np.arange(fringes.at.size) * wavelength / 4
     edges = (fringes.at[1:] + fringes.at[:-1]) / 2
-    # The mean over the samples around an extremum stands for the voltage there: motion is straight between fringes.
+    # The voltage at an extremum is the mean over the samples around it: between fringes the motion is nearly linear.
     sums = np.concatenate([[0.0], np.cumsum(recording.sensor)])
     first, last = np.ceil(edges[:-1]).astype(int), np.ceil(edges[1:]).astype(int)
     volts = (sums[last] - sums[first]) / (last - first)
@@ -282,21 +287,24 @@ def calibrate_sensor(recording: CalibrationRun, wavelength: float) -> Slope:
     x = d - d.mean()
     slope = float(x @ volts / (x @ x))
     residual = volts - volts.mean() - slope * x
-    parts = np.array_split(x * residual, BLOCKS)
-    spread = sqrt(sum(float(part.sum()) ** 2 for part in parts) * BLOCKS / (BLOCKS - 2)) / float(x @ x)
+    parts = np.array_split(x * residual, CLUSTERS)
+    spread = sqrt(sum(float(part.sum()) ** 2 for part in parts) * CLUSTERS / (CLUSTERS - 2)) / float(x @ x)
     sensitivity = 1 / slope
     return Slope(sensitivity, spread * sensitivity**2, float(np.sqrt(residual @ residual / (residual.size - 2))))
 
 
 def sensitivity_statistics(recordings: Sequence[CalibrationRun], wavelength: float) -> SensitivityStatistics:
-    """Statistics over repeated recordings; at least two."""
+    """Statistics over repeated recordings. Raises ValueError for fewer than two."""
     if len(recordings) < 2:
         raise ValueError("a standard deviation needs at least two recordings")
     return SensitivityStatistics(tuple(calibrate_sensor(recording, wavelength) for recording in recordings))
 
 
 def low_pass(signal: np.ndarray, cutoff: float, rate: float, settled: bool = True) -> np.ndarray:
-    """Second-order Butterworth low-pass. S2 names the cutoff only; first order would leave more than it prints."""
+    """`signal` (n,) after a second-order Butterworth low-pass; `settled`: as if its first value had lasted for ever.
+
+    S2 gives the cutoff only; a first-order filter would pass more noise than S2 states.
+    """
     from scipy.signal import (
         butter,
         lfilter,
@@ -309,7 +317,7 @@ def low_pass(signal: np.ndarray, cutoff: float, rate: float, settled: bool = Tru
 
 
 def _first_order(white: np.ndarray, cutoff: float, rate: float, before: float = 0.0) -> np.ndarray:
-    """White noise of unit variance coloured to first-order bandwidth `cutoff`, unit variance again."""
+    """White noise of unit variance through a first-order low-pass of `cutoff` [Hz], scaled to unit variance."""
     from scipy.signal import lfilter
 
     pole = exp(-2 * pi * cutoff / rate)
@@ -341,8 +349,8 @@ SENSORS = {
     "3316": _eddy("eddy-current 3316", "10.264 um/V", "5 mV", "1.8 mV", "89 mV/delta_degC"),
     "3317": _eddy("eddy-current 3317", "10.099 um/V", "3.5 mV", "1.0 mV", "82 mV/delta_degC"),
     "3338": _eddy("eddy-current 3338", "10.184 um/V", "5 mV", "1.5 mV", "159 mV/delta_degC"),
-    # Its filtered noise (0.3 mV, 3.5 nm) is below its own least significant bit (0.305 mV, 3.59 nm): only the digital
-    # filter's mean over many samples, dithered by the noise, can resolve that.
+    # Its filtered noise (0.3 mV, 3.5 nm) is below the least significant bit (0.305 mV, 3.59 nm): only the digital filter's
+    # mean over many samples, dithered by the noise, resolves it.
     "fibre": Sensor(
         "fibre-optic D20, near side",
         parse("11.770 um/V", "m/V"),
@@ -351,7 +359,7 @@ SENSORS = {
         noise=parse("4 mV", "V"),
         filtered_noise=parse("0.3 mV", "V"),
         filter_cutoff=parse("10 Hz", "Hz"),
-        offset_rate=0.0,  # A.6.2: set right by tuning the peak to 5 V
+        offset_rate=0.0,  # A.6.2: removed by tuning the peak to 5 V
         calibrated_at=parse("22 degC", "degC"),
         low=1.5,
         high=2.5,

@@ -29,7 +29,7 @@ def force(T: Scalar, a: Any) -> Scalar:
 def temperature_rate(T: Scalar, P: Scalar, a: Any) -> Scalar:
     """dT/dt = (R_th P - (T - T_amb)) / tau [K/s]: heated by P >= 0 [W], cooled passively.
 
-    The papers give no dynamics; a first-order lag is the reconstruction.
+    The papers give no dynamics; the first-order lag is our assumption.
     """
     return (a.thermal_resistance * P - (T - a.ambient)) / a.time_constant
 
@@ -37,7 +37,7 @@ def temperature_rate(T: Scalar, P: Scalar, a: Any) -> Scalar:
 def beam_stiffness(a: Any) -> Matrix:
     """[K^tb] of one beam, wrench per twist, shape (6, 6). Source: S1 eq. (5).
 
-    Entry (6, 5) is printed -0.22; it must equal (2, 3) = -0.0216.
+    Entry (6, 5) is printed as -0.22; by symmetry it equals (2, 3) = -0.0216.
     """
     return inverse(blade_compliance(a.beam_length, a.beam_width, a.thickness, a.young, a.poisson))
 
@@ -45,8 +45,7 @@ def beam_stiffness(a: Any) -> Matrix:
 def stiffness(a: Any) -> Matrix:
     """[K^t] of all 2 n beams about the bar's end, shape (6, 6). Source: S1 eq. (6).
 
-    Entries (1, 4), (2, 5) and (3, 6) reproduce the print; the moment entries do not follow
-    from the printed beam spacing.
+    Entries (1, 4), (2, 5) and (3, 6) are those of the paper; its moment entries do not follow from its beam spacing.
     """
     K = beam_stiffness(a)
     pitch = a.beam_gap + a.bar_width / 2

@@ -1,9 +1,9 @@
 """The X-Y stage: notch flexures, levers, and the force its actuators need. Source: S1 sections 3.2-4.
 
-One axis (the X stage; the Y stage is its copy turned by 90 degrees) moves along its local x.
-Four arms of length e_4 stand along y between ground and the moving plate: two are levers, driven
-through a notch at e_3 from their root, two only guide. Fig. 5 and 6, which fix where the arms
-stand, are lost; their place on the plate and the lever's axial compliance are reconstructions.
+One axis (the X stage; the Y stage is the same rotated by 90 degrees) moves along its local x. Four arms of length e_4
+along y connect ground and the moving plate: two are levers, driven through a notch at e_3 from their root, two only guide.
+Fig. 5 and 6, which show the positions of the arms, are not legible; these positions on the plate and the lever's axial
+compliance are our reconstruction.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ctrlgen.physics.screw import Matrix, Scalar, inverse, move, parallel, rotat
 def linear_force(d: Scalar, s: Any, a: Any) -> Scalar:
     """F^l = (K^t_14 / r + r N / (c e_4^2)) d [N] on the actuator bar, `d` [m] the stage displacement.
 
-    r = e_4/e_3 is the lever ratio, N the number of notches, each turning by d/e_4, and c = theta_z/M_z
+    r = e_4/e_3 is the lever ratio, N the number of notches, each rotating by d/e_4, and c = theta_z/M_z
     the rotational compliance of one. Source: S1 eq. (9), referred to the bar by virtual work.
     """
     r = s.lever_long / s.lever_short
@@ -36,7 +36,7 @@ def rotation(d: Scalar, s: Any) -> Scalar:
 def parasitic(d: Scalar, s: Any) -> Scalar:
     """delta_y = e_4 - sqrt(e_4^2 - d^2) [m]. Source: S1 eq. (10).
 
-    Written d^2 / (e_4 + sqrt(e_4^2 - d^2)), which does not cancel in single precision.
+    Computed as d^2 / (e_4 + sqrt(e_4^2 - d^2)), which does not cancel in single precision.
     """
     return d**2 / (s.lever_long + ca.sqrt(s.lever_long**2 - d**2))
 
@@ -44,8 +44,8 @@ def parasitic(d: Scalar, s: Any) -> Scalar:
 def nonlinear_force(d: Scalar, s: Any) -> Scalar:
     """F^n = 2 r k_a sin(phi) cos(phi) delta_y [N] on the bar, sin(phi) = d/e_4, r = e_4/e_3.
 
-    The axial stiffness k_a of one half stage, turned by phi, resists the parasitic shortening
-    delta_y of eq. (10). Source: S1 eq. (11), with K^n the turned axial stiffness.
+    The axial stiffness k_a of one half stage, rotated by phi, resists the parasitic shortening delta_y of eq. (10).
+    Source: S1 eq. (11), with K^n the rotated axial stiffness.
     """
     r = s.lever_long / s.lever_short
     sin_phi = d / s.lever_long
@@ -59,7 +59,7 @@ def force(d: Scalar, s: Any, a: Any) -> Scalar:
 
 
 def stiffened(d: Matrix, s: Any, a: Any) -> Matrix:
-    """c(0) - c(d) [m/N] of each axis: how much less a plate at `d` (n,) yields to a force along its axis than at home.
+    """c(0) - c(d) [m/N] of each axis: by how much a plate at `d` (n,) is less compliant along its axis than at home.
 
     c = r / (dF/dd), the force on the plate being 1/r of that on the bar. Source: S1 eq. (12), differentiated.
     """
@@ -74,8 +74,8 @@ def stiffened(d: Matrix, s: Any, a: Any) -> Matrix:
 def notch_compliance(s: Any) -> Matrix:
     """[C^c] of a circular notch about its free end, x along the flexure, shape (6, 6). Source: S1 eq. (7).
 
-    The coupling entries are printed twice with different roundings (7.10 and 7.11, -0.802 and
-    -0.801); reciprocity demands one value, and their mean is taken.
+    The coupling entries are printed twice with different rounding (7.10 and 7.11, -0.802 and -0.801); by reciprocity they
+    are equal, and the mean is taken.
     """
     n = s.notch
     z = (n.theta_z_per_F_y + n.delta_y_per_M_z) / 2
@@ -94,11 +94,11 @@ def notch_compliance(s: Any) -> Matrix:
 def _lever_compliance(s: Any, a: Any) -> Matrix:
     """Lever or guide beam between two notches, x along it, about its far end, shape (6, 6).
 
-    A blade of length e_4 - 2 r; its axial term is the one that gives an arm (beam and two
-    notches) half of k_a, because a half stage holds two arms side by side.
+    A blade of length e_4 - 2 r. Its axial compliance is chosen so that an arm (beam and two notches) has half of k_a,
+    because a half stage has two arms in parallel.
     """
     C = blade_compliance(s.lever_long - 2 * s.notch_radius, a.thickness, s.lever_width, a.young, a.poisson)
-    C = move(C, _QUARTER_TURN_X)  # the blade's thin side is z here
+    C = move(C, _QUARTER_TURN_X)  # the blade is thin along z
     axial = 2 / s.half_stage_stiffness - 2 * s.notch.delta_x_per_F_x
     return C + (axial - C[3, 0]) * _AXIAL
 
@@ -136,7 +136,7 @@ def axis_stiffness(s: Any, a: Any) -> Matrix:
     drive = series((half_actuator, about_centre))
     blocks = []
     for side in (1, -1):  # the arm runs from (x, side (b + e_4)) to (x, side b)
-        # In the arm's frame (x along the arm) the bar pushes along side y: the two blocks are mirror images.
+        # In the arm's frame (x along the arm) the bar pushes along +y or -y: the two blocks are mirror images.
         push = rotation_z(side * ca.pi / 2)
         driven_root = inverse(parallel((inverse(about_centre), move(inverse(drive), push, (s.lever_short, 0, 0)))))
         toward_plate = rotation_z(-side * ca.pi / 2)
@@ -148,7 +148,7 @@ def axis_stiffness(s: Any, a: Any) -> Matrix:
 def stage_compliance(s: Any, a: Any) -> Matrix:
     """[C^XY] = Ad^X C^X Ad^X^-1 + Ad^Y C^Y Ad^Y^-1 at the stage centre, shape (6, 6). Source: S1 eq. (8).
 
-    The Y stage is the X stage turned by 90 degrees, its centre e_8 away along the stage's y.
+    The Y stage is the X stage rotated by 90 degrees, with its centre at e_8 along the stage's y.
     """
     C_X = inverse(axis_stiffness(s, a))
     return series((C_X, move(C_X, rotation_z(ca.pi / 2), (0, s.centre_offset, 0))))

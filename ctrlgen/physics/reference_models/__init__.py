@@ -1,1 +1,1 @@
-"""Independent models that serve as the truth to compare with. They import nothing of ctrlgen's physics."""
+"""Independent reference models. They import nothing of ctrlgen, so that a comparison with them is a check."""

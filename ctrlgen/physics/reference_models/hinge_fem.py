@@ -1,6 +1,6 @@
 """A circular flexure hinge by finite elements: plane stress, biquadratic isoparametric quadrilaterals.
 
-The truth beside the hinge equations, so nothing of ctrlgen is imported. Needs scikit-fem.
+The reference for the hinge equations; it imports nothing of ctrlgen. Needs scikit-fem.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from skfem.helpers import ddot, sym_grad, trace
 
 
 class Reading(Enum):
-    """Between which places of the hinge, x = -R and x = +R, the relative motion is read.
+    """How the relative motion of the hinge's ends, x = -R and x = +R, is read.
 
-    This alone changes delta_x/F_x: SECTION exceeds CENTRE by 6 % at t/R = 0.05 and by 32 % at 0.8, BLOCKS by more.
+    The choice alone changes delta_x/F_x: SECTION exceeds CENTRE by 6 % at t/R = 0.05 and by 32 % at 0.8, BLOCKS by more.
     """
 
     CENTRE = "centre-line points of the end sections, mean rotation of the sections, elastic blocks beyond"
@@ -56,7 +56,7 @@ class Grid:
 def compliance(notch: Notch, reading: Reading = Reading.CENTRE, grid: Grid | None = None) -> np.ndarray:
     """(delta_x, delta_y, alpha_z) of the right end per (F_x, F_y, M_z) acting there, shape (3, 3), for E = b = R = 1.
 
-    Referred to the point (R, 0); the left end is held. For others, delta_x/F_x and delta_y/F_y scale with 1/(E b),
+    Referred to the point (R, 0); the left end is fixed. For other E, b, R: delta_x/F_x and delta_y/F_y scale with 1/(E b),
     delta_y/M_z with 1/(E b R), alpha_z/M_z with 1/(E b R^2).
     """
     notch = replace(notch, block=0.0) if reading is Reading.RIGID else notch
@@ -83,13 +83,13 @@ def compliance(notch: Notch, reading: Reading = Reading.CENTRE, grid: Grid | Non
     u = T @ motion
     left, right = (_section(basis, sideways, u, side, reading) for side in (-1.0, 1.0))
     relative = right - left
-    relative[1] -= 2 * left[2]  # the left section's rotation carries (1, 0) along
+    relative[1] -= 2 * left[2]  # the left section's rotation moves (1, 0) too
     return relative
 
 
 def mesh(notch: Notch, grid: Grid) -> skfem.MeshQuad2:
     """Columns of elements between the two arcs, then the blocks; both end sections are mesh lines."""
-    near = np.sqrt(notch.ratio)  # the bending lives within sqrt(t R) of the neck
+    near = np.sqrt(notch.ratio)  # bending is concentrated within sqrt(t R) of the neck
     angles = near * np.sinh(np.linspace(-1, 1, grid.along + 1) * np.arcsinh(np.pi / 2 / near))
     columns = list(angles)
     if notch.block:
@@ -127,7 +127,7 @@ def _stiffness(nu: float) -> skfem.BilinearForm:
 
 
 def _components(basis: skfem.Basis) -> np.ndarray:
-    """True where a degree of freedom is the y component."""
+    """(N,) True for the degrees of freedom that are y components."""
     y = np.zeros(basis.N, dtype=bool)
     for dofs in (basis.nodal_dofs, basis.facet_dofs, basis.interior_dofs):
         y[dofs[1::2]] = True
