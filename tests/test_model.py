@@ -8,7 +8,9 @@ from scipy.linalg import expm
 
 from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.devices.mems_hexapod import matrices
+from ctrlgen.effects import Effect
 from ctrlgen.model.discretisation import held_step, one_step_map
+from ctrlgen.model.effect_terms import REQUIREMENTS
 from ctrlgen.model.linearisation import equilibrium, linearise
 from ctrlgen.physics import thermal_actuator, xy_stage
 
@@ -227,3 +229,11 @@ def test_a_loop_is_closed_on_what_it_measures(tmp_path, measures):
         ends.append(simulate(model, np.full((4000, 1), 1e-5), 1e-3).signals["displacement"][-1, 0])
     assert ends[0] == pytest.approx(1e-5, rel=1e-3)
     assert ends[1] == pytest.approx(1e-5 / 1.1 if measures == "reading" else 1e-5, rel=1e-3)
+
+
+def test_an_effect_that_reads_what_the_device_lacks_is_refused_in_words():
+    """Damping on a stage without inertia; every word that a law may require has its phrase."""
+    device = effect_device({"kind": "quadratic_damping", "at": "1X", "damping": "1 N*s^2/m^2"})
+    with pytest.raises(InputError, match="quadratic_damping does not fit this device: it needs axes with inertia"):
+        build_model(device)
+    assert {word for law in Effect.library.values() for word in law.requires} <= REQUIREMENTS.keys()

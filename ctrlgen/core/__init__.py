@@ -1,1 +1,1 @@
-"""What everything else stands on: units at the border, errors, files in and out, parallel work."""
+"""The foundation of all packages: units, errors, files in and out, parallel work, results as JSON."""

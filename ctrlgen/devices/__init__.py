@@ -1,4 +1,4 @@
-"""Device descriptions: one kind, one file. `load_device` reads a device.toml."""
+"""Descriptions of devices, one kind in each file; `load_device` reads a device.toml."""
 
 from __future__ import annotations
 

@@ -1,1 +1,2 @@
-"""Device -> one symbolic model, and what is computed with it: one sample, a simulation, the inverse, the feedforward controller."""
+"""The symbolic model of a device and its uses: assembly, one sample, simulation, inverse, feedforward controller,
+linearisation, virtual sensors."""

@@ -15,8 +15,23 @@ from ctrlgen.core.units import same_dimension
 from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
 from ctrlgen.effects import Channel, Effect, Place, State, faults_at
 
-REACH = 10.0  # typical displacements beyond which a law reads the stage's force at that end: a search may try values
-# that far, no stage goes there, and restoring forces may have no value (a root of a negative number)
+# Typical displacements beyond which a law reads the stage's force at that end: a search may try values farther out, where
+# no stage goes and a restoring force may have no value (a root of a negative number).
+REACH = 10.0
+REQUIREMENTS = {  # the words of `Effect.requires`, in messages
+    "actuator": "an actuator, and not an imposed motion",
+    "ambient": "the temperature of the surroundings",
+    "bipolar": "a drive of both signs",
+    "force": "forces in N or N*m",
+    "heat": "heaters",
+    "sample_time": "a sample time",
+    "second_order_kinematics": "the second-order kinematics of the links",
+    "spatial": "a pose of six components",
+    "state": "heaters, whose temperature it reads",
+    "tangent_compliance": "the tangent compliance of the stages",
+    "unheated": "actuators without heaters",
+    "velocity": "axes with inertia or an imposed motion",
+}
 
 
 @dataclass
@@ -45,8 +60,7 @@ class EffectTerms:
     """Adds the effects' terms place by place, in the order of `Effect.order`, and collects their states.
 
     `displacement` (n_axes,), `velocity` (n_axes, or none where it is not known) and `acceleration` are the model's
-    symbols, `ambient` the rise of the surroundings [K]. Raises InputError with every effect or sensor that does not fit
-    the device.
+    symbols, `ambient` the rise of the surroundings [K]. `faults` lists the effects that do not fit the device.
     """
 
     def __init__(
@@ -66,13 +80,12 @@ class EffectTerms:
             self._place(k, effect, p.effect[k])
 
     def _place(self, k: int, effect: Effect, values: SimpleNamespace) -> None:
-        """Adds one member per channel on which the effect acts; notes its faults."""
+        """Adds one member for each channel on which the effect acts; collects its faults."""
         places = channels(self.physics, effect.place)
         names = [channel.name for channel in places]
         for need in sorted(effect.requires - available(self.physics, sample_time=self.sample_time)):
-            self.faults.append(
-                Fault(f"effect[{k}].kind", f"{effect.kind} needs {need}, which this device does not have")
-            )
+            what = f"{effect.kind} does not fit this device: it needs {REQUIREMENTS[need]}"
+            self.faults.append(Fault(f"effect[{k}].kind", what))
         chosen = range(len(names)) if effect.at == "all" else [i for i, c in enumerate(names) if c == effect.at]
         if not chosen:
             self.faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(names)}, all"))
@@ -180,7 +193,7 @@ def channels(physics: DevicePhysics, place: Place) -> list[Channel]:
 
 
 def available(physics: DevicePhysics, sample_time: float | None = None) -> frozenset[str]:
-    """What a device offers to an effect's law, in the words of `Effect.requires`."""
+    """What a device offers to an effect's law: words of `REQUIREMENTS`."""
     heated, balanced = _has_heaters(physics), isinstance(physics, BalancedPhysics)
     present = {
         "unheated": not heated, "heat": heated, "state": heated,

@@ -1,1 +1,2 @@
-"""Mathematical tools that know no physics: interval arithmetic, least squares, quantisation steps, batched evaluation."""
+"""Mathematics without physics: interval arithmetic, phi functions, Newton's method, least squares, spectral peaks, quantisation
+steps, batched evaluation."""

@@ -261,7 +261,8 @@ def find_fringes(photodiode: np.ndarray) -> Fringes:
         crossings.append(last + np.clip(-level / slope, 0, first - last))
     if len(crossings) < 4:
         raise ValueError(
-            f"{len(crossings)} half fringes in the photodiode's signal are too few, 4 are needed; move the mirror by at least two wavelengths"
+            f"{len(crossings)} half fringes in the photodiode's signal are too few, 4 are needed; "
+            "move the mirror by at least two wavelengths"
         )
     at = (np.array(crossings[1:]) + np.array(crossings[:-1])) / 2
     signs = state[decided[flips + 1]][:-1]
