@@ -25,6 +25,7 @@ from axis_records import (
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.held_out import held_out_deviance, refit_to_held_out
 from ctrlgen.diagnosis.estimation.isolated_outliers import isolated_outliers
 from ctrlgen.diagnosis.estimation.noise import estimate_noise, stationary_deviation
 from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
@@ -56,7 +57,7 @@ def test_play_is_followed_through_reversals_between_samples():
     assert fit.chi2 < 1.4 * fit.n  # the samples alone: 10 n
     n = sum(int(r.valid.sum()) for r in fitter.held_out_records)
     assert (
-        fitter.held_out_deviance(fit) < 1.4 * n
+        held_out_deviance(fitter, fit) < 1.4 * n
     )  # rests first: inside the gap the slopes by the start say nothing of it
 
 
@@ -357,8 +358,8 @@ def test_numbers_that_the_fit_leaves_open_are_not_held_against_a_structure():
     plain = sum(float(np.sum(fitter.whitened_residual(off, r) ** 2)) for r in fitter.held_out_records)
     poorly_determined = replace(off, J=off.J / 40)  # as if known 40 times worse
     assert plain > 1.5 * n
-    assert fitter.held_out_deviance(poorly_determined) < 0.7 * plain
-    assert fitter.held_out_deviance(fit) < fitter.held_out_deviance(off)
+    assert held_out_deviance(fitter, poorly_determined) < 0.7 * plain
+    assert held_out_deviance(fitter, fit) < held_out_deviance(fitter, off)
 
 
 def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
@@ -366,8 +367,8 @@ def test_a_number_that_nothing_holds_does_not_keep_the_others_where_they_are():
     fit = fitter.fit(Structure(AXIS))
     off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
     poorly_determined = replace(off, J=off.J / 40 * (np.arange(off.J.shape[1]) != 1))
-    assert fitter.held_out_deviance(poorly_determined) < 0.7 * fitter.held_out_deviance(replace(off, J=1e4 * off.J))
-    moved, *_ = fitter.refitted_to_held_out(poorly_determined)
+    assert held_out_deviance(fitter, poorly_determined) < 0.7 * held_out_deviance(fitter, replace(off, J=1e4 * off.J))
+    moved = refit_to_held_out(fitter, poorly_determined).fit
     assert moved.theta[1] == off.theta[1] and np.all(moved.theta[[0, 2, 3]] != off.theta[[0, 2, 3]])
 
 

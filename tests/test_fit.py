@@ -10,7 +10,9 @@ from axis_records import AXIS
 from conftest import DEVICES
 
 from ctrlgen import load_device
+from ctrlgen.diagnosis.estimation import held_out
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.held_out import HeldOutRefit
 from ctrlgen.diagnosis.estimation.robust_covariance import sandwich_over_model
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
@@ -85,13 +87,17 @@ def test_a_number_stands_once_in_a_structure_and_a_fringe_as_often_as_there_are_
 
 @pytest.mark.parametrize("objective, steps", [(2 * N * (1 - 1e-9), 4), (2 * N * (1 + 1e-9), 1)])
 def test_a_fit_that_leaves_less_than_twice_the_noise_is_refitted_to_the_held_out_records_in_four_steps(
-    objective, steps
+    objective, steps, monkeypatch
 ):
     tried = []
-    fitter = SimpleNamespace(
-        refitted_to_held_out=lambda fit, steps: tried.append(steps) or (fit, 3.0, 2.0), held_out_squares=lambda fit: 7.0
-    )
-    assert Fitter.held_out_deviance(fitter, SimpleNamespace(objective=objective, n=N)) == 12.0 and tried == [steps]
+
+    def refit(fitter, fit, steps):
+        tried.append(steps)
+        return HeldOutRefit(fit, penalty=3.0, log_det=2.0)
+
+    monkeypatch.setattr(held_out, "refit_to_held_out", refit)
+    fitter = SimpleNamespace(held_out_squares=lambda fit: 7.0)
+    assert held_out.held_out_deviance(fitter, SimpleNamespace(objective=objective, n=N)) == 12.0 and tried == [steps]
 
 
 def test_of_a_cause_that_starts_at_nothing_an_amplitude_is_scaled_by_a_millionth_of_its_range_a_shape_by_the_whole():

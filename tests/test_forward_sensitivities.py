@@ -110,7 +110,7 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
 class Counted:
     """A cubic whose slope nearly vanishes where the fit starts, so that its first steps go too far; keeps what is asked."""
 
-    bounds, most, k = (np.array([-9.0]), np.array([9.0])), np.array([np.inf]), 1
+    bounds, step_limit, k = (np.array([-9.0]), np.array([9.0])), np.array([np.inf]), 1
 
     def __init__(self):
         self.residuals, self.slopes = [], []

@@ -25,6 +25,7 @@ from battery.plant_hexapod import Faults, Hexapod
 from ctrlgen import load_device
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import Fitter
+from ctrlgen.diagnosis.estimation.held_out import held_out_deviance
 from ctrlgen.diagnosis.estimation.noise import estimate_noise
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses import priors
@@ -250,7 +251,7 @@ def recover(fitter: Fitter, device: Device, effect: str, planted: Planted) -> No
     fit = fitter.fit(Structure(device).with_cause(cause, best.start))
     rough, held = cause.prior.model_form_error**2, sum(int(r.valid.sum()) for r in fitter.held_out_records)
     assert fit.chi2 < noisy(fit.n) + rough * nominal.chi2 and fit.chi2 < 0.3 * nominal.chi2
-    assert fitter.held_out_deviance(fit) < noisy(held) + rough * fitter.held_out_deviance(nominal)
+    assert held_out_deviance(fitter, fit) < noisy(held) + rough * held_out_deviance(fitter, nominal)
     sd = np.sqrt(np.diag(fit.covariance))
     found = {u.name: (fit.theta[k], sd[k]) for k, u in enumerate(fit.structure.free_parameters) if u.cause == 0}
     for parameter, truth in planted.truth.items():

@@ -10,6 +10,7 @@ from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, fitter_of, move,
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.held_out import held_out_deviance
 from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise_colour
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.structure import Structure
@@ -153,7 +154,7 @@ def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, pa
     nominal = replace(fitter.fit(Structure(AXIS)), chi2=1e7)
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
     left = fit.n + share**2 * (nominal.objective - fit.n)
-    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(fit), 0.0)
+    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), held_out_deviance(fitter, fit), 0.0)
     bare = CandidateModel(nominal, 1e9, 0.0)
     search = SearchResult(bare, chosen, (bare,), ((chosen,) * rivals,), (), None)
     assert verdict(fitter, search, ResidualTests((1.2,), {}, passed)) == says
@@ -172,7 +173,7 @@ def test_a_law_that_says_how_rough_it_is_may_leave_as_much(share, says):
     bare = CandidateModel(replace(fitter.fit(Structure(AXIS)), chi2=1e7), 1e7, 0.0)
     fit = fitter.fit(Structure(AXIS).with_cause(drift, {"rate": 1e-7}), steps=0)
     left = fit.n + share**2 * (bare.fit.objective - fit.n)
-    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), fitter.held_out_deviance(bare.fit), 0.0)
+    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), held_out_deviance(fitter, bare.fit), 0.0)
     search = SearchResult(bare, chosen, (bare,), ((),), (), None)
     assert verdict(fitter, search, ResidualTests((1.2,), {}, False)) == says
 
@@ -250,14 +251,14 @@ def test_numbers_that_foresee_worse_than_none_are_not_the_whole_answer():
     far = replace(fit, theta=fit.theta * np.where([u.cause is None for u in fit.structure.free_parameters], 1.0, 4.0))
     bare = CandidateModel(nominal, 1e9, 0.0)
     for of, says in ((fit, EXPLAINED), (far, PARTLY)):  # as where one touch in the record to fit tells little of a stop
-        search = SearchResult(bare, CandidateModel(of, fitter.held_out_deviance(fit), 0.0), (bare,), ((),), (), None)
+        search = SearchResult(bare, CandidateModel(of, held_out_deviance(fitter, fit), 0.0), (bare,), ((),), (), None)
         assert verdict(fitter, search, ResidualTests((1.0,), {}, True)) == says
 
 
 class Kinked:
     """Two numbers; the slope by the second, which promises much, is that of another place."""
 
-    k, most, bounds = 2, np.full(2, np.inf), (np.full(2, -1e3), np.full(2, 1e3))
+    k, step_limit, bounds = 2, np.full(2, np.inf), (np.full(2, -1e3), np.full(2, 1e3))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         return np.array([x[0] - 7.0, 5.0 + abs(x[1])])
@@ -276,7 +277,7 @@ class Linear:
     def __init__(self, A, b, low, high, most=np.inf) -> None:
         self.A, self.b, self.bounds = np.array(A), np.array(b), (np.array(low), np.array(high))
         self.k = len(low)
-        self.most = np.broadcast_to(most, (self.k,))
+        self.step_limit = np.broadcast_to(most, (self.k,))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         return self.A @ x - self.b
@@ -298,7 +299,7 @@ def test_a_number_that_meets_its_bound_stops_there_and_the_others_go_on():
 class Product:
     """A force constant and a gain, of which the readings know the product and the data sheet the first."""
 
-    k, most, bounds = 2, np.full(2, np.inf), (np.full(2, -9.0), np.full(2, 9.0))
+    k, step_limit, bounds = 2, np.full(2, np.inf), (np.full(2, -9.0), np.full(2, 9.0))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         return np.array([3e4 * (x[0] * (1 + x[1]) - 1.2), (x[0] - 1) / 0.02])

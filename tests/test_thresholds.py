@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from axis_records import AXIS
 from scipy import stats
 
+from ctrlgen.diagnosis.estimation import residual_tests
 from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.held_out import HeldOutRefit
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.residual_tests import cross_correlation, run_residual_tests
+from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests, cross_correlation, run_residual_tests
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
@@ -261,6 +264,13 @@ def test_what_a_law_that_is_right_to_a_hundredth_may_leave_is_doubtful(sd, times
     assert not w.within_model_form_error(fitted(2 * 190.0, 190.0 / 2, GAIN), current, 0)  # a gain has its own form
 
 
+def residual_tests_of(fitter, fit, penalty: float = 0.0) -> ResidualTests:
+    """With parameters that the held-out records leave as they were, at a given penalty."""
+    refit = HeldOutRefit(fit, penalty, 0.0)
+    with patch.object(residual_tests, "refit_to_held_out", lambda *_: refit):
+        return run_residual_tests(fitter, fit)
+
+
 def judged(
     white: np.ndarray,
     *,
@@ -281,10 +291,9 @@ def judged(
         noise=noise,
         held_out_records=[held],
         recording=recording,
-        refitted_to_held_out=lambda fit, _: (fit, price, 0.0),
         whitened_residual=lambda fit, r: white,
     )
-    return run_residual_tests(fitter, fit)
+    return residual_tests_of(fitter, fit, price)
 
 
 def sized(ratio: float, n: int = 20000, n_y: int = 1) -> np.ndarray:
@@ -404,8 +413,7 @@ def test_tails_at_rest_that_noise_has_not_are_no_noise(tails, moves):
         noise=noise,
         held_out_records=[held],
         recording=recording,
-        refitted_to_held_out=lambda fit, _: (fit, 0.0, 0.0),
         whitened_residual=lambda fit, r: r.observed,
     )
-    found = run_residual_tests(fitter, SimpleNamespace(n=10**6, theta=np.zeros(0), chi2=1e6))
+    found = residual_tests_of(fitter, SimpleNamespace(n=10**6, theta=np.zeros(0), chi2=1e6))
     assert found.restless == (("reading.axis",) if moves else ()) and found.passed == (not moves)

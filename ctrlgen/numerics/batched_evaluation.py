@@ -1,30 +1,33 @@
-"""CasADi functions mapped over samples, on NumPy's own memory: `Function.__call__` goes through a Python list of numbers."""
+"""CasADi functions evaluated over many samples, directly on NumPy's memory.
+
+`Function.__call__` converts every number through a Python list; `Function.buffer` does not.
+"""
 
 from __future__ import annotations
 
 import casadi as ca
 import numpy as np
 
-BLOCK = 500  # samples
+BLOCK = 500  # samples of an unrolled recursion: CasADi takes longer to unroll a long one than to run it
 
 
-def evaluate(mapped: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
-    """The results of `f.map(n)` or `f.mapaccum(n)`, dense.
+def evaluate(batched: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
+    """The results of `f.map(n)` or `f.mapaccum(n)`.
 
-    An argument that f takes as (rows,) is given as (n, rows), a result (rows, columns) returned as (n columns, rows): the
-    order in which CasADi stores them, sample after sample.
+    An argument that f takes as (rows,) is given as (n, rows); a result (rows, columns) of f is returned as (n columns, rows),
+    the order in which CasADi stores it. Raises ValueError for an argument of the wrong size or a result that is not dense.
     """
-    buffer, run = mapped.buffer()
-    kept = [np.ascontiguousarray(value, float) for value in given]
-    for i, value in enumerate(kept):
-        if value.size != mapped.nnz_in(i):
-            raise ValueError(f"{mapped.name_in(i)}: {value.size} numbers, not {mapped.nnz_in(i)}")
+    buffer, run = batched.buffer()
+    arguments = [np.ascontiguousarray(value, float) for value in given]
+    for i, value in enumerate(arguments):
+        if value.size != batched.nnz_in(i):
+            raise ValueError(f"argument {batched.name_in(i)} has {value.size} numbers instead of {batched.nnz_in(i)}")
         if value.size:
             buffer.set_arg(i, value.ravel().data)
-    results = [np.empty((mapped.size2_out(i), mapped.size1_out(i))) for i in range(mapped.n_out())]
+    results = [np.empty((batched.size2_out(i), batched.size1_out(i))) for i in range(batched.n_out())]
     for i, value in enumerate(results):
-        if value.size != mapped.nnz_out(i):
-            raise ValueError(f"{mapped.name_out(i)} is not dense")
+        if value.size != batched.nnz_out(i):
+            raise ValueError(f"result {batched.name_out(i)} is not dense")
         if value.size:
             buffer.set_res(i, value.ravel().data)
     run()
@@ -32,17 +35,14 @@ def evaluate(mapped: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
 
 
 class Recursion:
-    """`one` (state, inputs ...) -> (state after, result), sample after sample.
-
-    CasADi takes longer to unroll a long recursion than to run it, so a block of it is unrolled and run again and again.
-    """
+    """The recursion `one` (state, inputs ...) -> (next state, result), run sample after sample in unrolled blocks."""
 
     def __init__(self, one: ca.Function) -> None:
         self.one = one
         self.unrolled: dict[int, ca.Function] = {}
 
     def run(self, state: np.ndarray, *inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The state after each of n samples (n, n_s) and the results (n, n_r) for inputs (n, .)."""
+        """States (n, n_s) after each of n samples and results (n, n_r), from `state` (n_s,) and inputs (n, .)."""
         n = len(inputs[0])
         size = min(n, BLOCK)
         if size not in self.unrolled:
@@ -50,6 +50,7 @@ class Recursion:
         states, results = np.empty((n, self.one.size1_out(0))), np.empty((n, self.one.size1_out(1)))
         for a in range(0, n, size):
             b = min(a + size, n)
+            # the last block is filled with its last sample
             block = [np.concatenate([x[a:b], np.repeat(x[b - 1 : b], a + size - b, axis=0)]) for x in inputs]
             after, found = evaluate(self.unrolled[size], state, *block)
             states[a:b], results[a:b], state = after[: b - a], found[: b - a], after[-1]

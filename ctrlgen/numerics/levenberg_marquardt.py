@@ -7,69 +7,75 @@ from typing import Protocol
 import numpy as np
 from scipy.optimize import lsq_linear
 
-NEGLIGIBLE = 0.01  # of one squared standard deviation
-PART = 0.1  # of a step, from which its curvature is taken
-BEGIN, FAILED = 1e-6, 1e-2  # Marquardt's damping at first, and where a step has failed twice
+NEGLIGIBLE = 0.01  # squared standard deviations: a step that promises less ends the search
+PROBE = 0.1  # share of a step from which the curvature along it is taken
+FIRST_DAMPING = 1e-6
+FAILING = 1e-2  # damping above which three steps in a row have failed: 1e-6, 1e-4, 3e-3
+LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e8
+RELAX, STIFFEN, FIRST_STIFFENING = 10, 30, 1e-4  # damping after a good step, after a failed one, and at least then
 
 
 class Problem(Protocol):
-    """Numbers x of order one, of which the first `k` are the structure's own and the others the records' starts; each may
-    step by its `most` at once."""
+    """A residual (m,) as a function of variables x (n,) of order one.
+
+    The first `k` variables are parameters, the others nuisance variables (initial states of records). `step_limit` (n,)
+    bounds how far each may move in one step.
+    """
 
     k: int
-    most: np.ndarray
+    step_limit: np.ndarray
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest x."""
 
     def residual(self, x: np.ndarray) -> np.ndarray:
-        """What is squared and summed."""
+        """The residual (m,), whose squares are summed."""
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same with its slopes by x."""
+        """The residual (m,) and its Jacobian (m, n)."""
 
 
 def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
-    """The minimum of |residual|^2 within bounds (D. W. Marquardt, J. SIAM 11 (1963) 431).
+    """The x (n,) of least |residual|^2 within the bounds, from a starting `x`, in at most so many steps.
 
-    A step that fails is tried along the valley that it left, then without its part in the records' starts: those may bend
-    within a gap or a fringe. One that fails however short it is, without the number that promises most: the moment of an
-    event between two samples lies about its slope. Ends when a step promises less than `NEGLIGIBLE` of one squared standard
-    deviation.
+    Marquardt's damping (D. W. Marquardt, J. SIAM 11 (1963) 431). A step that does not lower the objective is tried again:
+    first along the curved valley of the objective; then with the nuisance variables fixed, along which the residual may have
+    a kink; then, when the damping has already grown, without the parameter that promises most, for the derivative by the
+    moment of an event between two samples may be wrong. Ends when a step promises less than `NEGLIGIBLE`.
     """
     low, high = problem.bounds
-    own = np.arange(len(x)) < problem.k
-    x, damping = np.clip(x, low, high), BEGIN
+    parameters = np.arange(len(x)) < problem.k
+    x, damping = np.clip(x, low, high), FIRST_DAMPING
     r, J = problem.evaluate(x)
     for _ in range(steps):
         gradient, H = J.T @ r, J.T @ J
-        least, most = np.maximum(low - x, -problem.most), np.minimum(high - x, problem.most)
-        step = _damped(H, gradient, least, most, damping)
+        least, most = np.maximum(low - x, -problem.step_limit), np.minimum(high - x, problem.step_limit)
+        step = _damped_step(H, gradient, least, most, damping)
         if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
             break
-        better = _better(problem, r, np.clip(x + step, low, high))
-        if better is None and damping <= FAILED:
+        better = _if_better(problem, r, np.clip(x + step, low, high))
+        if better is None and damping <= FAILING:
             better = _along_valley(problem, x, r, J, H, step, damping)
-        if better is None and 0 < np.count_nonzero(step[own]) < np.count_nonzero(step):
-            step = _damped(H, gradient, least, most, damping, own)
-            better = _better(problem, r, np.clip(x + step, low, high))
-        if better is None and damping > FAILED:
-            others = own & (step != 0)
+        if better is None and 0 < np.count_nonzero(step[parameters]) < np.count_nonzero(step):
+            step = _damped_step(H, gradient, least, most, damping, parameters)
+            better = _if_better(problem, r, np.clip(x + step, low, high))
+        if better is None and damping > FAILING:
+            others = parameters & (step != 0)
             others[np.argmax(np.where(others, np.abs(gradient * step), -1.0))] = False
-            step = _damped(H, gradient, least, most, BEGIN, others)
-            better = _better(problem, r, np.clip(x + step, low, high))
+            step = _damped_step(H, gradient, least, most, FIRST_DAMPING, others)
+            better = _if_better(problem, r, np.clip(x + step, low, high))
         if better is not None:
-            x, damping = better, max(damping / 10, 1e-9)
+            x, damping = better, max(damping / RELAX, LEAST_DAMPING)
             r, J = problem.evaluate(x)
         else:
-            damping = max(damping * 30, 1e-4)
-            if damping > 1e8:
+            damping = max(damping * STIFFEN, FIRST_STIFFENING)
+            if damping > MOST_DAMPING:
                 break
     return x
 
 
-def _damped(
+def _damped_step(
     H: np.ndarray,
     gradient: np.ndarray,
     least: np.ndarray,
@@ -77,35 +83,40 @@ def _damped(
     damping: float,
     movable: np.ndarray | bool = True,
 ) -> np.ndarray:
-    """Marquardt's step of the `movable` numbers, the best in the box from `least` to `most`: a number that nothing holds, or
-    that meets its bound, does not shorten the step of the others."""
+    """Marquardt's step (n,) of the `movable` variables, the best within the box from `least` to `most`.
+
+    A bounded least-squares problem, so that a variable that the residual does not depend on, or that meets its bound, does
+    not shorten the step of the others.
+    """
     step = np.zeros_like(gradient)
-    open_ = (np.diag(H) > 0) & (least < most) & movable
-    if open_.any():
-        scale = np.sqrt(np.diag(H)[open_])  # no number's unit decides what can be solved for
-        w, V = np.linalg.eigh(H[np.ix_(open_, open_)] / np.outer(scale, scale))
+    free = (np.diag(H) > 0) & (least < most) & movable
+    if free.any():
+        scale = np.sqrt(np.diag(H)[free])  # the conditioning does not depend on units
+        w, V = np.linalg.eigh(H[np.ix_(free, free)] / np.outer(scale, scale))
         root = np.sqrt(np.maximum(w, 0.0) + damping)
-        A, b = root[:, None] * V.T, -(V.T @ (gradient[open_] / scale)) / root
-        step[open_] = lsq_linear(A, b, (least[open_] * scale, most[open_] * scale), method="bvls").x / scale
+        A, b = root[:, None] * V.T, -(V.T @ (gradient[free] / scale)) / root
+        step[free] = lsq_linear(A, b, (least[free] * scale, most[free] * scale), method="bvls").x / scale
     return step
 
 
 def _along_valley(
     problem: Problem, x: np.ndarray, r: np.ndarray, J: np.ndarray, H: np.ndarray, step: np.ndarray, damping: float
 ) -> np.ndarray | None:
-    """x + t step + t^2 bend, t = 1 or 1/3, the first that leaves less than `r`: the bend takes back the curvature of the
-    residual along the step, half its second derivative, from a small `PART` of it (geodesic acceleration, M. K. Transtrum,
-    J. P. Sethna, arXiv:1201.5885)."""
+    """x + t step + t^2 bend for t = 1 or 1/3, the first that lowers |r|^2; None where neither does.
+
+    The bend takes back half the second derivative of the residual along the step, found by a finite difference (geodesic
+    acceleration, M. K. Transtrum, J. P. Sethna, arXiv:1201.5885).
+    """
     low, high = problem.bounds
-    curved = ((problem.residual(np.clip(x + PART * step, low, high)) - r) / PART - J @ step) / PART
-    if not np.isfinite(curved).all():
+    curvature = ((problem.residual(np.clip(x + PROBE * step, low, high)) - r) / PROBE - J @ step) / PROBE
+    if not np.isfinite(curvature).all():
         return None
-    bend = _damped(H, J.T @ curved, low - x, high - x, damping)
-    tried = (_better(problem, r, np.clip(x + t * step + t**2 * bend, low, high)) for t in (1.0, 1 / 3))
+    bend = _damped_step(H, J.T @ curvature, low - x, high - x, damping)
+    tried = (_if_better(problem, r, np.clip(x + t * step + t**2 * bend, low, high)) for t in (1.0, 1 / 3))
     return next((better for better in tried if better is not None), None)
 
 
-def _better(problem: Problem, r: np.ndarray, tried: np.ndarray) -> np.ndarray | None:
-    """`tried`, where it leaves less than `r`."""
-    left = problem.residual(tried)
-    return tried if left @ left < r @ r else None
+def _if_better(problem: Problem, r: np.ndarray, x: np.ndarray) -> np.ndarray | None:
+    """x where its residual is smaller than `r`, else None."""
+    residual = problem.residual(x)
+    return x if residual @ residual < r @ r else None

@@ -1,5 +1,5 @@
-"""Noise learnt from a fit: where it was only guessed, its colour where that was known from few samples, and its size where
-nothing but the misfit tells it."""
+"""Noise updated from the residual of a fit: guessed noise, the colour of noise known from few samples, and the size of noise
+that only the misfit tells."""
 
 from __future__ import annotations
 
@@ -14,39 +14,12 @@ from ctrlgen.diagnosis.settings import NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
 
 
-def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
-    """Where the noise was guessed: from what `fit` leaves at the frequencies at which the readings move least."""
-    noise, channels = fitter.noise, fitter.recording.channels
-    sd, ar, count, said = noise.sd.copy(), list(noise.ar), noise.count.copy(), list(noise.notes)
-    for i in np.flatnonzero(noise.guessed).tolist():
-        parts = [p for r in fitter.fit_records if (p := _quiet(fitter, fit, r, i)) is not None]
-        if not parts:
-            continue
-        weights = [c for *_, c in parts]
-        order = max(len(a) for _, a, _ in parts)
-        sd[i] = np.sqrt(np.average([s**2 for s, *_ in parts], weights=weights))
-        ar[i] = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in parts], axis=0, weights=weights)
-        count[i] = sum(weights)
-        said[i] = (
-            f"{channels[i]}: from what the fit leaves at the frequencies at which the "
-            f"readings move least, autoregressive of order {order}; record some rest to know it"
-        )
-    return replace(noise, sd=sd, ar=tuple(ar), count=count, notes=tuple(said))
-
-
-def _quiet(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
-    """On the longest stretch of valid samples of channel i."""
-    y = fitter.predict(fit, record)[:, i]
-    good = np.flatnonzero(np.diff(np.concatenate([[False], record.valid[:, i] & np.isfinite(y), [False]])))
-    if not len(good):
-        return None
-    a, b = max(good.reshape(-1, 2), key=lambda run: run[1] - run[0])
-    return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b])
-
-
 def update_noise(fitter: Fitter, fit: Fit) -> Noise:
-    """What a fit with causes tells of the noise: of one that was guessed, where it is smaller now, as physics left out only
-    adds to it; else its colour. The same noise where nothing is learnt."""
+    """The noise after a fit with causes; the same object where the fit tells nothing new.
+
+    Guessed noise is estimated again and replaced where it became smaller, for physics that was left out only adds to it.
+    Of other noise the colour may change, see `update_noise_colour`.
+    """
     noise = fitter.noise
     if not noise.guessed.any():
         return update_noise_colour(fitter, fit)
@@ -54,43 +27,81 @@ def update_noise(fitter: Fitter, fit: Fit) -> Noise:
     smaller = found.floor < noise.floor
     if not smaller.any():
         return noise
-    better = [found if s else noise for s in smaller]
+    source = [found if s else noise for s in smaller]
     return replace(
         noise,
         sd=np.where(smaller, found.sd, noise.sd),
         count=np.where(smaller, found.count, noise.count),
-        ar=tuple(each.ar[i] for i, each in enumerate(better)),
-        notes=tuple(each.notes[i] for i, each in enumerate(better)),
+        ar=tuple(source[i].ar[i] for i in range(len(smaller))),
+        notes=tuple(source[i].notes[i] for i in range(len(smaller))),
     )
 
 
+def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
+    """Guessed noise estimated from the residual of `fit` at the frequencies at which the readings move least.
+
+    Variances and coefficients of the records to fit are averaged by their numbers of independent samples.
+    """
+    noise, channels = fitter.noise, fitter.recording.channels
+    sd, ar, count, notes = noise.sd.copy(), list(noise.ar), noise.count.copy(), list(noise.notes)
+    for i in np.flatnonzero(noise.guessed).tolist():
+        estimates = [e for r in fitter.fit_records if (e := _of_longest_stretch(fitter, fit, r, i)) is not None]
+        if not estimates:
+            continue
+        weights = [n for *_, n in estimates]
+        order = max(len(a) for _, a, _ in estimates)
+        sd[i] = np.sqrt(np.average([s**2 for s, *_ in estimates], weights=weights))
+        ar[i] = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in estimates], axis=0, weights=weights)
+        count[i] = sum(weights)
+        notes[i] = (
+            f"{channels[i]}: from the residual of the fit at the frequencies at which the readings move least, "
+            f"autoregressive of order {order}; a record at rest would tell it better"
+        )
+    return replace(noise, sd=sd, ar=tuple(ar), count=count, notes=tuple(notes))
+
+
+def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
+    """`noise_from_residual` on the longest stretch of valid samples of channel i."""
+    y = fitter.predict(fit, record)[:, i]
+    good = record.valid[:, i] & np.isfinite(y)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
+    if not len(edges):
+        return None
+    a, b = max(edges.reshape(-1, 2), key=lambda stretch: stretch[1] - stretch[0])
+    return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b])
+
+
 def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:
-    """Where the noise was known from fewer samples than there are to fit: the colour of what `fit` leaves, if it leaves
-    little, and no colour that the rest has not; the same noise where none is learnt. Its size is not let grow beyond what
-    the first estimate allows.
+    """The noise with the colour of the residual of `fit`, per channel; the same object where no channel changes.
+
+    A channel changes where its noise was estimated from fewer samples than there are to fit, the residual is not much
+    larger than the noise, and rest, whitened by the residual's coefficients, is white. The standard deviation follows the
+    residual too, but not beyond the uncertainty of its first estimate.
     """
     noise = fitter.noise
     sd, ar, floor = noise.sd.copy(), list(noise.ar), noise.floor
-    learnt = False
+    changed = False
     rests = [r for r in fitter.recording.records if r.role == "rest"]
     for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.fit_records)).tolist():
-        parts = [_left(fitter, fit, r, i) for r in fitter.fit_records]
-        left = np.sqrt(np.mean(np.concatenate(parts) ** 2))
-        if left >= NOISE_UPDATE.largest_residual * floor[i]:
+        residuals = [_residual(fitter, fit, r, i) for r in fitter.fit_records]
+        rms = np.sqrt(np.mean(np.concatenate(residuals) ** 2))
+        if rms >= NOISE_UPDATE.largest_residual * floor[i]:
             continue
-        found = autoregression(parts)
-        if all(_of_that_colour(_left(fitter, fit, r, i), found[1]) for r in rests):
-            learnt, (sd[i], ar[i]) = True, found
-            sd[i] *= min(1.0, floor[i] * (1 + STATISTICS.noise_size_margin / np.sqrt(2 * noise.count[i])) / left)
-    return replace(noise, sd=sd, ar=tuple(ar)) if learnt else noise
+        innovation, a = autoregression(residuals)
+        if all(_has_colour(_residual(fitter, fit, r, i), a) for r in rests):
+            changed = True
+            largest = floor[i] * (1 + STATISTICS.noise_size_margin / np.sqrt(2 * noise.count[i]))
+            sd[i], ar[i] = innovation * min(1.0, largest / rms), a
+    return replace(noise, sd=sd, ar=tuple(ar)) if changed else noise
 
 
-def _left(fitter: Fitter, fit: Fit, record: Record, i: int) -> np.ndarray:
+def _residual(fitter: Fitter, fit: Fit, record: Record, i: int) -> np.ndarray:
+    """Observed minus predicted [SI] at the valid samples of channel i."""
     return (record.observed - fitter.predict(fit, record))[record.valid[:, i], i]
 
 
-def _of_that_colour(rest: np.ndarray, a: np.ndarray) -> bool:
-    """Whether `rest` (n,) is white once what the coefficients `a` foresee is taken out."""
+def _has_colour(rest: np.ndarray, a: np.ndarray) -> bool:
+    """Whether `rest` (n,) is white after whitening by the coefficients `a`; True where it is too short to tell."""
     if len(rest) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags or np.ptp(rest) == 0:
         return True
     white = np.convolve(rest, np.concatenate([[1.0], -a]), "valid")
@@ -98,7 +109,10 @@ def _of_that_colour(rest: np.ndarray, a: np.ndarray) -> bool:
 
 
 def update_noise_size(fitter: Fitter, fit: Fit) -> Noise:
-    """Where nothing but the misfit tells the noise: what `fit` leaves over, alike for all channels of one unit."""
+    """Noise that only the misfit tells: the root mean square of the residual of `fit`, over all channels of one unit.
+
+    The variance is divided by the share of samples that the fitted parameters leave free.
+    """
     recording, noise = fitter.recording, fitter.noise
     squares, count = np.zeros(len(recording.channels)), np.zeros(len(recording.channels))
     for record in fitter.fit_records:
@@ -108,6 +122,6 @@ def update_noise_size(fitter: Fitter, fit: Fit) -> Noise:
     sd = noise.sd.copy()
     used = len(fit.theta) / max(count.sum(), 1.0)
     for i in np.flatnonzero(~noise.known):
-        alike = [k for k, unit in enumerate(recording.units) if unit == recording.units[i]]
-        sd[i] = np.sqrt(squares[alike].sum() / (count[alike].sum() * (1 - used)))
+        same_unit = [k for k, unit in enumerate(recording.units) if unit == recording.units[i]]
+        sd[i] = np.sqrt(squares[same_unit].sum() / (count[same_unit].sum() * (1 - used)))
     return replace(noise, sd=sd)

@@ -1,8 +1,9 @@
-"""Step 11: how sure the numbers of the findings are.
+"""Step 11: confidence intervals of the causes' parameters by profile likelihood.
 
-Profile: the objective with one number held at distance t and all others fitted again; in a well-behaved problem it rises
-by (t/sd)^2. The 95 % interval ends where it has risen by 1.96^2; where it never does, the data do not bound the number.
-Where the residual is not as white as the noise model says, the interval is widened as the sandwich of `scatter` is.
+The profile of a parameter is the objective with the parameter held at a distance t from its optimum and all others fitted
+again. Where the problem is close to linear it rises by (t/sd)^2. The 95 % interval ends where it has risen by 1.96^2; where
+it never does, the data do not bound the parameter. Where the residual is not as white as the noise model says, the interval
+is widened as in `robust_covariance`.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, _Problem
-from ctrlgen.diagnosis.estimation.robust_covariance import sandwich_over_model
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.robust_covariance import sandwich_over_model, widening
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER
-from ctrlgen.diagnosis.settings import PROFILE, ROBUST_COVARIANCE, STATISTICS
+from ctrlgen.diagnosis.settings import PROFILE, STATISTICS
 
 BOUNDED, ABOVE, BELOW, FLAT = (
     "bounded", "not bounded above by these data", "not bounded below by these data", "not bounded by these data",
@@ -24,9 +25,11 @@ BOUNDED, ABOVE, BELOW, FLAT = (
 
 @dataclass(frozen=True)
 class Profile:
-    """One number of one finding, at `path` in the corrected device, in `unit`: `ci95` the larger of profile and sandwich;
-    `points` (value, rise of the objective); `shape` says whether both sides are bounded; `verified` whether the profile was
-    looked at or only its curvature; the sandwich's deviation over the model's, None where there are too few samples for it.
+    """The profile of one parameter of one finding, at `path` in the corrected device, its numbers in `unit`.
+
+    `ci95`: the 95 % interval, widened by the sandwich. `points`: (value, rise of the objective). `shape`: which sides the
+    data bound. `verified`: whether the profile was evaluated on both sides; else the interval is that of the curvature.
+    `sandwich_over_model`: ratio of the standard deviations, None where there are too few samples for it.
     """
 
     path: str
@@ -43,119 +46,139 @@ class Profile:
 
 
 def profiles(fitter: Fitter, fit: Fit) -> tuple[Profile, ...]:
-    """Of every number of every cause, in the order of the unknowns."""
-    if all(u.cause is None for u in fit.structure.free_parameters):
+    """The profile of every parameter of every cause, in the order of the structure's free parameters."""
+    parameters = fit.structure.free_parameters
+    if all(p.cause is None for p in parameters):
         return ()
-    surface = _Surface(fitter, fit)
-    ratio = sandwich_over_model(fit)
+    objective = _Objective(fitter, fit)
+    ratio, wider = sandwich_over_model(fit), widening(fit)
     return tuple(
-        _profile(surface, fit, i, ratio) for i, u in enumerate(fit.structure.free_parameters) if u.cause is not None
+        _profile(objective, fit, i, float(wider[i]), None if ratio is None else float(ratio[i]))
+        for i, p in enumerate(parameters)
+        if p.cause is not None
     )
 
 
-def _profile(surface: _Surface, fit: Fit, i: int, ratio: np.ndarray | None) -> Profile:
-    unknown = fit.structure.free_parameters[i]
-    cause = fit.structure.cause_of(unknown)
+def _profile(objective: _Objective, fit: Fit, i: int, wider: float, ratio: float | None) -> Profile:
+    p = fit.structure.free_parameters[i]
+    cause = fit.structure.cause_of(p)
     value, sd = float(fit.theta[i]), float(np.sqrt(max(fit.covariance[i, i], 0.0)))
-    low, high = (_Side(surface, i, value, sd, bound) for bound in (unknown.low, unknown.high))
-    wider = 1.0 if ratio is None or ratio[i] < ROBUST_COVARIANCE.agreement else float(ratio[i])
-    ends = [max(value + wider * (low.end - value), unknown.low), min(value + wider * (high.end - value), unknown.high)]
-    points = sorted([*low.points, (value, 0.0), *high.points])
+    low, high = (_Side(objective, i, value, sd, bound) for bound in (p.low, p.high))
+    ends = max(value + wider * (low.end - value), p.low), min(value + wider * (high.end - value), p.high)
     shape = {(True, True): BOUNDED, (True, False): ABOVE, (False, True): BELOW, (False, False): FLAT}
-    name = (cause.path if cause.effect == PARAMETER else unknown.path).rpartition(".")[2]
-    shown = [float(from_si(x, unknown.unit)) for x in (value, *ends)]
+
+    def shown(si: float) -> float:
+        return float(from_si(si, p.unit))
+
     return Profile(
-        unknown.path, cause.effect, cause.location, name, shown[0], (shown[1], shown[2]), unknown.unit,
-        tuple((float(from_si(x, unknown.unit)), float(rise)) for x, rise in points), shape[low.bounded, high.bounded],
-        low.verified and high.verified, None if ratio is None else float(ratio[i]),
-    )  # fmt: skip
+        path=p.path,
+        effect=cause.effect,
+        location=cause.location,
+        parameter=(cause.path if cause.effect == PARAMETER else p.path).rpartition(".")[2],
+        value=shown(value),
+        ci95=(shown(ends[0]), shown(ends[1])),
+        unit=p.unit,
+        points=tuple((shown(x), float(rise)) for x, rise in sorted([*low.points, (value, 0.0), *high.points])),
+        shape=shape[low.bounded, high.bounded],
+        verified=low.verified and high.verified,
+        sandwich_over_model=ratio,
+    )
 
 
 class _Side:
-    """One side of a profile: `points` (value, rise), the `end` of the interval, whether the data bound it."""
+    """One side of a profile, towards a bound of the parameter.
 
-    def __init__(self, surface: _Surface, i: int, value: float, sd: float, bound: float) -> None:
-        side = np.sign(bound - value) or 1.0
-        room = abs(bound - value)
+    `points`: (value [SI], rise); `end` [SI] of the 95 % interval; `bounded`: whether the objective rises enough before the
+    parameter's bound; `verified`: whether it was evaluated. Points are taken at doubling distances until the rise is enough.
+    """
+
+    def __init__(self, objective: _Objective, i: int, value: float, sd: float, bound: float) -> None:
+        self.objective, self.i, self.value = objective, i, value
+        self.sign, room = np.sign(bound - value) or 1.0, abs(bound - value)
         self.points: list[tuple[float, float]] = []
         self.verified, self.bounded = False, STATISTICS.z_95 * sd <= room
-        self.end = value + side * min(STATISTICS.z_95 * sd, room)
-        t, before = PROFILE.first_distance * sd, (0.0, 0.0)
+        self.end = value + self.sign * min(STATISTICS.z_95 * sd, room)
+        t, before = PROFILE.first_distance * sd, (0.0, 0.0)  # before: (distance, root of the rise)
         for _ in range(PROFILE.doublings + 1):
-            if not surface.affords() or room == 0:
+            if not objective.affordable or room == 0:
                 return
-            reach = min(t, room)
-            rise = surface.rise(i, value + side * reach, (reach / sd) ** 2 if sd else np.inf)
-            self.points.append((float(value + side * reach), rise))
+            distance = min(t, room)
+            rise = self._rise(distance, (distance / sd) ** 2 if sd else np.inf)
             self.verified, root = True, np.sqrt(max(rise, 0.0))
             self.bounded = root >= STATISTICS.z_95
             if self.bounded:
-                self.end = value + side * self._between(surface, i, value, side, before, (reach, root))
+                self.end = value + self.sign * self._crossing(before, (distance, root))
                 return
-            self.end, before = float(value + side * reach), (reach, root)
-            if reach == room:
+            self.end, before = float(value + self.sign * distance), (distance, root)
+            if distance == room:
                 return
             t *= 2.0
 
-    def _between(
-        self,
-        surface: _Surface,
-        i: int,
-        value: float,
-        side: float,
-        near: tuple[float, float],
-        far: tuple[float, float],
-    ) -> float:
-        """The distance at which the root of the rise is CI, by the secant; looked at again while it was far overshot."""
+    def _rise(self, distance: float, expected: float) -> float:
+        """The rise of the objective at a distance from the optimum, kept among the points."""
+        value = self.value + self.sign * distance
+        rise = self.objective.rise(self.i, value, expected)
+        self.points.append((float(value), rise))
+        return rise
+
+    def _crossing(self, near: tuple[float, float], far: tuple[float, float]) -> float:
+        """The distance at which the root of the rise is 1.96, by secants between `near` and `far` (distance, root), as long
+        as `far` lies well above."""
+        z = STATISTICS.z_95
         for _ in range(PROFILE.most_secants):
-            reach = float(near[0] + (STATISTICS.z_95 - near[1]) / (far[1] - near[1]) * (far[0] - near[0]))
-            if far[1] < PROFILE.overshoot * STATISTICS.z_95 or not surface.affords():
-                return reach
-            rise = surface.rise(i, value + side * reach, STATISTICS.z_95**2)
-            self.points.append((float(value + side * reach), rise))
-            near, far = (
-                ((reach, np.sqrt(max(rise, 0.0))), far) if rise < STATISTICS.z_95**2 else (near, (reach, np.sqrt(rise)))
-            )
+            distance = float(near[0] + (z - near[1]) / (far[1] - near[1]) * (far[0] - near[0]))
+            if far[1] < PROFILE.overshoot * z or not self.objective.affordable:
+                return distance
+            rise = self._rise(distance, z**2)
+            if rise < z**2:
+                near = distance, np.sqrt(max(rise, 0.0))
+            else:
+                far = distance, np.sqrt(rise)
         return far[0]
 
 
-class _Surface:
-    """The objective around an optimum."""
+class _Objective:
+    """The objective around an optimum; evaluations are limited by their cost."""
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
-        self.problem = _Problem(fitter, fit.structure)
+        self.problem = fitter.problem(fit.structure)
         self.values = np.concatenate([fit.theta, *fit.initial_states])
-        self.at = self.problem.inner(self.values)
+        self.optimum = self.problem.to_scaled(self.values)
         self.low, self.high = self.problem.bounds
-        J = fit.J * self.problem.by_inner(self.values)
-        self.H, self.best = J.T @ J, fit.objective
-        states = max(len(s) for s in self.problem.sizes) + fit.J.shape[1]
-        affordable = max(int(PROFILE.cost / (fit.n * states * fit.J.shape[1])), PROFILE.fewest_points)
-        self.left = affordable if fit.chi2 < PROFILE.largest_ratio * fit.n else 0
+        J = fit.J * self.problem.si_by_scaled(self.values)
+        self.H, self.least = J.T @ J, fit.objective
+        states = max(len(sd) for sd in self.problem.initial_sd) + fit.J.shape[1]
+        most = max(int(PROFILE.cost / (fit.n * states * fit.J.shape[1])), PROFILE.fewest_points)
+        self.evaluations_left = most if fit.chi2 < PROFILE.largest_ratio * fit.n else 0
 
-    def affords(self) -> bool:
-        """Whether another point may be looked at."""
-        return self.left > 0
+    @property
+    def affordable(self) -> bool:
+        """Whether another point may be evaluated."""
+        return self.evaluations_left > 0
 
     def rise(self, i: int, value: float, expected: float) -> float:
-        """The objective above its optimum with number `i` at `value` [SI] and the others where the curvature puts them,
-        fitted once more where that is far above `expected`."""
-        rest = np.arange(len(self.at)) != i
-        x = self.at.copy()
+        """The objective above its optimum with parameter `i` at `value` [SI] and the others fitted again.
+
+        The others follow the quadratic approximation; where the rise exceeds the one `expected`, one Gauss-Newton step is
+        added.
+        """
+        others = np.arange(len(self.optimum)) != i
+        x = self.optimum.copy()
         moved = self.values.copy()
         moved[i] = value
-        x[i] = self.problem.inner(moved)[i]
-        x[rest] -= np.linalg.lstsq(self.H[np.ix_(rest, rest)], self.H[rest, i] * (x[i] - self.at[i]), rcond=1e-12)[0]
-        x[rest] = np.clip(x, self.low, self.high)[rest]
-        rise = self._objective(x) - self.best
-        if rise > PROFILE.refit_ratio * expected and self.affords():
+        x[i] = self.problem.to_scaled(moved)[i]
+        shift = self.H[others, i] * (x[i] - self.optimum[i])
+        x[others] -= np.linalg.lstsq(self.H[np.ix_(others, others)], shift, rcond=1e-12)[0]
+        x[others] = np.clip(x, self.low, self.high)[others]
+        rise = self._at(x) - self.least
+        if rise > PROFILE.refit_ratio * expected and self.affordable:
             r, J = self.problem.evaluate(x)
-            J = J[:, rest]
-            x[rest] = np.clip(x[rest] - np.linalg.lstsq(J, r, rcond=1e-10)[0], self.low[rest], self.high[rest])
-            rise = min(rise, self._objective(x) - self.best)
+            step = np.linalg.lstsq(J[:, others], r, rcond=1e-10)[0]
+            x[others] = np.clip(x[others] - step, self.low[others], self.high[others])
+            rise = min(rise, self._at(x) - self.least)
         return float(rise)
 
-    def _objective(self, x: np.ndarray) -> float:
-        self.left -= 1
+    def _at(self, x: np.ndarray) -> float:
+        self.evaluations_left -= 1
         r, _ = self.problem.evaluate(x)
         return float(r @ r)

@@ -1,9 +1,9 @@
-"""Steps 3 and 9: does a structure leave anything over? Judged on the held-out records, the fitted ones, and at rest.
+"""Steps 3 and 9, model validation: whether a structure leaves a residual beyond noise.
 
-The numbers are judged where the held-out records are most likely, at the price of how well the fit knows them: then the
-squares are those of the noise alone, also of a stage that drifts or saturates, where a little uncertainty goes far. What is
-left of the records to fit must be noise in size too. At rest, where the noise was learnt, its size says nothing; but
-stationary noise leaves neither memory nor heavy tails after whitening, and a stage that moves by itself does.
+Three residuals are tested. That of the held-out records, with the parameters refitted under their posterior (`held_out`), so
+that it holds noise alone, also where the device drifts or saturates and a small parameter error grows. That of the records
+to fit, by its size. That at rest, where the noise was estimated: its size tells nothing, but stationary noise has neither
+memory nor heavy tails after whitening, and a stage that moves by itself has.
 """
 
 from __future__ import annotations
@@ -14,15 +14,23 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.held_out import HeldOutRefit, refit_to_held_out
 from ctrlgen.diagnosis.estimation.noise import ljung_box, without_lines
 from ctrlgen.diagnosis.settings import HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
+from ctrlgen.recordings.recording import Record
+
+SHORTEST = STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags  # samples of a test of whiteness
 
 
 @dataclass(frozen=True)
 class ResidualTests:
-    """`ratio` of held-out error to what is expected, per channel; the smallest p of each test; `restless` channels, which
-    do at rest what no noise does; `passed` all of it."""
+    """`ratio` of the held-out residual to the noise, root mean square, by channel; the smallest p of each test.
+
+    `p_values`: "memory" (Ljung-Box), "variance" (McLeod-Li), "drive" (cross-correlation), "size" of the held-out residual,
+    "fitted" size of that of the records to fit. `restless`: channels that do at rest what no stationary noise does. `passed`:
+    whether the structure is valid by all of them.
+    """
 
     ratio: tuple[float, ...]
     p_values: dict[str, float]
@@ -31,76 +39,79 @@ class ResidualTests:
 
     @property
     def worst(self) -> float:
-        """The largest ratio of any channel."""
+        """The largest ratio of any channel, NaN where there is none."""
         return max(self.ratio, default=float("nan"))
 
 
 def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
-    """Ratio per channel, Ljung-Box (memory), McLeod-Li (size that comes and goes), correlation with the drive."""
+    """All residual tests of one fit.
+
+    The size of a residual counts where it exceeds both `error_ratio` and what chance allows, each widened by the uncertainty
+    of the noise itself. A test of whiteness counts where its p, after Bonferroni's correction, is below `whiteness_p` and the
+    ratio is noticed at all.
+    """
     n_y = len(fitter.recording.channels)
-    moved, price, _ = fitter.refitted_to_held_out(fit, HELD_OUT_REFIT.max_steps_tests)
-    squares, expected = np.full(n_y, price / n_y), np.zeros(n_y)
-    p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
-    for record in fitter.held_out_records:
-        white = fitter.whitened_residual(moved, record)
-        usable = fitter.noise.usable(record.valid)
-        squares += np.sum(white**2, axis=0)
-        expected += usable.sum(axis=0)
-        if fitter.recording.kind == "series":
-            for i in range(n_y):
-                e = white[usable[:, i], i]
-                if len(e) > STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags:
-                    p["memory"].append(ljung_box(e))
-                    p["variance"].append(ljung_box(e**2 - np.mean(e**2)))
-                    p["drive"].append(cross_correlation(e, record.drive[usable[:, i]]))
-    ratio = tuple(np.sqrt(squares / np.maximum(expected, 1.0)))
+    refit = refit_to_held_out(fitter, fit, HELD_OUT_REFIT.max_steps_tests)
+    squares, count, p = _held_out_residual(fitter, refit)
+    ratio = tuple(np.sqrt(squares / np.maximum(count, 1.0)))
     smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
-    rejected = (
-        any(value < RESIDUAL_TESTS.whiteness_p for value in smallest.values())
-        and max(ratio, default=0.0) > RESIDUAL_TESTS.noticed_ratio
-    )
-    doubt = 1 + STATISTICS.noise_size_margin / np.sqrt(
-        2 * np.maximum(fitter.noise.count, 1.0)
-    )  # the noise itself is known no better
-    chance = min(1.0, n_y * min(map(float, stats.chi2.sf(squares / doubt**2, np.maximum(expected, 1.0)))))
-    smallest["size"] = chance
-    above = (
-        any(r > RESIDUAL_TESTS.error_ratio * d for r, d in zip(ratio, doubt, strict=True))
-        and chance < RESIDUAL_TESTS.size_p
-    )
-    free = max(fit.n - len(fit.theta), 1)  # what shows in the records to fit alone is no less left out
-    smallest["fitted"] = float(stats.chi2.sf(fit.chi2 / max(doubt) ** 2, free))
-    above |= (
-        np.sqrt(fit.chi2 / free) > RESIDUAL_TESTS.error_ratio * max(doubt)
-        and smallest["fitted"] < RESIDUAL_TESTS.size_p
-    )
+    noticed = max(ratio, default=0.0) > RESIDUAL_TESTS.noticed_ratio
+    rejected = noticed and any(value < RESIDUAL_TESTS.whiteness_p for value in smallest.values())
+    # the noise itself is known no better
+    margin = 1 + STATISTICS.noise_size_margin / np.sqrt(2 * np.maximum(fitter.noise.count, 1.0))
+    by_channel = stats.chi2.sf(squares / margin**2, np.maximum(count, 1.0))
+    smallest["size"] = min(1.0, n_y * min(map(float, by_channel)))
+    large = any(r > RESIDUAL_TESTS.error_ratio * m for r, m in zip(ratio, margin, strict=True))
+    too_large = large and smallest["size"] < RESIDUAL_TESTS.size_p
+    free = max(fit.n - len(fit.theta), 1)
+    smallest["fitted"] = float(stats.chi2.sf(fit.chi2 / max(margin) ** 2, free))
+    large = np.sqrt(fit.chi2 / free) > RESIDUAL_TESTS.error_ratio * max(margin)
+    too_large |= large and smallest["fitted"] < RESIDUAL_TESTS.size_p
     restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
-    passed = bool(np.isfinite(ratio).all()) and not (above or rejected or restless)
+    passed = bool(np.isfinite(ratio).all()) and not (too_large or rejected or restless)
     return ResidualTests(ratio, smallest, passed, restless)
 
 
+def _held_out_residual(fitter: Fitter, refit: HeldOutRefit) -> tuple[np.ndarray, np.ndarray, dict[str, list[float]]]:
+    """Whitened squares (n_y,) with the refit's penalty, usable samples (n_y,), and the p of each test of whiteness."""
+    n_y = len(fitter.recording.channels)
+    squares, count = np.full(n_y, refit.penalty / n_y), np.zeros(n_y)
+    p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
+    for record in fitter.held_out_records:
+        white = fitter.whitened_residual(refit.fit, record)
+        usable = fitter.noise.usable(record.valid)
+        squares += np.sum(white**2, axis=0)
+        count += usable.sum(axis=0)
+        if fitter.recording.kind == "series":
+            for i in range(n_y):
+                e = white[usable[:, i], i]
+                if len(e) > SHORTEST:
+                    p["memory"].append(ljung_box(e))
+                    p["variance"].append(ljung_box(e**2 - np.mean(e**2)))
+                    p["drive"].append(cross_correlation(e, record.drive[usable[:, i]]))
+    return squares, count, p
+
+
 def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
-    """Whether what is left of channel i at rest has a memory beyond the noise's, or tails that noise has not."""
-    for record in fitter.recording.records:
-        if record.role != "rest" or fitter.recording.kind != "series":
-            continue
-        e = fitter.whitened_residual(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
-        read = record.observed[record.valid[:, i], i]
-        step = quantisation_step(read)
-        if (
-            len(e) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags
-            or np.ptp(read) == 0
-            or step > RESIDUAL_TESTS.coarse_reading * fitter.noise.floor[i]
-        ):
-            continue
-        e = without_lines(e)  # a vibration is looked for by itself
-        if min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESIDUAL_TESTS.rest_p:
-            return True
-    return False
+    """Whether the whitened residual of channel i at rest has memory (Ljung-Box) or heavy tails (kurtosis)."""
+    if fitter.recording.kind != "series":
+        return False
+    at_rest = (r for r in fitter.recording.records if r.role == "rest")
+    return any(_is_no_noise(fitter, fit, record, i) for record in at_rest)
+
+
+def _is_no_noise(fitter: Fitter, fit: Fit, record: Record, i: int) -> bool:
+    e = fitter.whitened_residual(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
+    readings = record.observed[record.valid[:, i], i]
+    coarse = quantisation_step(readings) > RESIDUAL_TESTS.coarse_reading * fitter.noise.floor[i]
+    if len(e) < SHORTEST or np.ptp(readings) == 0 or coarse:
+        return False
+    e = without_lines(e)  # a vibration is a candidate of its own
+    return min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESIDUAL_TESTS.rest_p
 
 
 def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
-    """p of the hypothesis that white `e` is uncorrelated with the drive's changes at lags 0 ... `lags` (Bonferroni)."""
+    """p of the hypothesis that white `e` (n,) is uncorrelated with each drive (n, n_u) at lags 0 ... `lags` (Bonferroni)."""
     n, worst = len(e), 0.0
     for u in drive.T:
         u = u - np.mean(u)

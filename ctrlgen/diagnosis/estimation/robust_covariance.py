@@ -1,7 +1,7 @@
-"""How sure fitted numbers are where the noise is not quite of its model, or a law not quite of its form.
+"""Standard deviations of the parameters that hold where the residual is not as white as the noise model says.
 
-Sandwich: H^-1 B H^-1 instead of H^-1, H = J'J, B the sum of squared scores J'r over blocks of time: holds where the
-residual r is not as white as the noise model says (W. K. Newey, K. D. West, Econometrica 55 (1987) 703, with blocks).
+Sandwich covariance H^-1 B H^-1 instead of H^-1: H = J'J, B the summed squares of the scores J'r over blocks of time (W. K.
+Newey, K. D. West, Econometrica 55 (1987) 703, here with blocks). It also covers a law that is not quite of the right form.
 """
 
 from __future__ import annotations
@@ -13,20 +13,25 @@ from ctrlgen.diagnosis.settings import ROBUST_COVARIANCE
 
 
 def robust_deviations(fit: Fit) -> np.ndarray:
-    """Standard deviation [SI] of each unknown: by curvature, or by the sandwich where that disagrees upwards."""
+    """Standard deviation (k,) [SI] of each free parameter: of the model, or of the sandwich where that is clearly larger."""
     if not len(fit.theta):
         return np.zeros(0)
+    return np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) * widening(fit)
+
+
+def widening(fit: Fit) -> np.ndarray:
+    """Factor (k,) on the standard deviations of the model: sandwich over model, 1 where that is within its own error."""
     ratio = sandwich_over_model(fit)
-    wider = 1.0 if ratio is None else np.where(ratio < ROBUST_COVARIANCE.agreement, 1.0, ratio)
-    return np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) * wider
+    if ratio is None:
+        return np.ones(len(fit.theta))
+    return np.where(ratio < ROBUST_COVARIANCE.agreement, 1.0, ratio)
 
 
 def sandwich_over_model(fit: Fit) -> np.ndarray | None:
-    """Per unknown, the deviation by block scores over that by curvature; None where there are too few blocks."""
+    """Standard deviation of the sandwich over that of the model (k,); None where there are too few blocks."""
     k = len(fit.theta)
-    size = max(
-        sum(n for n, _ in fit.shapes) // max(ROBUST_COVARIANCE.blocks, ROBUST_COVARIANCE.blocks_per_parameter * k), 1
-    )
+    fewest = ROBUST_COVARIANCE.blocks_per_parameter * k
+    size = max(sum(n for n, _ in fit.shapes) // max(ROBUST_COVARIANCE.blocks, fewest), 1)
     scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
     J, first, scores = fit.J / scale, 0, []
@@ -35,7 +40,7 @@ def sandwich_over_model(fit: Fit) -> np.ndarray | None:
             rows = slice(first + a * n_y, first + min(a + size, n) * n_y)
             scores.append(J[rows].T @ fit.residual[rows])
         first += n * n_y
-    if len(scores) < ROBUST_COVARIANCE.blocks_per_parameter * k:
+    if len(scores) < fewest:
         return None
     s, prior = np.array(scores), J[first:]
     inverse = np.linalg.pinv(J.T @ J, rcond=1e-14)

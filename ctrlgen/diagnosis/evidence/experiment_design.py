@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.least_squares import initial_state_sd
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.settings import EXPERIMENT
@@ -151,7 +152,7 @@ class _Sums:
         other = truth.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
         delta = fitter.noise.whiten(other.simulate(record, truth.theta) - y, record.valid).ravel()
         J = fitter.noise.whiten(slopes, record.valid).reshape(len(delta), -1)
-        sizes = start_sizes(simulator)
+        sizes = initial_state_sd(simulator)
         prior = np.hstack([np.zeros((len(sizes), len(refitted.theta))), np.diag(1 / sizes)])
         new = _Sums._of(np.vstack([J, prior]), np.concatenate([delta, np.zeros(len(sizes))]), len(refitted.theta))
         return _Sums(self.N + new.N, self.g + new.g, self.s + new.s)

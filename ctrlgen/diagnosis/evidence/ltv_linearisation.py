@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.devices import BalancedPhysics, DevicePhysics
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter, start_sizes
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.least_squares import initial_state_sd
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
@@ -102,7 +103,7 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
     probes = m.device.effect[len(fit.structure.device_with_causes.effect) :]
     placed = [probe for probe in probes if probe.place is place]
     sd = np.zeros(simulator.n_s)
-    sd[list(simulator.free_initial_states)] = start_sizes(simulator)
+    sd[list(simulator.free_initial_states)] = initial_state_sd(simulator)
     return LtvModel(
         record, place, tuple(probe.at for probe in placed),
         tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), physics.travel_unit,

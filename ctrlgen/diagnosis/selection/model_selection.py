@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.held_out import held_out_deviance
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, restart
@@ -32,7 +33,7 @@ class ModelSelection:
 
     def scored(self, fit: Fit, cause: Hypothesis | None) -> CandidateModel:
         """The candidate model of a fit, with its held-out deviance and criterion T."""
-        structure, held_out_loss = fit.structure, self.fitter.held_out_deviance(fit)
+        structure, held_out_loss = fit.structure, held_out_deviance(self.fitter, fit)
         price = sum(u.cause is not None for u in structure.free_parameters) * np.log(max(self.n_fit, 2))
         price -= 2 * structure.log_prior_odds
         return CandidateModel(fit, held_out_loss, fit.objective + price + held_out_loss, cause)
