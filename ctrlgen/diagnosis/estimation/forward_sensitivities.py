@@ -1,8 +1,11 @@
-"""One sample of a model with the derivatives of its state and readings carried along.
+"""Forward sensitivities of one sample: the state and its derivatives by m parameters, one sample on.
 
-Tangents T (m, n_s) hold dS/dp of m numbers, one a row, so that CasADi's product with a sparse matrix runs along columns.
-A model with inertia takes many steps a sample: T goes from step to step. An explicit step needs only its constant
-matrices and the slopes of what is not linear at the points where it was evaluated, instead of being differentiated whole.
+D+ = F_S D + F_c dc/dp,  dy/dp = H_S D + H_c dc/dp,  D = dS/dp. They are kept transposed, T = D' (m, n_s), a row a parameter,
+because CasADi multiplies by a sparse matrix along columns.
+
+A model in balance is differentiated as a whole. A model with inertia takes many integrator steps a sample, and T is
+propagated from step to step: a step is linear but for the nonlinear rates N, so it needs only constant matrices and the
+derivatives of N at the points where the step evaluates it.
 """
 
 from __future__ import annotations
@@ -15,120 +18,132 @@ import casadi as ca
 from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations
 from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau
 
-POINTS = 4  # of an explicit step
-Step = Callable[
-    [ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]
-]  # T, seed, (y, u, u at the end, held, ambient, c) -> y, T
+POINTS = 4  # at which a step of ETD-RK4 evaluates N
+
+Step = Callable[[ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]]
+"""(T, seed, [Y, u, u at the end of the step, held values, ambient, c]) -> Y and T one step on. Y = (x, z) as in
+`ctrlgen.model.integrators`; `seed` is the transposed derivative of what is constant within the sample."""
 
 
 def forward_sensitivities(
-    q: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX]
+    equations: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX]
 ) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
-    """S and T one sample on, the readings (n_y,) and their derivatives (m, n_y); `seed` (m, n_c) is dc/dp,
-    `given` those of `q`."""
-    by = [q.given[0], q.given[4]] if seed.nnz() else q.given[:1]
+    """S and T one sample on, the readings (n_y,) and their derivatives (m, n_y).
 
-    def slope(*slopes: ca.MX) -> ca.MX:
-        return sum((V @ slope for V, slope in zip((T, seed), slopes, strict=False)))
+    `T` (m, n_s) is (dS/dp)', `seed` (m, n_c) is (dc/dp)', `given` are the values of `equations.given`.
+    """
+    symbols = [equations.given[0], equations.given[4]] if seed.nnz() else equations.given[:1]
 
-    if not takes_several_steps(q):
-        one = ca.Function("one", q.given, [q.following, q.y, *_slopes([q.following, q.y], by)])
-        following, y, *slopes = one(*given)
-        return following, slope(*slopes[: len(by)]), y, slope(*slopes[len(by) :])
-    m = q.model
-    once = [q.y, m.held_value, ca.vertcat(ca.SX(0, 1), *m.stepped.values())]
-    first = ca.Function("first", q.given, [*once, *_slopes(once, by)], {"cse": True})
-    y, held, stepped, *slopes = first(*given)
-    Y, of_held, of_stepped = (slope(*slopes[i * len(by) : (i + 1) * len(by)]) for i in range(3))
-    after, T = _steps(q, T, ca.horzcat(of_held, seed) if seed.nnz() else of_held, given, held)
+    def chain(*derivatives: ca.MX) -> ca.MX:
+        """(d value/dp)' from the transposed derivatives by S and, where there is a seed, by c."""
+        return sum((V @ derivative for V, derivative in zip((T, seed), derivatives, strict=False)))
+
+    if not takes_several_steps(equations):
+        values = [equations.following, equations.y]
+        one = ca.Function("one", equations.given, [*values, *_transposed_jacobians(values, symbols)])
+        following, y, *by = one(*given)
+        return following, chain(*by[: len(symbols)]), y, chain(*by[len(symbols) :])
+    m = equations.model
+    once = [equations.y, m.held_value, ca.vertcat(ca.SX(0, 1), *m.stepped.values())]  # once a sample, at its beginning
+    first = ca.Function("first", equations.given, [*once, *_transposed_jacobians(once, symbols)], {"cse": True})
+    y, held, stepped, *by = first(*given)
+    Y, of_held, of_stepped = (chain(*by[i * len(symbols) : (i + 1) * len(symbols)]) for i in range(3))
+    constant = ca.horzcat(of_held, seed) if seed.nnz() else of_held
+    following, T = _all_steps(equations, T, constant, given, held)
     if m.stepped:
         places = list(m.stepped)
-        after[places], T[:, places] = stepped, of_stepped
-    return after, T, y, Y
+        following[places], T[:, places] = stepped, of_stepped
+    return following, T, y, Y
 
 
-def takes_several_steps(q: SampleEquations) -> bool:
-    """Whether a sample takes more than one explicit step, or implicit ones: not to be differentiated whole."""
-    return q.steps is not None and (isinstance(q.steps, ImplicitRadau) or q.steps.count > 1)
+def takes_several_steps(equations: SampleEquations) -> bool:
+    """Whether a sample takes more than one explicit integrator step, or implicit ones: not to be differentiated whole."""
+    steps = equations.steps
+    return steps is not None and (isinstance(steps, ImplicitRadau) or steps.count > 1)
 
 
-def _slopes(values: list[ca.SX], by: list[ca.SX]) -> list[ca.SX]:
-    """(d value/d symbols)^T of each value by each of `by`, sparse."""
-    return [ca.sparsify(ca.jacobian(value, symbols)).T for value in values for symbols in by]
+def _transposed_jacobians(values: list[ca.SX], symbols: list[ca.SX]) -> list[ca.SX]:
+    """(d value/d symbol)', sparse, of each value by each symbol in turn."""
+    return [ca.sparsify(ca.jacobian(value, symbol)).T for value in values for symbol in symbols]
 
 
-def _steps(q: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX) -> tuple[ca.MX, ca.MX]:
-    """y and T after all steps of a sample; `seed` by what keeps its value meanwhile: `held`, then the constants."""
-    y, u, u_next, e, c = given
-    free = seed.size2() > held.numel()
-    steps = q.integrator
-    on = _implicitly(q, steps, free) if isinstance(steps, ImplicitRadau) else _explicitly(q, steps, free)
-    for begin, end in pairwise(steps.drives(u, u_next, q.linear)):
-        y, T = on(T, seed, [y, begin, end, held, e, c])
-    return y, T
+def _all_steps(
+    equations: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX
+) -> tuple[ca.MX, ca.MX]:
+    """S and T after all integrator steps of a sample; `seed` by the `held` values, then by c where c has a seed."""
+    S, u, u_next, e, c = given
+    c_varies = seed.size2() > held.numel()
+    steps = equations.integrator
+    if isinstance(steps, ImplicitRadau):
+        step = _implicit_step(equations, steps, c_varies)
+    else:
+        step = _explicit_step(equations, steps, c_varies)
+    for u_start, u_end in pairwise(steps.drives(u, u_next, equations.linear)):
+        S, T = step(T, seed, [S, u_start, u_end, held, e, c])
+    return S, T
 
 
-def _implicitly(q: SampleEquations, steps: ImplicitRadau, free: bool) -> Step:
-    """A step through points Y = base + M n with n = N(Y): dn = (1 - N_Y M)^-1 (N_Y dbase + N_c dc)."""
-    along = _along(q, free)
+def _implicit_step(equations: SampleEquations, steps: ImplicitRadau, c_varies: bool) -> Step:
+    """The step of `ImplicitRadau`: at each of its two points Y = base + M n, n = N(Y), so that
+
+    dn = (1 - N_Y M)^-1 (N_Y dbase + N_c dc).
+    """
+    evaluate = _step_with_jacobians(equations, c_varies)
     E_c, E, P, W, V = (M.T for M in (steps.E_c, steps.E, steps.P, steps.W, steps.V))
 
-    def on(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
-        y, *slopes = along(*given)
+    def step(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
+        after, by_Y_1, by_Y_2, by_constant_1, by_constant_2 = evaluate(*given)
 
-        def of_n(base: ca.MX, M: ca.DM, by_y: ca.MX, by_kept: ca.MX) -> ca.MX:
-            return (base @ by_y + seed @ by_kept) @ ca.inv(ca.DM.eye(M.size1()) - M @ by_y)
+        def derivative_of_n(base: ca.MX, M: ca.DM, by_Y: ca.MX, by_constant: ca.MX) -> ca.MX:
+            return (base @ by_Y + seed @ by_constant) @ ca.inv(ca.DM.eye(M.size1()) - M @ by_Y)
 
-        first = of_n(T @ E_c, P, slopes[0], slopes[2])
+        first = derivative_of_n(T @ E_c, P, by_Y_1, by_constant_1)
         base = T @ E + first @ W
-        return y, base + of_n(base, V, slopes[1], slopes[3]) @ V
+        return after, base + derivative_of_n(base, V, by_Y_2, by_constant_2) @ V
 
-    return on
+    return step
 
 
-def _explicitly(q: SampleEquations, steps: ExponentialRungeKutta, free: bool) -> Step:
-    """A step from point to point."""
-    along = _along(q, free)
-    read = sorted({row for i in range(1, 1 + POINTS) for row in along.sparsity_out(i).row()})  # the states N depends on
-    half, Q, R = (_columns(M.T, read) for M in (steps.half, steps.Q, steps.R))
+def _explicit_step(equations: SampleEquations, steps: ExponentialRungeKutta, c_varies: bool) -> Step:
+    """The step of `ExponentialRungeKutta`, differentiated from point to point; its matrices as there, transposed."""
+    evaluate = _step_with_jacobians(equations, c_varies)
+    # N depends on some states only: the other columns of the points' derivatives are not needed
+    states = sorted({row for i in range(1, 1 + POINTS) for row in evaluate.sparsity_out(i).row()})
+    half, Q, R = (_columns(M.T, states) for M in (steps.half, steps.Q, steps.R))
 
-    def on(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
-        y, *slopes = along(*given)
-        by_y, enters = slopes[:POINTS], [ca.densify(seed @ slope) for slope in slopes[POINTS:]]
+    def step(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
+        after, *by = evaluate(*given)
+        by_Y, entering = by[:POINTS], [ca.densify(seed @ by_constant) for by_constant in by[POINTS:]]
         halfway, whole = T @ half, T @ steps.E.T
-        first = ca.mac(T, by_y[0], enters[0])
-        second = ca.mac(ca.mac(first, Q, halfway), by_y[1], enters[1])
-        third = ca.mac(ca.mac(second, Q, halfway), by_y[2], enters[2])
-        fourth = ca.mac(ca.mac(third, 2 * Q, ca.mac(first, R, whole)), by_y[3], enters[3])
+        # dN at the four points; mac(A, B, C) is A B + C
+        first = ca.mac(T, by_Y[0], entering[0])
+        second = ca.mac(ca.mac(first, Q, halfway), by_Y[1], entering[1])
+        third = ca.mac(ca.mac(second, Q, halfway), by_Y[2], entering[2])
+        fourth = ca.mac(ca.mac(third, 2 * Q, ca.mac(first, R, whole)), by_Y[3], entering[3])
         T = whole
         for value, W in zip((first, second, third, fourth), steps.W, strict=True):
             T = ca.mac(value, W.T, T)
-        return y, T
+        return after, T
 
-    return on
-
-
-def _along(q: SampleEquations, free: bool) -> ca.Function:
-    """(y, u, u at the end, held, ambient, c) -> y one step on, then the transposed slopes of N at its points by y,
-    then those by what keeps its value through a sample: held and, where they are `free`, the constants."""
-    N, arguments, kept = _rest(q, free)
-    y, u, end, *own = arguments
-    slopes = ca.Function("slopes", [y, u, *own], _slopes([N(y, u, *own)], [y, kept]))
-    after, points = q.integrator.points(lambda y, u: N(y, u, *own), y, u, end)
-    by_y, by_kept = zip(*(slopes(*point, *own) for point in points), strict=True)
-    return ca.Function("along", arguments, [after, *by_y, *by_kept], {"cse": True})
+    return step
 
 
-def _rest(q: SampleEquations, free: bool) -> tuple[ca.Function, list[ca.SX], ca.SX]:
-    """N (y, u, held, ambient, c); symbols y, u, u at the end, held, ambient, c; those of what keeps its value."""
-    y, u, _, e, c = q.given
-    own = [q.model.held, e, c]
-    N = ca.Function("N", [y, u, *own], [q.integrator.nonlinear_rates(q.model)])
-    return N, [y, u, ca.SX.sym("end", u.numel()), *own], ca.vertcat(q.model.held, c) if free else q.model.held
+def _step_with_jacobians(equations: SampleEquations, c_varies: bool) -> ca.Function:
+    """[Y, u, u at the end, held values, ambient, c] -> Y one step on, then N_Y' at each point of the step, then the transposed
+    derivative of N by what is constant within the sample: the held values and, where it varies, c."""
+    Y, u, _, e, c = equations.given
+    held, u_end = equations.model.held, ca.SX.sym("end", u.numel())
+    constant = ca.vertcat(held, c) if c_varies else held
+    N = ca.Function("N", [Y, u, held, e, c], [equations.integrator.nonlinear_rates(equations.model)])
+    by = _transposed_jacobians([N(Y, u, held, e, c)], [Y, constant])
+    jacobians = ca.Function("jacobians", [Y, u, held, e, c], by)
+    after, points = equations.integrator.points(lambda Y, u: N(Y, u, held, e, c), Y, u, u_end)
+    by_Y, by_constant = zip(*(jacobians(*point, held, e, c) for point in points), strict=True)
+    return ca.Function("step", [Y, u, u_end, held, e, c], [after, *by_Y, *by_constant], {"cse": True})
 
 
 def _columns(M: ca.DM, wanted: list[int]) -> ca.DM:
-    """M with nothing in the other columns."""
+    """M, sparse, with zeros in the other columns."""
     found = ca.DM(*M.shape)
     found[:, wanted] = M[:, wanted]
     return ca.sparsify(found)

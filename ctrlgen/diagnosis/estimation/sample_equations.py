@@ -1,7 +1,7 @@
-"""What a model does in one sample, in numbers that stay as they are through a record.
+"""The equations of one sample, with everything that depends on the parameters alone computed once for a record.
 
-What depends on the parameters p alone (a Jacobian of struts, say) is such a number: it is computed once for a record,
-not once a sample.
+F(S, u, u+, e, p) and H(S, u, e, p) become functions of constants c(p) instead of p. Where the model holds much that depends
+on p alone (a Jacobian of struts, for instance), c holds those results; else c = p.
 """
 
 from __future__ import annotations
@@ -19,8 +19,11 @@ from ctrlgen.model.model import Model
 
 @dataclass(frozen=True, eq=False)
 class SampleEquations:
-    """`constants` p -> c, dc/dp; S at the next sample (`following`) and the readings y in terms of `given`: S, u, u at the
-    next sample, ambient, c. With inertia `model` moves in terms of c, too, by `steps`, the drive `linear` or held."""
+    """S at the next sample, `following`, and the readings `y`, as expressions in `given`: S, u, u+, ambient, c.
+
+    `constants` is p -> c, dc/dp. A model with inertia takes the `steps` of its integrator within the sample, under a drive
+    that is `linear` or held; `model` states its rates in terms of c.
+    """
 
     constants: ca.Function
     model: Model
@@ -34,43 +37,41 @@ class SampleEquations:
     def integrator(self) -> ExponentialRungeKutta | ImplicitRadau:
         """The steps of a model with inertia. Raises ValueError for one without."""
         if self.steps is None:
-            raise ValueError("a model in balance takes no steps")
+            raise ValueError("a model in balance takes no integrator steps")
         return self.steps
 
 
 def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> SampleEquations:
-    """Of `model` with readings `y`, settled where `sample_time` is infinite."""
-    moving = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
-    after = None if model.inertial else _after(model, sample_time, linear)
-    if after is not None:
-        following = ca.vertcat(after.x, after.z)
+    """The sample equations of `model` with readings `y` (n_y,); of settled poses where `sample_time` is infinite."""
+    expressions = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
+    sample = None if model.inertial else _one_step(model, sample_time, linear)
+    if sample is not None:
+        following = ca.vertcat(sample.x, sample.z)
         if not np.isfinite(sample_time):  # a settled pose is read after it has settled
-            y = ca.substitute(y, ca.vertcat(model.x, model.z, model.u), ca.vertcat(following, after.u_next))
-        moving = [following, y]
-    rows, symbols, parametric = ca.extract_parametric(moving, model.p, {"extract_trivial": True})
+            y = ca.substitute(y, ca.vertcat(model.x, model.z, model.u), ca.vertcat(following, sample.u_next))
+        expressions = [following, y]
+    in_symbols, symbols, parametric = ca.extract_parametric(expressions, model.p, {"extract_trivial": True})
     c, value = model.p, model.p
     if ca.Function("work", [model.p], parametric).n_instructions() > SIMULATION.parametric_operations:
-        moving, c, value = rows, ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
+        expressions = in_symbols
+        c, value = ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
     constants = ca.Function("constants", [model.p], [value, ca.jacobian(value, model.p)])
-    if after is None:
-        rates, held, stepped, y = moving
+    if sample is None:
+        rates, held, stepped, y = expressions
         stepped = dict(zip(model.stepped, ca.vertsplit(stepped), strict=True))
         nominal = constants(model.p_nominal)[0].full().ravel()
         model = replace(model, p=c, p_nominal=nominal, sampled_rates=rates, held_value=held, stepped=stepped)
-        after = _after(model, sample_time, linear)
-        following = ca.vertcat(after.x, after.z)
+        sample = _one_step(model, sample_time, linear)
+        following = ca.vertcat(sample.x, sample.z)
     else:
-        following, y = moving
-    following, y = ca.cse([following, y])  # before they are differentiated: afterwards it takes ten times as long
-    given = [ca.vertcat(model.x, model.z), model.u, after.u_next, model.ambient_symbol, c]
+        following, y = expressions
+    following, y = ca.cse([following, y])  # before differentiation: afterwards it takes ten times as long
+    given = [ca.vertcat(model.x, model.z), model.u, sample.u_next, model.ambient_symbol, c]
     steps = integrator_of(model, sample_time) if model.inertial else None
     return SampleEquations(constants, model, steps, linear, following, y, given)
 
 
-def _after(model: Model, sample_time: float, linear: bool) -> Sample:
-    return one_step_map(
-        model,
-        sample_time,
-        linear,
-        SIMULATION.newton_steps if np.isfinite(sample_time) else SIMULATION.pose_newton_steps,
-    )
+def _one_step(model: Model, sample_time: float, linear: bool) -> Sample:
+    settled = not np.isfinite(sample_time)
+    newton_steps = SIMULATION.pose_newton_steps if settled else SIMULATION.newton_steps
+    return one_step_map(model, sample_time, linear, newton_steps)

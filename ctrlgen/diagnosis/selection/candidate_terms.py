@@ -57,7 +57,7 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
         f = ca.Function("signals", [ca.vertcat(m.x, m.z), m.u, simulator.ambient, m.p], [rows])
         S = simulator.simulate_states(record, fit.theta, start if len(start) else None)[0]
         values = f.map(n)(
-            S.T, record.drive.T, simulator._ambients(record)[None, :], np.tile(fit.theta[:, None], (1, n))
+            S.T, record.drive.T, simulator.ambient_of(record)[None, :], np.tile(fit.theta[:, None], (1, n))
         )
         most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
         for where, row in zip(places, most, strict=True):
