@@ -74,10 +74,11 @@ def _all_steps(
     S, u, u_next, e, c = given
     c_varies = seed.size2() > held.numel()
     steps = equations.integrator
-    if isinstance(steps, ImplicitRadau):
-        step = _implicit_step(equations, steps, c_varies)
-    else:
-        step = _explicit_step(equations, steps, c_varies)
+    step = (
+        _implicit_step(equations, steps, c_varies)
+        if isinstance(steps, ImplicitRadau)
+        else _explicit_step(equations, steps, c_varies)
+    )
     for u_start, u_end in pairwise(steps.drives(u, u_next, equations.linear)):
         S, T = step(T, seed, [S, u_start, u_end, held, e, c])
     return S, T
