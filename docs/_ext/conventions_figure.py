@@ -49,9 +49,9 @@ def _from_above(axes, device, g, platform, base) -> None:
     for i in range(6):
         axes.plot(*np.column_stack([base[:2, i], platform[:2, i]]), color="0.6", lw=1)
     for j in range(3):
-        centre, turn = 1e3 * ca.DM(g.centre[j]).full()[:2, 0], ca.DM(g.turn[j]).full()
+        centre, rotation = 1e3 * ca.DM(g.centre[j]).full()[:2, 0], ca.DM(g.rotation[j]).full()
         for k in range(2):
-            way = turn[:2, k]  # positive displacement is along the push: `push` gives the paper's sign, not ours
+            way = rotation[:2, k]  # positive displacement is along the push: `push` gives the paper's sign, not ours
             axes.annotate("", centre + PUSH * way, centre, arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 1.6})
             axes.text(
                 *(centre + 1.35 * PUSH * way), device.axes[2 * j + k], color="C3", ha="center", va="center", fontsize=9
