@@ -16,6 +16,7 @@ import numpy as np
 
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.model.assembly import build_model
+from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
@@ -79,7 +80,7 @@ class Samples:
         """(y, before) -> the drives that lead from `before` to the T in y, in W."""
         m, (y, before, _) = self.model, self.symbols
         u = ca.SX.sym("u", self.axes)
-        step = self._at(m.step(self.scenario.sample_time or 1.0), u, before * m.x_scale + m.rest)
+        step = self._at(held_step(m, self.scenario.sample_time or 1.0), u, before * m.x_scale + m.rest)
         motion = step - y[self.axes :] * m.x_scale - m.rest
         slope = ca.jacobian(motion, u)
         return ca.Function("drive", [y, before], [-ca.solve(slope, ca.substitute(motion, u, 0))])
