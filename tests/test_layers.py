@@ -27,6 +27,7 @@ MAY_IMPORT = {  # package -> packages; every module may import its own package a
     "diagnosis.settings": "",
     "diagnosis.hypotheses": f"{PHYSICS} diagnosis.settings",
     "diagnosis.estimation": f"{PHYSICS} recordings diagnosis.settings diagnosis.hypotheses",
+    "diagnosis.shares": f"{DIAGNOSIS} reporting",
     "diagnosis.selection": f"{DIAGNOSIS}",
     "diagnosis.evidence": f"{DIAGNOSIS} diagnosis.selection",
     "diagnosis.report": f"{DIAGNOSIS} reporting diagnosis.selection",

@@ -75,6 +75,12 @@ def test_what_was_done_to_the_columns_is_said_in_one_sentence(loaded):
     assert len(said) == 1 and said[0].endswith("; one row in 4 kept.") and "'reading.force'" not in said[0]
 
 
+def test_a_record_knows_up_to_which_frequency_it_holds_anything(loaded):
+    """The columns hold nothing above it, which a noise taken from their differences must know."""
+    assert [r.band for r in loaded('low_pass = "60 Hz"\nkeep_every = 4').records] == [60.0, 60.0]
+    assert [r.band for r in loaded("").records] == [None, None]
+
+
 def test_a_limit_on_one_side_alone_is_kept_to_a_millionth_of_itself(loaded):
     """The position goes to 50 mm; what lies beyond by less is the rounding of the file."""
     model = loaded.model

@@ -92,6 +92,40 @@ def test_two_recordings_are_joined_channel_by_channel(tmp_path, model):
     assert any("given twice" in what for what in refused([a, a], model).values())
 
 
+# what matters to the reader
+
+
+def test_a_tolerance_is_carried_in_si_and_the_strictest_counts(tmp_path, model):
+    def stating(first: str | None, second: str | None):
+        two(tmp_path, samples())
+        reading = COLUMNS["reading.delta_x"]
+        records = [
+            {
+                "file": f"{name}.csv",
+                "role": role,
+                "columns": {"reading.delta_x": {**reading, **({"tolerance": t} if t else {})}},
+            }
+            for name, role, t in (("fit", "fit", first), ("held", "hold_out", second))
+        ]
+        return described(tmp_path, *records)
+
+    assert load_recordings([stating(None, None)], model).tolerance == (None,)
+    assert load_recordings([stating("2 um", None)], model).tolerance == (pytest.approx(2e-6),)
+    recording = load_recordings([stating("2 um", "500 nm")], model)
+    assert recording.tolerance == (pytest.approx(5e-7),)
+    assert "records state different tolerance; the smallest is taken" in recording.notes[0]
+    for wrong, said in (("0 um", "leave it out"), ("2", "unit"), ("2 deg", "deg"), ("-1 um", "negative")):
+        found = refused([stating(wrong, None)], model)["record[0].columns.'reading.delta_x'"]
+        assert "tolerance" in found and said in found
+
+
+def test_a_drive_has_no_tolerance(tmp_path, model):
+    two(tmp_path, samples())
+    columns = {**COLUMNS, "drive.1X": {**COLUMNS["drive.1X"], "tolerance": "1 mW"}}
+    described(tmp_path, {"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}, columns=columns)
+    assert "tolerance: is for readings" in refused([tmp_path], model)["columns.'drive.1X'"]
+
+
 # refusals
 
 

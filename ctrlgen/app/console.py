@@ -163,16 +163,30 @@ def print_recording(recording: Recording) -> None:
 
 def print_diagnosis(found: Diagnosis) -> None:
     """The verdict, the findings and the held-out errors of a diagnosis."""
-    from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, number, sentence
+    from ctrlgen.diagnosis.report.narrative import (
+        gathered,
+        hypothesis_name,
+        interval,
+        next_steps,
+        number,
+        sentence,
+        share_text,
+    )
 
     out.print(f"[bold]{escape(sentence(found))}[/bold]", soft_wrap=True)
     if found.findings:
-        table = table_of(("found", "left"), ("at", "left"), ("parameter", "left"), ("estimate, 95 % interval", "left"))
+        table = table_of(
+            ("found", "left"),
+            ("at", "left"),
+            ("share", "right"),
+            ("parameter", "left"),
+            ("estimate, 95 % interval", "left"),
+        )
         for finding in found.findings:
             rows = [(name, interval(e)) for name, e in finding.parameters.items()]
-            alike = ", ".join(f"{effect} {location}" for effect, location in finding.alternatives)
+            alike = ", ".join(map(hypothesis_name, finding.alternatives))
             for k, (name, text) in enumerate(rows):
-                first = (finding.effect, finding.location) if k == 0 else ("", "")
+                first = (finding.effect, finding.location, share_text(finding.share)) if k == 0 else ("",) * 3
                 table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
         show_table(table)
     table = table_of(

@@ -17,7 +17,7 @@ class Mechanics(Section):
     """The moving mass and its flexures; with zero stiffness the axis integrates."""
 
     domain: ClassVar[str] = "stage"
-    tolerance: ClassVar[float | None] = 0.1
+    relative_sd: ClassVar[float | None] = 0.1
 
     mass: Annotated[Quantity, In("kg", positive=True)]
     """Moving mass m."""
@@ -33,7 +33,7 @@ class Actuator(Section):
     """A motor whose force is proportional to its drive, in volt or ampere."""
 
     domain: ClassVar[str] = "actuator"
-    tolerance: ClassVar[float | None] = 0.1
+    relative_sd: ClassVar[float | None] = 0.1
 
     force_constant: ForceConstant
     """Force per drive k_f; its unit decides whether the drive is a voltage or a current."""
@@ -48,7 +48,7 @@ class Loop(Section):
     """
 
     domain: ClassVar[str] = "actuator"
-    tolerance: ClassVar[float | None] = 0.0
+    relative_sd: ClassVar[float | None] = 0.0
 
     measures: Literal["reading", "displacement"] = "reading"
     """What y is: the recorded reading with all its errors, or the displacement q, seen by an encoder of its own."""

@@ -151,12 +151,22 @@ class InertialPhysics(DevicePhysics):
 
 @dataclass(frozen=True, kw_only=True)
 class ImposedPhysics(DevicePhysics):
-    """A stage whose motion is imposed, u = (displacement, velocity, acceleration), and the force that takes is read.
+    """A stage whose motion is imposed and the force that takes is read.
 
-    The reading is force(u, d) + restoring_force(d).
+    With n axes u (3 n,) holds their displacements, then their velocities, then their accelerations (`imposed_motion`).
+    The reading (n,), one for each axis, is force(u, d) + restoring_force(d).
     """
 
     force: Callable[[ca.SX, ca.SX], ca.SX]
+
+
+def imposed_motion(axes: tuple[str, ...] | None, unit: str, scale: tuple[float, ...]) -> Signal:
+    """The drive of `ImposedPhysics`: the channels 'position', 'velocity' and 'acceleration' of one axis without a name (None),
+    or 'q1_position', ... of axes with names; `unit` is that of the displacements, `scale` (3 n,) in SI."""
+    kinds = {"position": unit, "velocity": f"{unit}/s", "acceleration": f"{unit}/s^2"}
+    names = [kind if axis is None else f"{axis}_{kind}" for kind in kinds for axis in axes or (None,)]
+    units = [written for written in kinds.values() for _ in axes or (None,)]
+    return Signal("motion", "imposed motion", tuple(names), tuple(units), "", ca.SX.sym("u", len(names)), scale)
 
 
 class Device(Section):

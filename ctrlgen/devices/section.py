@@ -10,11 +10,11 @@ from pydantic import BaseModel, ConfigDict
 class Section(BaseModel):
     """A table of a device file. Unknown keys are faults; nothing changes after loading. The docstring below a key describes it.
 
-    `domain` is the part of the device to which a report assigns its numbers; `tolerance` their relative standard deviation
+    `domain` is the part of the device to which a report assigns its numbers; `relative_sd` their relative standard deviation
     where the file states none; None where any deviation from the file would be a finding.
     """
 
     domain: ClassVar[str] = "mechanism"
-    tolerance: ClassVar[float | None] = None
+    relative_sd: ClassVar[float | None] = None
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, use_attribute_docstrings=True)

@@ -5,8 +5,9 @@
 3. The device as described is refitted within its stated uncertainty (`estimation.fit`).
 4. Hypotheses are listed: every effect at every location, every parameter of the device (`hypotheses`).
 5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
-6. Residual tests and the held-out data give the verdict (`estimation.residual_tests`, `selection.verdict`).
-7. Supporting analyses: where the residual is, what was detectable, what to record next (`evidence`).
+6. Every accepted cause gets its share of the mismatch (`selection.attribution`).
+7. Residual tests and the held-out data give the verdict (`estimation.residual_tests`, `selection.verdict`).
+8. Supporting analyses: where the residual is, what was detectable, what to record next (`evidence`).
 """
 
 from __future__ import annotations
@@ -22,20 +23,21 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.isolated_outliers import mark_outliers
-from ctrlgen.diagnosis.estimation.noise import estimate_noise
-from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
+from ctrlgen.diagnosis.estimation.noise import Noise, estimate_noise
+from ctrlgen.diagnosis.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.diagnosis.estimation.profile_likelihood import profiles
 from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
-from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
+from ctrlgen.diagnosis.selection.attribution import attribute
+from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
 from ctrlgen.diagnosis.selection.result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.verdict import verdict
-from ctrlgen.diagnosis.settings import NOISE_UPDATE, SIMULATION
+from ctrlgen.diagnosis.settings import NOISE, NOISE_UPDATE, SIMULATION
 from ctrlgen.effects import Effect
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
@@ -74,53 +76,89 @@ def _diagnose(
     laws: Sequence[str] | None,
 ) -> Diagnosis:
     effects = selected_laws(laws)
-    recording = _relative_ambient(recording)
-    missing = [role for role in ("fit", "hold_out") if not any(r.role == role for r in recording.records)]
-    if missing:
-        raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
+    recording = _relative_ambient(_with_both_roles(recording))
     step("noise")
     live = without_dead_channels(device, recording, effects)
-    recording = live.recording
-    noise = estimate_noise(recording, settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time)))
-    fitter = Fitter(recording, noise, checkpoint)
-    for _ in range(NOISE_UPDATE.guessed_refits if noise.guessed.any() else 0):
-        fitter.noise = update_guessed_noise(fitter, fitter.fit(Structure(device)))
-    noise = fitter.noise
-    described = fitter.fit_described(device)
-    fitter.recording, outliers = mark_outliers(recording, lambda record: fitter.predict(described, record))
-    suspected = _hypotheses(device, recording, effects)
+    fitter = _with_noise(device, Fitter(live.recording, _noise(device, live.recording), checkpoint))
+    known = fitter.noise.known
+    suspected = _hypotheses(device, live.recording, effects)
     step(f"refit of the device as described, {len(suspected)} hypotheses")
-    search = Searcher(fitter, Screen(fitter, suspected, seed), step).run(Structure(device))
+    fitter, outliers = _without_outliers(device, fitter)
+    search = Searcher(fitter, Screen(fitter, suspected, seed), step).run(device)
     step("residual tests")
-    tests = run_residual_tests(fitter, search.chosen.fit)
-    detected = (*live.findings, *directly_detected_findings(fitter, search, effects))
-    answer = verdict(fitter, search, tests, bool(detected))
+    tests = run_residual_tests(search.fitter, search.chosen.fit)
+    shares = attribute(search, seed)
+    detected = (*live.findings, *directly_detected_findings(search, effects))
+    answer = verdict(search, tests, shares, bool(detected))
     step("supporting analyses")
-    likelihoods = profiles(fitter, search.chosen.fit)
-    analyses = run_supporting_analyses(fitter, search, tests.passed, seed)
+    likelihoods = profiles(search.fitter, search.chosen.fit)
+    analyses = run_supporting_analyses(search, tests.passed, seed)
+    notes = _notes(search, live.notes, outliers, tests.restless, laws, effects)
     return Diagnosis(
         verdict=answer,
-        findings=(*findings(search, likelihoods), *detected),
-        held_out=held_out_errors(fitter, search, noise.known),
+        findings=(*findings(search, shares, likelihoods), *detected),
+        attribution=shares,
+        held_out=held_out_errors(search, known),
         residual_tests=tests,
         residual_location=analyses.residual_location,
         detectability=analyses.detectability,
         next_experiment=analyses.next_experiment,
         search_history=analyses.search_history,
-        notes=(
-            *recording.notes,
-            *live.notes,
-            *fitter.noise.notes,
-            *([outliers] if outliers else []),
-            *map(RESTLESS.format, tests.restless),
-            *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
-        ),
+        notes=notes,
         device=device,
-        recording=fitter.recording,
+        recording=search.fitter.recording,
         search=search,
-        fitter=fitter,
+        fitter=search.fitter,
         profiles=likelihoods,
         extra=analyses.extra,
+    )
+
+
+def _with_both_roles(recording: Recording) -> Recording:
+    """The recording. Raises InputError where no record is to fit, or none is held out."""
+    missing = [role for role in ("fit", "hold_out") if not any(r.role == role for r in recording.records)]
+    if missing:
+        raise InputError(recording.title, [Fault("record", f"no record has role {role!r}") for role in missing])
+    return recording
+
+
+def _noise(device: Device, recording: Recording) -> Noise:
+    """The noise of every channel, before any fit."""
+    return estimate_noise(recording, settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time)))
+
+
+def _with_noise(device: Device, fitter: Fitter) -> Fitter:
+    """The fitter with noise that was guessed, or stated wrongly, taken from the residual of the device as described."""
+    for _ in range(NOISE_UPDATE.guessed_refits if fitter.noise.guessed.any() else 0):
+        fitter, described = fitter.described(device)
+        fitter = fitter.with_noise(update_guessed_noise(fitter, described))
+    if fitter.recording.kind == "series" and (fitter.noise.count == NOISE.stated_samples).any():
+        weighed, described = fitter.described(device)
+        fitter = fitter.with_noise(correct_stated_noise(weighed, described))
+    return fitter
+
+
+def _without_outliers(device: Device, fitter: Fitter) -> tuple[Fitter, str]:
+    """The fitter without samples that lie off the prediction of the device as described alone, and a note on them."""
+    weighed, described = fitter.described(device)
+    recording, note = mark_outliers(fitter.recording, lambda record: weighed.predict(described, record))
+    return replace(fitter, recording=recording), note
+
+
+def _notes(
+    search: SearchResult, live: Sequence[str], outliers: str, restless: Sequence[str], laws: Sequence[str] | None,
+    effects: Sequence[type[Effect]],
+) -> tuple[str, ...]:  # fmt: skip
+    """What was done to the recording, what is known of its noise, and what could not be tried."""
+    failed = dict.fromkeys(text for round_ in search.rounds for text in round_.failed)
+    return (
+        *search.fitter.recording.notes,
+        *live,
+        *search.fitter.noise.notes,
+        *([outliers] if outliers else []),
+        *map(RESTLESS.format, restless),
+        *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
+        *(f"could not be tried: {text}" for text in failed),
     )
 
 

@@ -61,6 +61,8 @@ class Effect:
     order: ClassVar[int] = 0
     # May put energy into the stage.
     active: ClassVar[bool] = False
+    # Shifts the recorded drive by its amplitude [s] in simulations of recordings; adds nothing to the model.
+    shifts_drive: ClassVar[bool] = False
     # The force at standstill takes any value that holds the stage there (dry friction). The integrator must then be
     # implicit, in the effect's states too, whose rates must be linear in the states.
     set_valued: ClassVar[bool] = False

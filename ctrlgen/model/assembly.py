@@ -47,7 +47,8 @@ def build_model(
     if counts:
         raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
     model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time)
-    idle = [path for path in free if path not in model.moved_by]
+    outside = {f"effect[{k}].{e.amplitude().name}" for k, e in enumerate(device.effect) if e.shifts_drive}
+    idle = [path for path in free if path not in model.moved_by and path not in outside]
     if idle:
         what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
         raise InputError(device.name, [Fault(path, what) for path in idle])
@@ -91,7 +92,7 @@ def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: 
     n = len(physics.axes)
     inertial = isinstance(physics, InertialPhysics)
     z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n if inertial else 0), ca.SX.sym("a", n if inertial else 0)
-    velocity = physics.drive.expr[1] if isinstance(physics, ImposedPhysics) else v
+    velocity = physics.drive.expr[n : 2 * n] if isinstance(physics, ImposedPhysics) else v
     terms = EffectTerms(device, physics, values, z, velocity, a, ambient, sample_time)
     faults = mounting_faults(device.sensor, physics.components, physics.pose_units) + terms.faults
     if faults:
@@ -211,7 +212,7 @@ def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) 
 
 
 def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
-    """Motion imposed, force read: the displacement is the first component of the drive."""
+    """Motion imposed, force read: the displacements are the first components of the drive."""
     n = len(physics.axes)
     drive = terms.added(Place.DRIVE, physics.drive.expr)
     displacement = terms.added(Place.DISPLACEMENT, z)

@@ -5,8 +5,12 @@
 
 from __future__ import annotations
 
+import time
+
 import casadi as ca
 import numpy as np
+
+from ctrlgen.numerics.compiled import Compilable
 
 BLOCK = 500  # samples of an unrolled recursion: CasADi takes longer to unroll a long one than to run it
 
@@ -38,20 +42,23 @@ class Recursion:
     """The recursion `one` (state, inputs ...) -> (next state, result), run sample after sample in unrolled blocks."""
 
     def __init__(self, one: ca.Function) -> None:
-        self.one = one
+        self.one = Compilable(one)
         self.unrolled: dict[int, ca.Function] = {}
 
     def run(self, state: np.ndarray, *inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States (n, n_s) after each of n samples and results (n, n_r), from `state` (n_s,) and inputs (n, .)."""
-        n = len(inputs[0])
+        n, one = len(inputs[0]), self.one.function
         size = min(n, BLOCK)
         if size not in self.unrolled:
-            self.unrolled[size] = self.one.mapaccum(size)
-        states, results = np.empty((n, self.one.size1_out(0))), np.empty((n, self.one.size1_out(1)))
+            self.unrolled[size] = one.mapaccum(size)
+        states, results = np.empty((n, one.size1_out(0))), np.empty((n, one.size1_out(1)))
+        begin = time.perf_counter()
         for a in range(0, n, size):
             b = min(a + size, n)
             # the last block is filled with its last sample
             block = [np.concatenate([x[a:b], np.repeat(x[b - 1 : b], a + size - b, axis=0)]) for x in inputs]
             after, found = evaluate(self.unrolled[size], state, *block)
             states[a:b], results[a:b], state = after[: b - a], found[: b - a], after[-1]
+        if self.one.spent(time.perf_counter() - begin):
+            self.unrolled.clear()
         return states, results

@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -65,7 +65,8 @@ def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
     divided = validation.with_hold_out(records, kind) if not faults else validation.Validated()
     if faults or divided.faults:
         raise InputError(source, [*faults, *divided.faults])
-    noise, noise_notes = _stated_noise(channels, columns)
+    noise, noise_notes = _stated(channels, columns, "noise")
+    tolerance, tolerance_notes = _stated(channels, columns, "tolerance")
     return Recording(
         title=" + ".join(dict.fromkeys(written.title for _, written in readable)),
         device=model.device.name,
@@ -74,7 +75,13 @@ def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
         units=names.units,
         noise=noise,
         records=divided.records,
-        notes=(*(note for content in contents for note in content.notes), *noise_notes, *divided.notes),
+        notes=(
+            *(note for content in contents for note in content.notes),
+            *noise_notes,
+            *tolerance_notes,
+            *divided.notes,
+        ),
+        tolerance=tolerance,
     )
 
 
@@ -83,17 +90,22 @@ def _channel_names(model: Model, channels: tuple[str, ...], units: tuple[str, ..
     return validation.ChannelNames(tuple(f"drive.{c}" for c in drive.channels), drive.units, channels, units)
 
 
-def _stated_noise(
-    channels: tuple[str, ...], columns: Sequence[tuple[str, Column]]
+def _stated(
+    channels: tuple[str, ...], columns: Sequence[tuple[str, Column]], key: Literal["noise", "tolerance"]
 ) -> tuple[tuple[float | None, ...], list[str]]:
-    """The stated standard deviation of each channel's noise [SI]; where records differ the largest, with a note."""
+    """The stated noise (standard deviation) or tolerance of each channel [SI], and notes where records differ.
+
+    Of different noise the largest is taken, of different tolerances the smallest.
+    """
+    worst, which = (max, "largest") if key == "noise" else (min, "smallest")
     stated: list[float | None] = []
     notes = []
     for channel in channels:
-        values = {deviation(c.noise, c.unit) for name, c in columns if name == channel and c.noise}
-        stated.append(max(values, default=None))
+        texts = {(text, c.unit) for name, c in columns if name == channel and (text := getattr(c, key))}
+        values = {deviation(text, unit) for text, unit in texts}
+        stated.append(worst(values, default=None))
         if len(values) > 1:
-            notes.append(f"{channel}: records state different noise; the largest is taken for all of them.")
+            notes.append(f"{channel}: records state different {key}; the {which} is taken for all of them.")
     return tuple(stated), notes
 
 
@@ -286,6 +298,7 @@ class _RecordReader:
             ambient=None if ambient is None else (np.zeros(n) + ambient)[kept],
             valid=(after_lead_in & recorded)[kept],
             period=None if table.period is None else table.period.si,
+            band=None if self.written.low_pass is None else self.written.low_pass.si,
         )
 
     def _ambient(self, given: str | Column | None) -> np.ndarray | float | None:

@@ -16,7 +16,9 @@ class Record:
     order of `model.signals["drive"].channels`, always finite. `observed` (n, n_y) in the order of `Recording.channels`, NaN
     where not `valid` (n, n_y): missing, in a gap, an outlier, stuck, or belonging to the other part of a divided record.
     `linear`: the drive is linear between samples; otherwise it is held. `ambient` (n,) [K], None where not given. `period`
-    [s] after which the drive is stated to repeat, None where it is not.
+    [s] after which the drive is stated to repeat, None where it is not. `band` [Hz]: cut-off of the low-pass that every
+    column passed, half of the amplitude there and less than a hundredth an octave above; None where nothing was filtered.
+    Half of `1/sample_time` is the highest frequency that the rows can hold.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Record:
     ambient: np.ndarray | None
     valid: np.ndarray
     period: float | None = None
+    band: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,7 @@ class Recording:
 
     `kind`: "series" or "poses". `channels` observed, such as 'reading.delta_x', with the reader's `units` and the stated
     standard deviation of their `noise` in SI, None where none is stated. `notes`: what validation marked or could not do.
+    `tolerance`: error of each channel in SI that does not matter to the reader, None where none is stated.
     """
 
     title: str
@@ -47,3 +51,8 @@ class Recording:
     noise: tuple[float | None, ...]
     records: tuple[Record, ...]
     notes: tuple[str, ...]
+    tolerance: tuple[float | None, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.tolerance:  # none stated
+            object.__setattr__(self, "tolerance", (None,) * len(self.channels))

@@ -26,6 +26,8 @@ class Column(Section):
     """Unit of the column's numbers after `scale`."""
     noise: str | None = None
     """Standard deviation of the noise, with its unit, such as `"10 nm"`. Left out: estimated from the recording."""
+    tolerance: str | None = None
+    """Error of this reading that does not matter, with its unit, such as `"2 um"`. Left out: the noise is what matters."""
     file: str | None = None
     """Another file than the record's, with the same samples row by row. Left out: the record's file."""
     scale: float = 1.0
@@ -119,7 +121,7 @@ class RecordingFile(Section):
 
 
 def deviation(text: str, unit: str) -> float:
-    """A standard deviation in SI; of a temperature, as a difference. Raises ValueError for text that is none."""
+    """A standard deviation or tolerance in SI; of a temperature, as a difference. Raises ValueError for text that is none."""
     temperature = same_dimension(unit, "K")
     value = parse(text.replace(" degC", " delta_degC") if temperature else text, "delta_degC" if temperature else unit)
     if value < 0:
@@ -211,6 +213,8 @@ class _Check:
                 self._fault(f"{place}.{name!r}", f"is no signal of {self.model.device.name}; {hint}")
             else:
                 self._check_unit(f"{place}.{name!r}", column, units[name])
+            if column.tolerance is not None and name.startswith("drive."):
+                self._fault(f"{place}.{name!r}", "tolerance: is for readings, which are predicted; a drive is given")
         for name, unit in units.items():
             if name.startswith("drive.") and name not in columns and name not in self.written.derivatives:
                 what = f'is missing, and the device cannot be simulated without it; add "{name}" = {{ column = "...", unit = "{unit}" }}'
@@ -232,11 +236,14 @@ class _Check:
         except ValueError as error:
             self._fault(where, f"{error}; write for example {unit!r}")
             return
-        try:
-            if column.noise is not None:
-                deviation(column.noise, column.unit)
-        except ValueError as error:
-            self._fault(where, f"noise: {error}")
+        for key, stated in (("noise", column.noise), ("tolerance", column.tolerance)):
+            try:
+                if stated is not None and deviation(stated, column.unit) == 0 and key == "tolerance":
+                    raise ValueError(
+                        f"{stated!r} would call every error large; leave it out, or give a size above zero"
+                    )
+            except ValueError as error:
+                self._fault(where, f"{key}: {error}")
 
     def _observed(self, record: RecordTable) -> set[str]:
         return {name for name in self.written.columns_of(record) if not name.startswith("drive.")}

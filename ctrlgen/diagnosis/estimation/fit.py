@@ -6,18 +6,19 @@ jointly, with the initial states of the records.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
+from ctrlgen.diagnosis.estimation.error_model import ErrorModel, error_model
 from ctrlgen.diagnosis.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT, STATISTICS
+from ctrlgen.diagnosis.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, STATISTICS
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record, Recording
 
@@ -26,8 +27,8 @@ from ctrlgen.recordings.recording import Record, Recording
 class Fit:
     """A fitted structure with k free parameters.
 
-    `theta` (k,) [SI]; `initial_states` [SI] of each record to fit; `chi2` the sum of the whitened squares of the readings,
-    over `n` usable samples; `penalty` that of the prior. `residual` (m,) and its Jacobian `J` (m, k + n_s) by the parameters
+    `theta` (k,) [SI]; `initial_states` [SI] of each record to fit; `chi2` Huber's loss of the whitened readings, over `n`
+    independent samples; `penalty` the squares of the prior. `residual` (m,) and its Jacobian `J` (m, k + n_s) by the parameters
     and the initial states [SI] at the optimum: rows of the readings of records of `shapes` (samples, channels), then of the
     prior.
     """
@@ -36,7 +37,7 @@ class Fit:
     theta: np.ndarray
     initial_states: tuple[np.ndarray, ...]
     chi2: float
-    n: int
+    n: float
     residual: np.ndarray
     J: np.ndarray
     penalty: float
@@ -46,11 +47,6 @@ class Fit:
     def objective(self) -> float:
         """What was minimised: chi2 + penalty."""
         return self.chi2 + self.penalty
-
-    @property
-    def is_noise(self) -> bool:
-        """Whether the residual is no larger than noise: the objective is below n + `STATISTICS.chance_excess` sqrt(2 n)."""
-        return self.objective < self.n + STATISTICS.chance_excess * np.sqrt(2 * self.n)
 
     @cached_property
     def covariance(self) -> np.ndarray:
@@ -89,16 +85,33 @@ class Fit:
         return nested.effect if abs(self.theta[i] - nested.value) <= STATISTICS.z_95 * sd else None
 
 
+@dataclass(frozen=True, eq=False)
 class Fitter:
-    """Fits structures to one recording under one noise model.
+    """Fits structures to one recording under the noise of its channels and the discrepancy `errors` of the models fitted.
 
-    Keeps compiled simulators in `cache`, and optima in the `checkpoint` where there is one. `recording` and `noise` may be
-    replaced between fits.
+    Without `errors` there is noise alone. Compiled simulators are kept in `cache`, which copies share, and optima in the
+    `checkpoint` where there is one.
     """
 
-    def __init__(self, recording: Recording, noise: Noise, checkpoint: Checkpoint | None = None) -> None:
-        self.recording, self.noise, self.checkpoint = recording, noise, checkpoint
-        self.cache: dict = {}
+    recording: Recording
+    noise: Noise
+    checkpoint: Checkpoint | None = None
+    errors: ErrorModel | None = None
+    cache: dict = field(default_factory=dict)
+
+    @property
+    def error(self) -> ErrorModel:
+        """Noise and discrepancy."""
+        return self.errors or ErrorModel.of_noise(self.noise)
+
+    def with_noise(self, noise: Noise) -> Fitter:
+        """The same under another noise, without discrepancy."""
+        return replace(self, noise=noise, errors=None)
+
+    def with_errors_of(self, fit: Fit) -> Fitter:
+        """The same with the discrepancy that `fit` leaves on the records to fit."""
+        residuals = [r.observed - self.predict(fit, r) for r in self.fit_records]
+        return replace(self, errors=error_model(self.noise, self.fit_records, [np.nan_to_num(e) for e in residuals]))
 
     @property
     def fit_records(self) -> list[Record]:
@@ -116,7 +129,7 @@ class Fitter:
 
     def problem(self, structure: Structure) -> LeastSquaresProblem:
         """The least-squares problem of a structure."""
-        return LeastSquaresProblem(structure, self.recording, self.noise, self.cache)
+        return LeastSquaresProblem(structure, self.recording, self.error, self.cache)
 
     def fit(
         self,
@@ -140,7 +153,8 @@ class Fitter:
         for i, p in enumerate(structure.free_parameters):
             if p.amplitude and structure.cause_of(p) not in nested.structure.causes:
                 near[i] = p.nominal + FIT.restart_amplitude * (near[i] - p.nominal)
-        near[problem.k :] = np.concatenate(nested.initial_states)
+        if len(states := np.concatenate([np.zeros(0), *nested.initial_states])) == problem.n_initial:
+            near[problem.k :] = states
         stated = np.concatenate([structure.start, np.zeros(problem.n_initial)])
         for i, p in enumerate(structure.free_parameters):
             if p.cause is None:
@@ -148,20 +162,27 @@ class Fitter:
         again = (self._optimum(problem, x, steps) for x in (near, stated))
         return min(found, *again, key=lambda fit: fit.objective)
 
-    def fit_described(self, device: Device) -> Fit:
-        """The device as described, without causes.
+    def described(self, device: Device) -> tuple[Fitter, Fit]:
+        """The device as described, without causes, and the fitter with the discrepancy that it leaves.
 
-        Where its residual is far above the noise, the fit is repeated with each uncertain number one standard deviation
-        below and above its stated value: a device that drifts, or saturates in a loop, has several local optima.
+        Discrepancy and fit are estimated in turn (feasible generalised least squares), first at the stated numbers. Where the
+        residual is far above the noise, the fit is repeated with each uncertain number one standard deviation below and above
+        its stated value: a device that drifts, or saturates in a loop, has several local optima.
         """
-        found = self.fit(Structure(device))
-        if not self.noise.known.all() or found.objective < FIT.poor_start_rms**2 * found.n:
-            return found
+        fitter = self.with_errors_of(self.fit(Structure(device), steps=0))
+        for _ in range(DISCREPANCY.updates):
+            before, found = fitter, fitter.fit(Structure(device))
+            fitter = fitter.with_errors_of(found)
+            if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same):
+                break
+        found = fitter.fit(Structure(device))
+        if np.all(fitter.error.rms < FIT.poor_start_rms * self.noise.floor):
+            return fitter, found
         for p in found.structure.free_parameters:
             for start in (p.nominal - p.sd, p.nominal + p.sd) if p.sd else ():
-                again = self.fit(Structure(device, nominal_starts={p.path: start}))
+                again = fitter.fit(Structure(device, nominal_starts={p.path: start}))
                 found = min(found, again, key=lambda fit: fit.objective)
-        return found
+        return fitter.with_errors_of(found), found
 
     def initial_objective(self, structure: Structure) -> float:
         """The objective at the structure's starting values."""
@@ -174,7 +195,7 @@ class Fitter:
         """The optimum from `start` [SI], taken from the checkpoint where it was found before."""
         if self.checkpoint is None:
             return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps))
-        s, noise = problem.structure, self.noise
+        s, noise = problem.structure, self.error.weighted
         valid = [int(r.valid.sum()) for r in self.recording.records]
         key = key_of(s.causes, s.starts, sorted(s.nominal_starts.items()), start, steps, noise.sd, *noise.ar, valid)
         optimum = self.checkpoint.recall(key)
@@ -194,7 +215,7 @@ class Fitter:
             return simulator.simulate(record, fit.theta)
         y, Y = simulator.sensitivities(record, fit.theta, np.zeros(len(sd)), by_free=False)
         white = self._white(record, y)
-        J = self.noise.whiten(Y, record.valid).reshape(len(white), len(sd)) * sd
+        J = self.error.whiten(Y, record.valid).reshape(len(white), len(sd)) * sd
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
             return y
         with_prior = np.vstack([J, np.eye(len(sd))])
@@ -209,10 +230,10 @@ class Fitter:
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         """Whitened residual (n n_y,), not bounded."""
-        return self.noise.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
+        return self.error.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
 
     def whitened_residual(self, fit: Fit, record: Record) -> np.ndarray:
-        """Whitened residual (n, n_y) of a fitted structure on any record; zero where a sample is not usable."""
+        """Residual (n, n_y) of a fitted structure on any record, whitened by the noise; zero where a sample is not usable."""
         return limited(whiten_residual(self.noise, record, self.predict(fit, record)))
 
     def held_out_squares(self, fit: Fit) -> float:
@@ -231,7 +252,7 @@ def _fit_at(problem: LeastSquaresProblem, x: np.ndarray) -> Fit:
         theta=values[:k],
         initial_states=tuple(np.split(values[k:], np.cumsum([len(s) for s in problem.initial_sd])[:-1])),
         chi2=float(readings @ readings),
-        n=sum(int(problem.noise.usable(r.valid).sum()) for r in problem.records),
+        n=float(sum(problem.error.effective(r.valid).sum() for r in problem.records)),
         residual=residual,
         J=J / problem.si_by_scaled(values),
         penalty=float(prior @ prior),

@@ -24,17 +24,6 @@ class HeldOutRefit:
     log_det: float
 
 
-def held_out_deviance(fitter: Fitter, fit: Fit) -> float:
-    """-2 ln of the predictive likelihood of the held-out records, by Laplace's approximation, up to a constant.
-
-    |r|^2 + dp' C^-1 dp + ln det(I + C J'J), after one step of the refit, or a few where the structure nearly explains the
-    records to fit.
-    """
-    nearly = fit.objective < HELD_OUT_REFIT.nearly_noise * fit.n
-    refit = refit_to_held_out(fitter, fit, HELD_OUT_REFIT.max_steps if nearly else 1)
-    return fitter.held_out_squares(refit.fit) + refit.penalty + refit.log_det
-
-
 def refit_to_held_out(fitter: Fitter, fit: Fit, steps: int = 1) -> HeldOutRefit:
     """The parameters refitted to the held-out records by at most so many Gauss-Newton steps, within their bounds.
 

@@ -1,7 +1,8 @@
 """The least-squares problem of one structure: whitened residual and Jacobian, in scaled variables.
 
-min |W (y - y(p, s))|^2 + sum ((p_i - nominal_i)/sd_i)^2 + sum (s_j/sd_j)^2 over the free parameters p and the initial states
-s of the records to fit. W whitens with the noise; the second sum holds the device's own numbers near what is stated of them.
+min rho(W (y - y(p, s))) + sum ((p_i - nominal_i)/sd_i)^2 + sum (s_j/sd_j)^2 over the free parameters p and the initial states
+s of the records to fit. W whitens with the error model, rho is Huber's loss; the second sum holds the device's own numbers
+near what is stated of them.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ctrlgen.diagnosis.estimation.error_model import ErrorModel, huber
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
@@ -23,7 +25,7 @@ def initial_state_sd(simulator: Simulator) -> np.ndarray:
     return FIT.start_size * np.concatenate([m.x_scale, m.z_scale])[list(simulator.free_initial_states)]
 
 
-def whiten_residual(noise: Noise, record: Record, y: np.ndarray) -> np.ndarray:
+def whiten_residual(noise: Noise | ErrorModel, record: Record, y: np.ndarray) -> np.ndarray:
     """Observed minus `y` (n, n_y) [SI], whitened; zero where a sample is not usable, bounded where `y` has diverged."""
     residual = np.where(record.valid, record.observed - y, 0.0)
     return noise.whiten(_bounded(residual, FIT.reading_limit), record.valid)
@@ -47,8 +49,8 @@ class LeastSquaresProblem:
     size; of a time or a speed that shapes a law, which may lie anywhere within decades, x is the logarithm.
     """
 
-    def __init__(self, structure: Structure, recording: Recording, noise: Noise, cache: dict) -> None:
-        self.structure, self.noise = structure, noise
+    def __init__(self, structure: Structure, recording: Recording, error: ErrorModel, cache: dict) -> None:
+        self.structure, self.error = structure, error
         self.simulators = structure.simulators(recording, cache)
         self.records = [r for r in recording.records if r.role == "fit"]
         self.initial_sd = [initial_state_sd(self.simulators[r.sample_time, r.linear]) for r in self.records]
@@ -92,7 +94,7 @@ class LeastSquaresProblem:
         """The residual (m,) alone, without the work that the Jacobian takes."""
         values = self.to_si(x)
         rows = [
-            whiten_residual(self.noise, record, simulator.simulate(record, values[: self.k], values[own])).ravel()
+            self._robust(record, simulator.simulate(record, values[: self.k], values[own]))[0].ravel()
             for record, simulator, own in self._records()
         ]
         return self._with_prior(rows, x)
@@ -106,8 +108,9 @@ class LeastSquaresProblem:
         rows, blocks = [], []
         for record, simulator, own in self._records():
             y, Y = simulator.sensitivities(record, values[:k], values[own])
-            rows.append(whiten_residual(self.noise, record, y).ravel())
-            W = self.noise.whiten(_clipped(Y), record.valid).reshape(len(rows[-1]), Y.shape[2])
+            robust, weight = self._robust(record, y)
+            rows.append(robust.ravel())
+            W = self.error.whiten(_clipped(Y), record.valid).reshape(len(rows[-1]), Y.shape[2]) * weight.reshape(-1, 1)
             J = np.zeros((len(W), len(x)))
             J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
             blocks.append(J * si_by_scaled)
@@ -117,6 +120,10 @@ class LeastSquaresProblem:
         J = np.nan_to_num(np.vstack([*blocks, P, np.eye(len(x))[k:]]), posinf=0.0, neginf=0.0)
         self._last = x.copy(), self._with_prior(rows, x), J
         return self._last[1:]
+
+    def _robust(self, record: Record, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values whose squares are the loss of the readings `y` (n, n_y) [SI], and the weights of their derivatives."""
+        return huber(limited(whiten_residual(self.error, record, y)), self.error.corner)
 
     def _records(self) -> Iterator[tuple[Record, Simulator, slice]]:
         """Each record to fit, its simulator, and the places of its initial states among the variables."""

@@ -296,3 +296,16 @@ def ljung_box(e: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
         return 1.0
     r = np.array([float(e[k:] @ e[:-k]) / total for k in range(1, lags + 1)])
     return float(stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))
+
+
+def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
+    """p of the hypothesis that white `e` (n,) is uncorrelated with each drive (n, n_u) at lags 0 ... `lags` (Bonferroni)."""
+    n, worst = len(e), 0.0
+    for u in drive.T:
+        u = u - np.mean(u)
+        if np.std(u) == 0:
+            continue
+        for k in range(lags + 1):
+            a, b = e[k:], u[: n - k]
+            worst = max(worst, abs(float(a @ b)) / (np.std(e) * np.linalg.norm(b)))
+    return float(min(1.0, 2 * stats.norm.sf(worst) * (lags + 1) * drive.shape[1]))

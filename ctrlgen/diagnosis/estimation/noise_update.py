@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.noise import Noise, autoregression, ljung_box, without_lines
+from ctrlgen.diagnosis.estimation.noise import Noise, autoregression, cross_correlation, ljung_box, without_lines
 from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
-from ctrlgen.diagnosis.settings import NOISE_UPDATE, STATISTICS
+from ctrlgen.diagnosis.settings import DISCREPANCY, NOISE, NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
 
 
@@ -18,11 +18,11 @@ def update_noise(fitter: Fitter, fit: Fit) -> Noise:
     """The noise after a fit with causes; the same object where the fit tells nothing new.
 
     Guessed noise is estimated again and replaced where it became smaller, for physics that was left out only adds to it.
-    Of other noise the colour may change, see `update_noise_colour`.
+    Of other noise the colour may change, see `update_noise_colour`, and of stated noise the size, see `correct_stated_noise`.
     """
     noise = fitter.noise
     if not noise.guessed.any():
-        return update_noise_colour(fitter, fit)
+        return correct_stated_noise(fitter.with_noise(update_noise_colour(fitter, fit)), fit)
     found = update_guessed_noise(fitter, fit)
     smaller = found.floor < noise.floor
     if not smaller.any():
@@ -69,6 +69,42 @@ def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tup
         return None
     a, b = max(edges.reshape(-1, 2), key=lambda stretch: stretch[1] - stretch[0])
     return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b])
+
+
+def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:
+    """The noise with the size of the residual of `fit` for channels whose stated noise is wrong; the same object where none is.
+
+    What is left is noise of another size, and no physics, where it is white on every record, its variance does not change, and
+    it has nothing to do with the drive. Physics of a stage that moves smoothly is never white.
+    """
+    noise = fitter.noise
+    sd, notes, count = noise.sd.copy(), list(noise.notes), noise.count.copy()
+    for i in np.flatnonzero(noise.count == NOISE.stated_samples).tolist():
+        records = [r for r in fitter.recording.records if r.role != "rest"]
+        residuals = [_residual(fitter, fit, r, i) for r in records]
+        size = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+        ratio = size / noise.floor[i]
+        if not (1 / NOISE_UPDATE.stated_factor < ratio < NOISE_UPDATE.stated_factor) or len(noise.ar[i]):
+            continue
+        if abs(ratio - 1) < NOISE_UPDATE.stated_margin or not all(
+            _is_noise_alone(e, r.drive[r.valid[:, i]]) for e, r in zip(residuals, records, strict=True)
+        ):
+            continue
+        sd[i], count[i] = size, sum(map(len, residuals))
+        notes[i] = (
+            f"{fitter.recording.channels[i]}: the stated noise is {1 / ratio:.2f} of what is left, which is white and has nothing to do "
+            "with the drive; what is left is taken as the noise"
+        )
+    return noise if np.array_equal(sd, noise.sd) else replace(noise, sd=sd, notes=tuple(notes), count=count)
+
+
+def _is_noise_alone(e: np.ndarray, drive: np.ndarray) -> bool:
+    """Whether `e` (n,) is white, of steady variance, and uncorrelated with the `drive` (n, n_u)."""
+    if len(e) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags or np.ptp(e) == 0:
+        return False
+    e = np.clip(e, *(DISCREPANCY.huber_corner * np.std(e) * np.array([-1, 1])))
+    p = (ljung_box(e), ljung_box(e**2 - np.mean(e**2)), cross_correlation(e, drive))
+    return min(p) > NOISE_UPDATE.noise_alone_p
 
 
 def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:

@@ -37,6 +37,6 @@ def _sensitivities(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray:
     if not np.isfinite(Y_all).all():
         return np.full((*Y_all.shape[:2], k), np.inf)
     Y, Y_s = Y_all[:, :, :k], Y_all[:, :, k:] * initial_state_sd(simulator)
-    white = fitter.noise.whiten(np.concatenate([Y, Y_s], axis=2), record.valid).reshape(-1, k + n_s)
+    white = fitter.error.whiten(np.concatenate([Y, Y_s], axis=2), record.valid).reshape(-1, k + n_s)
     WY, WY_s = white[:, :k], white[:, k:]
     return Y - Y_s @ np.linalg.solve(WY_s.T @ WY_s + np.eye(n_s), WY_s.T @ WY)

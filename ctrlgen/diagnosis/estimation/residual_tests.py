@@ -15,8 +15,9 @@ from scipy import stats
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.held_out import HeldOutRefit, refit_to_held_out
-from ctrlgen.diagnosis.estimation.noise import ljung_box, without_lines
-from ctrlgen.diagnosis.settings import HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.diagnosis.estimation.misfit import misfit
+from ctrlgen.diagnosis.estimation.noise import cross_correlation, ljung_box, without_lines
+from ctrlgen.diagnosis.settings import DISCREPANCY, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record
 
@@ -53,6 +54,7 @@ def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
     n_y = len(fitter.recording.channels)
     refit = refit_to_held_out(fitter, fit, HELD_OUT_REFIT.max_steps_tests)
     squares, count, p = _held_out_residual(fitter, refit)
+    fitted = misfit(fitter.noise, fitter.fit_records, [r.observed - fitter.predict(fit, r) for r in fitter.fit_records])
     ratio = tuple(np.sqrt(squares / np.maximum(count, 1.0)))
     smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
     noticed = max(ratio, default=0.0) > RESIDUAL_TESTS.noticed_ratio
@@ -63,9 +65,9 @@ def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
     smallest["size"] = min(1.0, n_y * min(map(float, by_channel)))
     large = any(r > RESIDUAL_TESTS.error_ratio * m for r, m in zip(ratio, margin, strict=True))
     too_large = large and smallest["size"] < RESIDUAL_TESTS.size_p
-    free = max(fit.n - len(fit.theta), 1)
-    smallest["fitted"] = float(stats.chi2.sf(fit.chi2 / max(margin) ** 2, free))
-    large = np.sqrt(fit.chi2 / free) > RESIDUAL_TESTS.error_ratio * max(margin)
+    free, left = max(float(fitted.n_white.sum()) - len(fit.theta), 1.0), float(fitted.white.sum())
+    smallest["fitted"] = float(stats.chi2.sf(left / max(margin) ** 2, free))
+    large = np.sqrt(left / free) > RESIDUAL_TESTS.error_ratio * max(margin)
     too_large |= large and smallest["fitted"] < RESIDUAL_TESTS.size_p
     restless = tuple(c for i, c in enumerate(fitter.recording.channels) if _moves_at_rest(fitter, fit, i))
     passed = bool(np.isfinite(ratio).all()) and not (too_large or rejected or restless)
@@ -73,15 +75,16 @@ def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
 
 
 def _held_out_residual(fitter: Fitter, refit: HeldOutRefit) -> tuple[np.ndarray, np.ndarray, dict[str, list[float]]]:
-    """Whitened squares (n_y,) with the refit's penalty, usable samples (n_y,), and the p of each test of whiteness."""
-    n_y = len(fitter.recording.channels)
-    squares, count = np.full(n_y, refit.penalty / n_y), np.zeros(n_y)
+    """Huber's loss of the whitened residual (n_y,) with the refit's penalty, usable samples (n_y,), and the p of each test of
+    whiteness, for which rare spikes are cut."""
+    n_y, corner = len(fitter.recording.channels), DISCREPANCY.huber_corner
+    unseen = fitter.held_out_records
+    left = misfit(fitter.noise, unseen, [r.observed - fitter.predict(refit.fit, r) for r in unseen])
+    squares, count = left.white.sum(axis=0) + refit.penalty / n_y, left.n_white.sum(axis=0)
     p: dict[str, list[float]] = {"memory": [], "variance": [], "drive": []}
-    for record in fitter.held_out_records:
-        white = fitter.whitened_residual(refit.fit, record)
+    for record in unseen:
+        white = np.clip(fitter.whitened_residual(refit.fit, record), -corner, corner)
         usable = fitter.noise.usable(record.valid)
-        squares += np.sum(white**2, axis=0)
-        count += usable.sum(axis=0)
         if fitter.recording.kind == "series":
             for i in range(n_y):
                 e = white[usable[:, i], i]
@@ -106,18 +109,7 @@ def _is_no_noise(fitter: Fitter, fit: Fit, record: Record, i: int) -> bool:
     coarse = quantisation_step(readings) > RESIDUAL_TESTS.coarse_reading * fitter.noise.floor[i]
     if len(e) < SHORTEST or np.ptp(readings) == 0 or coarse:
         return False
-    e = without_lines(e)  # a vibration is a candidate of its own
+    e = without_lines(e)  # a vibration is a candidate of its own, and so are rare spikes
+    far = np.abs(e - np.mean(e)) > RESIDUAL_TESTS.spike * np.std(e)
+    e = e[~far] if np.mean(far) < RESIDUAL_TESTS.rare else e
     return min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESIDUAL_TESTS.rest_p
-
-
-def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
-    """p of the hypothesis that white `e` (n,) is uncorrelated with each drive (n, n_u) at lags 0 ... `lags` (Bonferroni)."""
-    n, worst = len(e), 0.0
-    for u in drive.T:
-        u = u - np.mean(u)
-        if np.std(u) == 0:
-            continue
-        for k in range(lags + 1):
-            a, b = e[k:], u[: n - k]
-            worst = max(worst, abs(float(a @ b)) / (np.std(e) * np.linalg.norm(b)))
-    return float(min(1.0, 2 * stats.norm.sf(worst) * (lags + 1) * drive.shape[1]))

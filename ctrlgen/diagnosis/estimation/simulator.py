@@ -9,10 +9,12 @@ State S = (x, z), drive u, ambient e, free parameters p:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.forward_sensitivities import forward_sensitivities, takes_several_steps
@@ -44,12 +46,43 @@ class Simulator:
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
 
     @cached_property
+    def _clock(self) -> tuple[float, int | None]:
+        """By how much the device's effects shift the recorded drive [s]: a fixed part, and the place in `free` of a free one."""
+        fixed, place = 0.0, None
+        for k, effect in enumerate(self.model.device.effect):
+            if effect.shifts_drive:
+                name = effect.amplitude().name
+                if (path := f"effect[{k}].{name}") in self.free:
+                    place = self.free.index(path)
+                else:
+                    fixed += effect.values[name].si
+        return fixed, place
+
+    def aligned(self, record: Record, p: np.ndarray) -> Record:
+        """The record with its drive at t + tau in place of t, tau the offset of the recorders' clocks; held at its ends.
+
+        Between samples a drive that is linear is interpolated by a cubic spline, a held one by its mean over a sample.
+        """
+        fixed, place = self._clock
+        tau = fixed + (p[place] if place is not None else 0.0)
+        if tau == 0 or not np.isfinite(self.sample_time) or len(record.time) < SIMULATION.shortest_spline:
+            return record
+        at = np.clip(record.time + tau, record.time[0], record.time[-1])
+        if record.linear:
+            drive = CubicSpline(record.time, record.drive)(at)
+        else:
+            drive = np.column_stack([np.interp(at, record.time, u) for u in record.drive.T])
+        return replace(record, drive=drive)
+
+    @cached_property
     def free_initial_states(self) -> tuple[int, ...]:
-        """Places in S of the initial states that are fitted: actuators' states and, with inertia, velocity and displacement."""
+        """Places in S of the initial states that are fitted: actuators' states, how far dry friction is bent when a record
+        begins, and, with inertia, velocity and displacement."""
         m = self.model
-        if not m.inertial:
-            return tuple(range(m.n_states)) if np.isfinite(self.sample_time) else ()
-        return (*range(m.n_states), *range(self.n_x - m.v.numel(), self.n_s))
+        if not np.isfinite(self.sample_time):
+            return ()
+        moving = range(self.n_x - m.v.numel(), self.n_s) if m.inertial else ()
+        return (*range(m.n_states), *m.bristles, *moving)
 
     @cached_property
     def _observed(self) -> ca.SX:
@@ -121,6 +154,7 @@ class Simulator:
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y) [SI]; arguments as of `simulate`."""
+        record = self.aligned(record, p)
         c = np.tile(self.equations.constants(p)[0].full().T, (len(record.time), 1))
         return self._recursion.run(self.starting_state(record, p, start), *self.inputs(record), c)
 
@@ -131,6 +165,9 @@ class Simulator:
 
         Without the derivatives by the parameters where `by_free` is False.
         """
+        clock = self._clock[1] if by_free else None
+        by_clock = None if clock is None else self._by_clock(record, p, start, clock)
+        record = self.aligned(record, p)
         c, c_p = self.equations.constants(p)
         k, n_i, n_y, n = len(self.free) * by_free, len(self.free_initial_states), len(self.channels), len(record.time)
         T_0 = np.zeros((k + n_i, self.n_s))
@@ -138,7 +175,19 @@ class Simulator:
         first = np.concatenate([self.starting_state(record, p, start), T_0.ravel(order="F")])
         constant = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(c_p.nonzeros())))
         values = self._recursion_with_sensitivities(by_free).run(first, *self.inputs(record), *constant)[1]
-        return values[:, :n_y], values[:, n_y:].reshape(n, n_y, k + n_i)
+        Y = values[:, n_y:].reshape(n, n_y, k + n_i)
+        if by_clock is not None:
+            Y[:, :, clock] = by_clock
+        return values[:, :n_y], Y
+
+    def _by_clock(self, record: Record, p: np.ndarray, start: np.ndarray | None, clock: int) -> np.ndarray:
+        """Derivative (n, n_y) of the readings by the offset of the clocks: a central difference over one sample."""
+        ends = []
+        for sign in (1, -1):
+            moved = p.copy()
+            moved[clock] += sign * self.sample_time / 2
+            ends.append(self.simulate(record, moved, start))
+        return (ends[0] - ends[1]) / self.sample_time
 
     @cached_property
     def _recursion(self) -> Recursion:

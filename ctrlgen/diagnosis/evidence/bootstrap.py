@@ -21,7 +21,6 @@ import numpy as np
 from ctrlgen.core.parallel import Failure, run_all, sendable
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
 from ctrlgen.diagnosis.selection.result import Diagnosis, Estimate
 from ctrlgen.diagnosis.settings import BOOTSTRAP
@@ -72,7 +71,7 @@ class Replicate:
     structure: Structure
     theta: np.ndarray
     recording: Recording
-    noise: Noise
+    fitter: Fitter
     predicted: tuple[np.ndarray, ...]
     blocks: tuple[int, ...]
     token: str
@@ -84,11 +83,10 @@ class Replicate:
             replace(r, observed=y + redrawn(r, y, block, rng))
             for r, y, block in zip(self.recording.records, self.predicted, self.blocks, strict=True)
         )
-        fitter = Fitter(replace(self.recording, records=records), self.noise)
         if self.token not in _COMPILED:
             _COMPILED.clear()
             _COMPILED[self.token] = {}
-        fitter.cache = _COMPILED[self.token]
+        fitter = replace(self.fitter, recording=replace(self.recording, records=records), cache=_COMPILED[self.token])
         s = self.structure
         stated = tuple(
             float(np.clip(value + u.sd * rng.standard_normal(), u.low, u.high)) if u.sd else u.nominal
@@ -145,7 +143,15 @@ def bootstrap(
     recording = replace(fitter.recording, records=tuple(fitter.fit_records))
     predicted = tuple(fitter.predict(fit, r) for r in recording.records)
     blocks = tuple(block_length(r, y) for r, y in zip(recording.records, predicted, strict=True))
-    work = Replicate(fit.structure, fit.theta, recording, fitter.noise, predicted, blocks, os.urandom(8).hex())
+    work = Replicate(
+        fit.structure,
+        fit.theta,
+        recording,
+        replace(fitter, cache={}, checkpoint=None),
+        predicted,
+        blocks,
+        os.urandom(8).hex(),
+    )
     if scheduler is None and not sendable(work):
         jobs = 0
     items = [[seed, k] for k in range(replicates)]

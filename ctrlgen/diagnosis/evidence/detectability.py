@@ -54,7 +54,7 @@ class Detectability:
     undetectable: tuple[Undetectable, ...]
 
 
-def detectability(fit: Fit, screened: Screened, n: int) -> Detectability:
+def detectability(fit: Fit, screened: Screened, n: float) -> Detectability:
     """Detectability of every hypothesis beside the causes of `fit`, from the screen of its residual over `n` samples.
 
     Where the residual exceeds the noise, the residual takes the place of the noise.

@@ -56,10 +56,10 @@ class Experiment:
         return self.after >= EXPERIMENT.settles
 
 
-def next_experiment(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 0) -> Experiment | None:
+def next_experiment(search: SearchResult, explained: bool, seed: int = 0) -> Experiment | None:
     """The drive that best discriminates between the chosen model and its rivals or, where the recording stays unexplained,
     between the two models that came closest; None where there is no such pair, or no admissible drive."""
-    pairs, reason = _open(fitter, search, explained)
+    fitter, (pairs, reason) = search.fitter, _open(search, explained)
     if not pairs:
         return None
     return max(
@@ -69,9 +69,9 @@ def next_experiment(fitter: Fitter, search: SearchResult, explained: bool, seed:
     )
 
 
-def _open(fitter: Fitter, search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]], str]:
+def _open(search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]], str]:
     """Pairs of fits between which the recording does not decide, and why these."""
-    rivals = sorted((t for rows in search.rivals for t in rows), key=lambda t: t.criterion)
+    rivals = [t for rows in search.rivals for t in rows]
     chosen = search.chosen.fit
     if rivals:
         return [(chosen, t.fit) for t in rivals[: EXPERIMENT.most_rivals]], "both explain this recording equally well"

@@ -138,6 +138,7 @@ def simulate_motion(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """State before and after each sample (n, n_s), and the readings (n, n_y)."""
     after, y = r.simulate_states(record, p, start)
+    record = r.aligned(record, p)
     return np.vstack([r.starting_state(record, p, start), after[:-1]]), after, y
 
 
@@ -145,7 +146,7 @@ def _linearised(
     r: Simulator, record: Record, p: np.ndarray, chosen: list[int], before: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """F_S, F_f, H_S, H_f along the motion."""
-    linear, inputs = r.linearise(p, chosen), (before, *r.inputs(record))
+    linear, inputs = r.linearise(p, chosen), (before, *r.inputs(r.aligned(record, p)))
     parts = [
         linear.evaluate_along(*(x[a : a + LTV_MODEL.block] for x in inputs))
         for a in range(0, len(before), LTV_MODEL.block)

@@ -48,7 +48,7 @@ def fit_empirical_term(fitter: Fitter, fit: Fit, models: list[LtvModel], i: int)
     into = np.linalg.pinv(J.T @ J, rcond=1e-12) @ (J[:n].T @ S)
     G = S.T @ S - (J[:n].T @ S).T @ into
     c = S.T @ fit.residual[:n] - into.T @ (J.T @ fit.residual)
-    a = _sparse(np.diag(S.T @ S), G, c, max(fit.chi2 - fit.n, 0.0), fit.n)
+    a = _sparse(np.diag(S.T @ S), G, c, max(fit.chi2 - fit.n, 0.0), int(fit.n))
     if not np.any(a):
         return None
     delta = (into @ a / scale)[: len(fit.theta)]

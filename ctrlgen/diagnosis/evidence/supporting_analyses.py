@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ctrlgen.core.to_json import plain
-from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.evidence.detectability import detectability
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment, next_experiment
 from ctrlgen.diagnosis.evidence.experiment_files import files
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel, linearise_along
 from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal, Round, SearchResult
 
 NEXT_DEVICE = "../device.next.toml"  # from the folder of the next experiment
 
@@ -30,9 +31,9 @@ class SupportingAnalyses:
     extra: dict[str, Any]
 
 
-def run_supporting_analyses(fitter: Fitter, search: SearchResult, explained: bool, seed: int = 0) -> SupportingAnalyses:
+def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0) -> SupportingAnalyses:
     """All supporting analyses. `explained`: the residual of the chosen model passes its tests. `seed` draws bootstrap and drives."""
-    recording = fitter.recording
+    fitter, recording = search.fitter, search.fitter.recording
     nominal, chosen = search.nominal.fit, search.chosen.fit
     records = [*fitter.fit_records, *fitter.held_out_records]
 
@@ -50,7 +51,7 @@ def run_supporting_analyses(fitter: Fitter, search: SearchResult, explained: boo
         location["after"]["unmodelled_force"] = {
             key: extra["unmodelled_force"][key] for key in ("statements", "empirical_term")
         }
-    experiment = next_experiment(fitter, search, explained, seed)
+    experiment = next_experiment(search, explained, seed)
     if experiment is not None:
         extra["files"] = files(fitter, chosen, experiment, NEXT_DEVICE)
     return SupportingAnalyses(
@@ -73,8 +74,12 @@ def search_history(search: SearchResult) -> tuple[dict[str, Any], ...]:
                 "round": number,
                 "threshold": float(round_.screened.threshold),
                 "suspects": len(round_.screened.suspects),
-                "criterion_before": float(round_.before.criterion),
-                "candidates": [_tried(t, round_, then) for t in round_.candidates],
+                "criterion_before": round_.criterion_before,
+                "candidates": [
+                    _tried(t, T, round_, then) for t, T in zip(round_.candidates, round_.criteria, strict=True)
+                ],
+                "refused": [_refused(r) for r in round_.refused],
+                "failed": list(round_.failed),
                 "causes_after": [[c.effect, c.location] for c in then.fit.structure.causes],
                 "decision": _decision(round_.before, then, bool(round_.candidates)),
             }
@@ -82,7 +87,13 @@ def search_history(search: SearchResult) -> tuple[dict[str, Any], ...]:
     return tuple(rows)
 
 
-def _tried(trial: CandidateModel, round_: Round, then: CandidateModel) -> dict[str, Any]:
+def _refused(refusal: Refusal) -> dict[str, Any]:
+    """The causes for which a model was refused, and the reasons."""
+    causes = [{"effect": c.effect, "location": c.location} for c in refusal.causes]
+    return {"causes": causes, "reasons": list(refusal.reasons)}
+
+
+def _tried(trial: CandidateModel, criterion: float, round_: Round, then: CandidateModel) -> dict[str, Any]:
     """The causes that one candidate model adds, and its criterion."""
     earlier = round_.before.fit.structure.causes
     z = {s.hypothesis: s.z for s in round_.screened.suspects}
@@ -94,9 +105,9 @@ def _tried(trial: CandidateModel, round_: Round, then: CandidateModel) -> dict[s
     return plain(
         {
             "causes": causes,
-            "criterion": trial.criterion,
-            "objective": trial.fit.objective,
-            "held_out_deviance": trial.held_out_deviance,
+            "criterion": criterion,
+            "fitted": float(np.mean(trial.fitted.plain_mean)),
+            "held_out": float(np.mean(trial.held_out.plain_mean)),
         }
     )
 

@@ -182,7 +182,8 @@ def _numbers(device: Device) -> Iterator[tuple[str, str]]:
     """(path, location) of every number that is not a count."""
     for path, section, number in numbers(device):
         if not number.whole:
-            yield path, f"{section.domain}:{path.rpartition('.')[2]}"
+            owner = "" if isinstance(section, Device) else getattr(section, "name", "")  # of several alike, such as axes
+            yield path, f"{section.domain}:{f'{owner}.' if owner else ''}{path.rpartition('.')[2]}"
 
 
 def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
@@ -217,7 +218,7 @@ def nuisances(device: Device) -> dict[str, float]:
     """Path and standard deviation [SI] of every number with a stated `sd`, or of a section with a tolerance."""
     found = {}
     for path, section, number in numbers(device):
-        sd = number.sd if number.sd is not None else (section.tolerance or 0.0) * abs(number.si)
+        sd = number.sd if number.sd is not None else (section.relative_sd or 0.0) * abs(number.si)
         if sd and not number.whole:
             found[path] = sd
     return found

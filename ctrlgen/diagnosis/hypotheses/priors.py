@@ -16,6 +16,7 @@ from types import MappingProxyType
 from ctrlgen.effects import Effect, Param
 
 ONE_IN_TEN = -2.3  # ln(1/10)
+ONE_IN_A_HUNDRED = -4.6
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,10 @@ def _peaks(*multiples: float) -> ParameterPrior:
 
 
 _EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": _peaks(1.0)}  # it may happen at any time
+_EVENTS_ARE_RARE = (
+    "An event at any time. Laws that act always come first among equals: most of a hundred records have no event, and a step fits "
+    "something of any structured residual. Judgement."
+)
 _DRY_FRICTION = "Forms of one contact. Measured friction differs by a few per cent from any of them; 2 % is judgement."
 _HYSTERESIS = (
     "Forms of one loop. 2 %: nature leaves about a fiftieth of a loop beside any of them, judged on simulated cases."
@@ -123,8 +128,19 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
             "phase": _starts((0.0, 90.0)),
         },
     ),
+    "clock_offset": LawPrior(
+        "One pair of recorders for all readings; rarer than a late reading, which is named first: judgement.",
+        log_prior_odds=ONE_IN_TEN,
+        acts_on_all=True,
+        domain="recording",
+    ),
     "delay": LawPrior("Error of the interpolation between samples; 0.1 %: judgement.", model_form_error=0.001),
     "drift": LawPrior("What drifts also wanders; 10 %: judgement.", model_form_error=0.1),
+    "home_offset": LawPrior(
+        "Readings are zeroed before a run, and an offset fits the mean of any residual of one sign, as of friction in one "
+        "direction: judgement.",
+        log_prior_odds=ONE_IN_TEN,
+    ),
     "low_pass": LawPrior(
         "No filter has exactly two poles; 0.5 %: judgement. A real filter acts on the whole reading: one that is fitted to a part "
         "of it stands for something else.",
@@ -139,7 +155,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         "Steps of half a decade each, from 1e-4 to 0.1 of the typical size.",
         parameters={"quantum": _starts((1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1))},
     ),
-    "sensor_step": LawPrior("An event from outside, at any time.", domain="disturbance", parameters=_EVENT),
+    "sensor_step": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT),
     "stitching_error": LawPrior(
         "Rarer than errors that act along the whole path: judgement. A scale may have several joints.",
         log_prior_odds=-1.0,
@@ -234,14 +250,14 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         model_form_error=0.05,
         parameters={"gap": _peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97), "power": _starts((1.0, 1.5))},
     ),
-    "force_step": LawPrior("An event from outside, at any time.", domain="disturbance", parameters=_EVENT),
+    "force_step": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT),
     "hysteresis": LawPrior(
         _HYSTERESIS,
         model_form_error=0.02,
         family="hysteresis",
         parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
     ),
-    "lost_beams": LawPrior("An event at any time.", parameters=_EVENT),
+    "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, parameters=_EVENT),
     "resonance": LawPrior(
         "A payload has more than one mode; 1 %: judgement. Octaves of frequency, lightly and well damped.",
         model_form_error=0.01,
@@ -287,7 +303,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     **dict.fromkeys(
         (
             "abbe_arm", "asymmetric_viscous", "coupling", "cubic_sensor", "drive_gain", "drive_offset", "expansion",
-            "frame_rotation_x", "frame_rotation_y", "frame_rotation_z", "heat_crosstalk", "heater_resistance", "home_offset",
+            "frame_rotation_x", "frame_rotation_y", "frame_rotation_z", "heat_crosstalk", "heater_resistance",
             "link_compliance", "quadratic_damping", "raised_point", "screw_motion", "sensor_gain", "stiffening", "stiffness",
         ),
         DEFAULT,

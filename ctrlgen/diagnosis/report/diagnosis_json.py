@@ -6,6 +6,8 @@ import dataclasses
 from typing import Any
 
 from ctrlgen.core.to_json import plain
+from ctrlgen.diagnosis.report.narrative import sentence
+from ctrlgen.diagnosis.selection.attribution import Share
 from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
 from ctrlgen.reporting.result_schemas import origin
 
@@ -23,7 +25,13 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> dict[str, 
     return plain({
         **origin(provenance.inputs, provenance.seed, diagnosis.notes),
         "verdict": diagnosis.verdict,
+        "sentence": sentence(diagnosis),
         "findings": [_finding(finding) for finding in diagnosis.findings],
+        "attribution": {
+            "explained": diagnosis.attribution.explained,
+            "rest": _share(diagnosis.attribution.rest),
+            "held_out": diagnosis.attribution.held_out,
+        },
         "residual_location": diagnosis.residual_location,
         "held_out": {channel: dataclasses.asdict(error) for channel, error in diagnosis.held_out.items()},
         "detectability": diagnosis.detectability,
@@ -36,10 +44,16 @@ def _finding(finding: Finding) -> dict[str, Any]:
     return {
         "effect": finding.effect,
         "location": finding.location,
+        "of": finding.cause.of,
+        "share": _share(finding.share),
+        "worth": {channel: dataclasses.asdict(worth) for channel, worth in finding.worth.items()},
         "parameters": {
             name: {"value": e.value, "ci95": e.ci95, "unit": e.unit} for name, e in finding.parameters.items()
         },
-        "alternatives": [{"effect": effect, "location": location} for effect, location in finding.alternatives],
-        "held_out_gain": finding.held_out_gain,
+        "alternatives": [{"effect": h.effect, "location": h.location, "of": h.of} for h in finding.alternatives],
         "source": finding.source,
     }
+
+
+def _share(share: Share | None) -> dict[str, Any] | None:
+    return None if share is None else dataclasses.asdict(share)

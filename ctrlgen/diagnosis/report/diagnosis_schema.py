@@ -29,16 +29,44 @@ class EffectAt(Keys):
     location: str = Field(description="Place and channel, such as actuator:2X.")
 
 
-class FindingEntry(EffectAt):
+class Cause(EffectAt):
+    """An effect at a location, with its partner."""
+
+    of: str | None = Field(description="The other channel of an effect between two; null for others.")
+
+
+class ShareEntry(Keys):
+    """A share of the mismatch."""
+
+    value: Number = Field(description="Of the energy beyond the noise that the device as described leaves.")
+    ci95: Interval = Field(description="95 % interval, by a bootstrap over blocks.")
+
+
+class WorthEntry(Keys):
+    """What a cause is worth in one channel, root mean square on the held-out records."""
+
+    without: Number = Field(description="Error without the cause, the others refitted [unit].")
+    with_it: Number = Field(description="Error with it [unit].")
+    unit: str = Field(description="Unit of both.")
+
+
+class AttributionEntry(Keys):
+    """How much of the mismatch the findings take away together."""
+
+    explained: Number = Field(description="Share of the mismatch that all findings take away, of energy.")
+    rest: ShareEntry | None = Field(description="Share that is left; null where there is no mismatch to share.")
+    held_out: bool = Field(description="Whether the shares are of the held-out records, else of those to fit.")
+
+
+class FindingEntry(Cause):
     """One cause that the device file leaves out."""
 
     parameters: dict[str, EstimateEntry] = Field(description="Parameters of the effect, by name.")
-    alternatives: list[EffectAt] = Field(
-        description="Other causes that explain the recording equally well in its place."
+    share: ShareEntry | None = Field(
+        description="Share of the mismatch that it takes away: its Shapley value; null where it was read from the data."
     )
-    held_out_gain: Number = Field(
-        description="Rise of the held-out deviance without the cause, over that of the device as described."
-    )
+    worth: dict[str, WorthEntry] = Field(description="What it is worth, by channel.")
+    alternatives: list[Cause] = Field(description="Other causes that explain the recording equally well in its place.")
     source: str = Field(description="Publication of the effect's law.")
 
 
@@ -214,15 +242,20 @@ class TriedCause(EffectAt):
     accepted: bool = Field(description="Whether it is in the model after the round.")
 
 
+class RefusedEntry(Keys):
+    """A model that scores better than what was taken, and was not taken."""
+
+    causes: list[EffectAt] = Field(description="The causes that speak against it.")
+    reasons: list[str] = Field(description="What speaks against each.")
+
+
 class CandidateModelEntry(Keys):
     """One model that was fitted in a round."""
 
     causes: list[TriedCause] = Field(description="Causes that it adds to the model before the round.")
     criterion: Number = Field(description="Selection criterion T: smaller is better.")
-    objective: Number = Field(
-        description="Whitened squares on the records to fit, with the penalties of stated parameters."
-    )
-    held_out_deviance: Number = Field(description="-2 ln likelihood on the held-out records.")
+    fitted: Number = Field(description="Mean square of the residual on the records to fit, over the noise's.")
+    held_out: Number = Field(description="Mean square of the residual on the held-out records, over the noise's.")
 
 
 class RoundEntry(Keys):
@@ -233,6 +266,8 @@ class RoundEntry(Keys):
     suspects: int = Field(description="Hypotheses screened.")
     criterion_before: Number = Field(description="Selection criterion T of the model before the round.")
     candidates: list[CandidateModelEntry] = Field(description="Models fitted, the best first.")
+    refused: list[RefusedEntry] = Field(description="Models that score better than what was taken, with the reason.")
+    failed: list[str] = Field(description="Trials that could not be built or simulated, with the reason.")
     causes_after: list[tuple[str, str]] = Field(description="[effect, location] of the causes after the round.")
     decision: str = Field(description="What was decided, and why.")
 
@@ -241,6 +276,8 @@ class DiagnosisRecord(Origin):
     """Result of `ctrlgen diagnose`: what a recording shows that the device file leaves out."""
 
     verdict: Verdict = Field(description="The answer in one word.")
+    sentence: str = Field(description="The answer in a sentence: cause, size, share, what is left.")
+    attribution: AttributionEntry = Field(description="How much of the mismatch the findings take away together.")
     findings: list[FindingEntry] = Field(
         description="Causes that the device file leaves out, the most important first."
     )

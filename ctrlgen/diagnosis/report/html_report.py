@@ -18,6 +18,7 @@ from ctrlgen.diagnosis.report.narrative import (
     number,
     plain_name,
     sentence,
+    share_text,
     unknown_lines,
 )
 from ctrlgen.diagnosis.report.plots import draw_all
@@ -81,8 +82,8 @@ def _row(f: Finding) -> dict[str, Any]:
     return {
         "plain": plain_name(f.effect), "effect": f.effect, "location": f.location, "of": f.cause.of,
         "numbers": [(name, interval(e)) for name, e in f.parameters.items()],
-        "alternatives": [{"effect": effect, "location": location} for effect, location in f.alternatives],
-        "gain": f"{100 * f.held_out_gain:.3g} %" if np.isfinite(f.held_out_gain) else "not known", "source": f.source,
+        "alternatives": [{"effect": h.effect, "location": h.location} for h in f.alternatives],
+        "share": share_text(f.share), "source": f.source,
     }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.selection.attribution import Share
 from ctrlgen.diagnosis.selection.result import ChannelError, Diagnosis, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import (
     AMBIGUOUS,
@@ -15,8 +16,7 @@ from ctrlgen.diagnosis.selection.verdict import (
     PARTLY,
     UNEXPLAINED,
     contradicts_datasheet,
-    model_error_allowance,
-    poorly_determined,
+    within_tolerance,
 )
 from ctrlgen.effects import Effect
 
@@ -121,12 +121,13 @@ def numbers_of(finding: Finding) -> str:
 
 
 def named(findings: Sequence[Finding]) -> str:
-    """The first findings with their parameters; each effect is described where it is named first."""
+    """The first findings with parameters and shares; each effect is described where it is named first."""
     parts, described = [], set()
     for f in findings[:NAMED]:
         cause = hypothesis_name(f.cause) if f.effect in described else cause_text(f)
         described.add(f.effect)
-        parts.append(f"{cause}, {numbers_of(f)}")
+        share = f", {share_text(f.share)} of the mismatch" if f.share else ""
+        parts.append(f"{cause}, {numbers_of(f)}{share}")
     more = [f"{len(findings) - NAMED} more"] if len(findings) > NAMED else []
     return "; ".join(parts + more)
 
@@ -137,20 +138,45 @@ def _within_a_sentence(text: str) -> str:
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The verdict in one sentence with numbers, and the held-out error of the worst channel."""
+    """The answer: the main cause, its size and share, the others, what is left, and the held-out error of the worst channel."""
     findings, verdict = diagnosis.findings, diagnosis.verdict
-    head = HEADLINE[verdict]
+    head, chosen = HEADLINE[verdict], diagnosis.search.chosen
+    far = contradicts_datasheet(chosen.fit)
     if verdict == CONSISTENT:
         text = f"{head}: the device file ({diagnosis.device.title}) lacks nothing that this recording can show"
-        text += f"{_blind(diagnosis)}."
-    elif (far := contradicts_datasheet(diagnosis.search.chosen.fit)) and diagnosis.residual_tests.passed:
+        text += f"{_blind(diagnosis) or _within(diagnosis)}."
+    elif far and (diagnosis.residual_tests.passed or not findings):
         text = f"{head}: {_beyond(diagnosis, far)}{f'; the model also needs {named(findings)}' if findings else ''}."
     elif not findings:
         text = f"{head}: the recording differs from {diagnosis.device.title}, and no known effect explains it."
+    elif verdict == UNEXPLAINED:
+        text = f"{head}: no confirmed cause takes away most of the mismatch; the best are {named(findings)}{_rest(diagnosis)}."
     else:
-        text = f"{head}: {LEAD[verdict]}{named(findings)}{_rivals(diagnosis)}."
+        text = f"{head}: {named(findings)}{_rivals(diagnosis)}{_rest(diagnosis)}."
     channel = worst_channel(diagnosis)
     return f"{text} {channel_sentence(channel, diagnosis.held_out[channel])}"
+
+
+def share_text(share: Share | None) -> str:
+    """'82 % (75 ... 88 %)'; a dash for a cause that was read from the data."""
+    if share is None:
+        return "-"
+    value, low, high = (round(100 * v) for v in (share.value, *share.ci95))
+    return f"{value} %" if low == high else f"{value} % ({low} ... {high} %)"
+
+
+def _rest(diagnosis: Diagnosis) -> str:
+    """'; 12 % (9 ... 15 %) of the mismatch is left', where more than noise is left."""
+    rest = diagnosis.attribution.rest
+    if rest is None or diagnosis.residual_tests.passed:
+        return ""
+    return f"; {share_text(rest)} of the mismatch is left{_within(diagnosis)}"
+
+
+def _within(diagnosis: Diagnosis) -> str:
+    """', within the stated tolerance', where that and not the noise is why nothing more is asked."""
+    tolerated = within_tolerance(diagnosis.search) and not diagnosis.residual_tests.passed
+    return ", within the stated tolerance" if tolerated else ""
 
 
 def _blind(diagnosis: Diagnosis) -> str:
@@ -172,17 +198,9 @@ def _beyond(diagnosis: Diagnosis, far: dict[str, float]) -> str:
     )
 
 
-LEAD = {
-    EXPLAINED: "",
-    PARTLY: "part of the mismatch is ",
-    AMBIGUOUS: "",
-    UNEXPLAINED: "no known effect explains the recording; the best fit adds ",
-}
-
-
 def _rivals(diagnosis: Diagnosis) -> str:
     """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
-    others = dict.fromkeys(f"{effect} at {place}" for f in diagnosis.findings for effect, place in f.alternatives)
+    others = dict.fromkeys(hypothesis_name(h) for f in diagnosis.findings for h in f.alternatives)
     if diagnosis.verdict != AMBIGUOUS or not others:
         return ""
     return f"; this recording cannot tell it from {' or '.join(others)}"
@@ -212,26 +230,47 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             "device.next.toml holds the best of them, which predicts recordings of this kind as well as the others do."
             + rest,
         ]
-    if verdict == PARTLY:
-        remark = f"Whether a mismatch remains cannot be said, because the noise is not known.{rest}"
-        if known:
-            most = number(100 * model_error_allowance(diagnosis.search))
-            remark = f"A residual above the noise remains, less than {most} % of the mismatch: the report shows where."
-        if poorly_determined(diagnosis.fitter, diagnosis.search):
-            return [
-                "The cause is identified, but its parameters are too uncertain to predict the held-out data: record more data "
-                "where the effect is active. Until then device.next.toml predicts worse than the device file.",
-            ]
-        if diagnosis.unconfirmed:
-            names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
-            remark = (
-                f"No held-out record shows {names}: hold out a record that covers the same range as the records to fit."
-            )
-        return [f"{use} It predicts better than the device file.", remark]
-    return [
-        "No known effect is the cause. The report shows where the residual is large; check wiring, units and clocks of the set-up.",
-        "device.next.toml is the best fit found, not an explanation: do not rely on its parameters.",
-    ]
+    steps = [BETTER if predicts_better(diagnosis) else WORSE]
+    if not known:
+        steps.append(f"Whether a mismatch remains cannot be said, because the noise is not known.{rest}")
+    elif not diagnosis.residual_tests.passed:
+        steps.append("More than noise is left: the report shows where it is and of what it is a function.")
+    if diagnosis.unconfirmed:
+        names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
+        steps.append(
+            f"No held-out record shows {names}: hold out a record that covers the same range as the records to fit."
+        )
+    if verdict == UNEXPLAINED:
+        steps.append("Check wiring, units and clocks of the set-up: no known effect takes away most of the mismatch.")
+    return [*steps, *(f"Not taken: {text}." for text in refusals(diagnosis))]
+
+
+BETTER = (
+    "Use device.next.toml in place of the device file, solve and generate the C with it: it predicts the held-out recordings better. Its "
+    "numbers hold for the range of travel, speed and temperature that was recorded."
+)
+WORSE = (
+    "Do not use device.next.toml yet: its numbers are too uncertain to predict the held-out recordings better than the device "
+    "file does. Record more where the causes act."
+)
+
+
+def predicts_better(diagnosis: Diagnosis) -> bool:
+    """Whether the corrected device predicts the held-out records better than the device as described, in noise units."""
+    search = diagnosis.search
+    return bool(search.chosen.causes) and search.chosen.held_out.excess < search.nominal.held_out.excess
+
+
+def refusals(diagnosis: Diagnosis) -> list[str]:
+    """Causes that would score better than what was taken in the last rounds, with what speaks against them."""
+    taken = {(c.effect, c.location) for c in diagnosis.search.chosen.causes}
+    reasons: dict[str, None] = {}
+    for round_ in diagnosis.search.rounds:
+        for refusal in round_.refused:
+            for cause, reason in zip(refusal.causes, refusal.reasons, strict=True):
+                if (cause.effect, cause.location) not in taken:
+                    reasons[f"{hypothesis_name(cause)}, although it would score better: {reason}"] = None
+    return list(reasons)[:NAMED]
 
 
 def unknown_lines(diagnosis: Diagnosis) -> list[str]:

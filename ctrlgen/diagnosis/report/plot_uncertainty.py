@@ -37,17 +37,17 @@ def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
     kept = set(diagnosis.search.chosen.fit.structure.causes)
     for k, (panel, round_) in enumerate(zip(axes[:, 0], rounds, strict=True)):
         _rival_bars(panel, round_, kept)
-        gained = round_.before.criterion - round_.candidates[0].criterion
+        gained = round_.criterion_before - round_.criteria[0]
         panel.set_title(f"round {k + 1}: the best candidate lowers T by {number(gained, 3)}", fontsize=9, loc="left")
     axes[-1, 0].set_xlabel("T above that of the best candidate (left of the dotted line: explains equally well)")
     return figure
 
 
 def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
-    best = round_.candidates[0].criterion
-    far = max(10 * SEARCH.rival_difference, *(t.criterion - best for t in round_.candidates))
-    for row, candidate in enumerate(round_.candidates):
-        worse = candidate.criterion - best
+    best = round_.criteria[0]
+    far = max(10 * SEARCH.rival_difference, *(T - best for T in round_.criteria))
+    for row, (candidate, criterion) in enumerate(zip(round_.candidates, round_.criteria, strict=True)):
+        worse = criterion - best
         colour = FOUND if candidate.cause in kept else ALIKE if worse < SEARCH.rival_difference else WORSE
         panel.barh(row, worse, color=colour, height=0.6)
         panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)

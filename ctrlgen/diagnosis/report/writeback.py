@@ -22,7 +22,15 @@ from ctrlgen.core.units import from_si, to_si
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.structure import FreeParameter
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
-from ctrlgen.diagnosis.report.narrative import HARD_SPACE, channel_sentence, hard, sentence
+from ctrlgen.diagnosis.report.narrative import (
+    BETTER,
+    HARD_SPACE,
+    WORSE,
+    channel_sentence,
+    hard,
+    predicts_better,
+    sentence,
+)
 from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
 from ctrlgen.version import program
@@ -152,6 +160,8 @@ def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
     lines += [channel_sentence(channel, error) for channel, error in diagnosis.held_out.items()]
     if changed:
         lines.append(f"Parameters changed above: {', '.join(changed)}.")
+    if diagnosis.findings:
+        lines.append(BETTER if predicts_better(diagnosis) else WORSE)
     if diagnosis.verdict == UNEXPLAINED:
         lines.append("This does NOT explain the recording: the values are the best fit, not physical parameters.")
     kept = (hard(" ".join(line.split())) for line in lines)

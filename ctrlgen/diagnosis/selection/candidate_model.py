@@ -1,4 +1,4 @@
-"""Records of the search: candidate models with their criterion, rounds, and the result."""
+"""Records of the search: candidate models with what they leave, rounds, and the result."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.error_model import ErrorModel
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.misfit import Misfit
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screened
@@ -14,41 +16,64 @@ from ctrlgen.diagnosis.selection.screen import Screened
 
 @dataclass(frozen=True, eq=False)
 class CandidateModel:
-    """A fitted structure with its selection criterion.
+    """A fitted structure and what it leaves.
 
-    held_out_deviance: -2 ln likelihood on the held-out records. criterion: T (see `model_selection`), smaller is better.
-    cause: the hypothesis that the candidate was fitted for.
+    errors: noise and the discrepancy that the candidate itself leaves. fitted, held_out: its misfit on the records to fit and
+    on the held-out records. refit_penalty: -2 ln likelihood of the refit to the held-out records, 0 where the parameters are
+    as fitted. cause: the hypothesis that the candidate was fitted for.
     """
 
     fit: Fit
-    held_out_deviance: float
-    criterion: float
+    errors: ErrorModel
+    fitted: Misfit
+    held_out: Misfit
+    refit_penalty: float = 0.0
     cause: Hypothesis | None = None
 
     @property
-    def complexity_penalty(self) -> float:
-        """Penalty for the number of parameters and the prior odds of the causes."""
-        return self.criterion - self.fit.objective - self.held_out_deviance
+    def causes(self) -> tuple[Hypothesis, ...]:
+        """The causes of its structure."""
+        return self.fit.structure.causes
+
+
+@dataclass(frozen=True, eq=False)
+class Refusal:
+    """A candidate model that was not taken as it was, because of the `reasons` against some of its `causes`, one each."""
+
+    candidate: CandidateModel
+    causes: tuple[Hypothesis, ...]
+    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One round of the search: its screen, its candidate models, the best first, and the model before."""
+    """One round of the search.
+
+    screened: its screen. candidates: its candidate models, the best first, with the `criteria` T of each. before: the model
+    before, with the criterion `criterion_before`. refused: candidates that score better than what was taken. failed: trials
+    that could not be simulated, with the reason.
+    """
 
     screened: Screened
     candidates: tuple[CandidateModel, ...]
+    criteria: tuple[float, ...]
     before: CandidateModel
+    criterion_before: float
+    refused: tuple[Refusal, ...] = ()
+    failed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
     """The result of a search.
 
-    nominal: the device as described, refitted within its stated uncertainty. chosen: the selected model.
-    without_cause: the chosen model without each of its causes. rivals: for each cause, models with another cause in its
-    place that explain the recording equally well. rounds: in order. final_screen: the screen of the chosen model.
+    fitter: with the noise and the discrepancy learnt. nominal: the device as described, refitted within its stated
+    uncertainty. chosen: the selected model. without_cause: the chosen model without each of its causes. rivals: for each
+    cause, models with another cause in its place that explain the recording equally well. rounds: in order. final_screen: the
+    screen of the chosen model.
     """
 
+    fitter: Fitter
     nominal: CandidateModel
     chosen: CandidateModel
     without_cause: tuple[CandidateModel, ...]

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_physics, selected_laws
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
@@ -20,11 +19,10 @@ from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.model.effect_terms import channels
 
 
-def directly_detected_findings(
-    fitter: Fitter, search: SearchResult, laws: Sequence[type[Effect]] | None = None
-) -> tuple[Finding, ...]:
+def directly_detected_findings(search: SearchResult, laws: Sequence[type[Effect]] | None = None) -> tuple[Finding, ...]:
     """Findings of the sensor laws, of `laws` (None: all), that the readings of a channel show directly, where neither the
     device file nor the search has that law there; none for settled poses."""
+    fitter = search.fitter
     recording, structure = fitter.recording, search.chosen.fit.structure
     if recording.kind != "series":
         return ()
@@ -56,4 +54,4 @@ def unfitted_finding(law: type[Effect], channel: Channel, values: dict[str, floa
         value = float(from_si(values[p.name], unit))
         parameters[p.name] = Estimate(value, (value, value), unit)
     cause = Hypothesis(law.kind, f"{DOMAIN[Place.SENSOR]}:{channel.name}", channel.name)
-    return Finding(law.kind, cause.location, parameters, (), 0.0, law.source, cause)
+    return Finding(law.kind, cause.location, parameters, (), None, {}, law.source, cause)

@@ -1,26 +1,47 @@
-"""Model selection: compares candidate models on the records to fit, on the held-out records and by their complexity.
+"""Model selection: compares candidate models by what they leave on the records to fit and on the held-out records.
 
-    T = objective + k ln n + held-out deviance - 2 ln(prior odds)
+    T = sum over channels and both kinds of records of (m/tau) l(q) + penalty + k ln(n/tau) - 2 ln(prior odds)
+    l(q) = q up to 1,  1 + ln q beyond
 
-with the objective (whitened squares on the n samples to fit, plus the penalties of stated parameters), the k parameters of
-the causes (as in BIC), the deviance -2 ln likelihood on the held-out records, to which nothing was fitted, and the prior
-odds of the causes.
+q is the mean square of the residual over that of the noise, m the samples of a channel, tau the correlation time of the
+discrepancy, k the parameters of the causes. It is -2 ln of the normal likelihood at the best variance that is not below the
+noise: where a model leaves noise alone, differences of T are those of chi-square; where every model leaves more, what counts is
+by which factor one leaves less than the other, on as many independent samples as the residual has. Two models are compared
+under the errors of the better one. Held-out records are predicted with the parameters as fitted, unless the model leaves noise
+alone: there the parameters are refitted under their posterior (`estimation.held_out`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ctrlgen.diagnosis.estimation.error_model import ErrorModel, error_model
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.held_out import held_out_deviance
+from ctrlgen.diagnosis.estimation.held_out import refit_to_held_out
+from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
 from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, restart
-from ctrlgen.diagnosis.selection.line_resolvability import lines_resolved
 from ctrlgen.diagnosis.selection.screen import Screened
-from ctrlgen.diagnosis.settings import MODEL_SELECTION, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.diagnosis.settings import HELD_OUT_REFIT, MODEL_SELECTION, RESIDUAL_TESTS, STATISTICS
+
+
+def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> CandidateModel:
+    """The candidate model of a fit, with what it leaves on the records to fit and on the held-out records."""
+    records = fitter.fit_records
+    left = [np.nan_to_num(r.observed - fitter.predict(fit, r), nan=1e150) for r in records]
+    errors = error_model(fitter.noise, records, left)
+    held, penalty = fit, 0.0
+    if errors.is_noise and fitter.noise.known.all():
+        refit = refit_to_held_out(fitter, fit, HELD_OUT_REFIT.max_steps)
+        held, penalty = refit.fit, refit.penalty + refit.log_det
+    unseen = fitter.held_out_records
+    apart = [r.observed - fitter.predict(held, r) for r in unseen]
+    return CandidateModel(
+        fit, errors, misfit(fitter.noise, records, left), misfit(fitter.noise, unseen, apart), penalty, cause
+    )
 
 
 class ModelSelection:
@@ -28,48 +49,65 @@ class ModelSelection:
 
     def __init__(self, fitter: Fitter, candidate: Callable[..., CandidateModel]) -> None:
         self.fitter, self.fit_candidate = fitter, candidate
-        self.n_fit = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.fit_records)
-        self.n_held = sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)
 
-    def scored(self, fit: Fit, cause: Hypothesis | None) -> CandidateModel:
-        """The candidate model of a fit, with its held-out deviance and criterion T."""
-        structure, held_out_loss = fit.structure, held_out_deviance(self.fitter, fit)
-        price = sum(u.cause is not None for u in structure.free_parameters) * np.log(max(self.n_fit, 2))
-        price -= 2 * structure.log_prior_odds
-        return CandidateModel(fit, held_out_loss, fit.objective + price + held_out_loss, cause)
+    def _loss(self, left: Misfit, errors: ErrorModel) -> float:
+        """Sum over the channels of (m/tau) l(q), under `errors`."""
+        noisy = errors.rms == 0
+        q = np.where(noisy, left.white_mean, left.plain_mean)
+        n = np.where(noisy, left.n_white.sum(axis=0), left.n_plain.sum(axis=0) / errors.tau)
+        beyond = (q > 1) | ~errors.noise.known
+        return float(np.sum(n * np.where(beyond, 1 + np.log(np.maximum(q, 1e-30)), q)))
+
+    def fit_loss(self, t: CandidateModel, errors: ErrorModel) -> float:
+        """What a model leaves on the records to fit, with the penalty of stated parameters."""
+        return self._loss(t.fitted, errors) + t.fit.penalty
+
+    def held_out_loss(self, t: CandidateModel, errors: ErrorModel) -> float:
+        """What a model leaves on the held-out records."""
+        return self._loss(t.held_out, errors) + t.refit_penalty
+
+    def samples(self, left: Misfit, errors: ErrorModel) -> float:
+        """Independent samples of all channels under `errors`."""
+        noisy = errors.rms == 0
+        return float(np.sum(np.where(noisy, left.n_white.sum(axis=0), left.n_plain.sum(axis=0) / errors.tau)))
+
+    def criterion(self, t: CandidateModel, errors: ErrorModel) -> float:
+        """T of a model under `errors`; smaller is better."""
+        numbers = sum(u.cause is not None for u in t.fit.structure.free_parameters)
+        price = numbers * np.log(max(self.samples(t.fitted, errors), 2)) - 2 * t.fit.structure.log_prior_odds
+        return self.fit_loss(t, errors) + self.held_out_loss(t, errors) + price
+
+    def reference(self, candidates: Sequence[CandidateModel]) -> ErrorModel:
+        """The errors under which candidates are compared: those of the one that leaves least."""
+
+        def left(t: CandidateModel) -> float:
+            q = [np.log(np.maximum(m.plain_mean, 1e-30)) @ m.n_plain.sum(axis=0) for m in (t.fitted, t.held_out)]
+            return float(sum(q))
+
+        return min(candidates, key=left).errors
+
+    def ranked(self, candidates: Sequence[CandidateModel]) -> list[CandidateModel]:
+        """The candidates by their criterion under common errors, the best first."""
+        if not candidates:
+            return []
+        errors = self.reference(candidates)
+        return sorted(candidates, key=lambda t: self.criterion(t, errors))
 
     def advantage(self, a: CandidateModel, b: CandidateModel) -> float:
-        """By how much the criterion of `a` is better than that of `b`, less the slack; negative where it is not better.
+        """By how much the criterion of `a` is better than that of `b`; negative where it is worse."""
+        errors = self.reference((a, b))
+        return self.criterion(b, errors) - self.criterion(a, errors)
 
-        Where both leave more than noise, squares are divided by the mean square that the better one leaves
-        (quasi-likelihood), on the records to fit and on the held-out ones, and small differences of what neither explains
-        do not count (slack).
-        """
-        best = min(a, b, key=lambda t: t.criterion)
-        c_fit = max(best.fit.objective / max(self.n_fit, 1), 1.0)
-        c_held = max(best.held_out_deviance / max(self.n_held, 1), 1.0)
-        gain = (
-            (b.fit.objective - a.fit.objective) / c_fit
-            + (b.held_out_deviance - a.held_out_deviance) / c_held
-            + b.complexity_penalty
-            - a.complexity_penalty
-        )
-        both_are_noise = a.fit.is_noise and b.fit.is_noise and self.fitter.noise.known.all()
-        slack = (
-            MODEL_SELECTION.held_out_slack if both_are_noise else MODEL_SELECTION.excess_slack
-        )  # both explain the records to fit, and neither law is exact
-        return (
-            gain - MODEL_SELECTION.excess_slack * self.n_fit * (1 - 1 / c_fit) - slack * self.n_held * (1 - 1 / c_held)
-        )
-
-    def most_parsimonious(self, better: list[CandidateModel]) -> CandidateModel:
-        """The best candidate or, of those within the slack with no more parameters, the one with the largest prior odds."""
-        first = better[0]
-        for t in better:
-            first = t if self.advantage(t, first) > 0 else first
+    def most_parsimonious(self, better: Sequence[CandidateModel]) -> CandidateModel:
+        """The best candidate or, of those that explain alike with no more parameters, the one with the largest prior odds."""
+        first, *others = self.ranked(better)
         numbers = len(first.fit.structure.free_parameters)
-        alike = [t for t in better if self.advantage(first, t) <= 0 and len(t.fit.structure.free_parameters) <= numbers]
-        return min(alike, key=lambda t: (-t.fit.structure.log_prior_odds, t.criterion), default=first)
+        alike = [
+            t
+            for t in others
+            if self.advantage(first, t) <= MODEL_SELECTION.alike and len(t.fit.structure.free_parameters) <= numbers
+        ]
+        return min((first, *alike), key=lambda t: -t.fit.structure.log_prior_odds)
 
     @staticmethod
     def parameters_may_mask_cause(fit: Fit) -> bool:
@@ -77,75 +115,58 @@ class ModelSelection:
         return fit.penalty > MODEL_SELECTION.hidden_penalty + 2 * len(fit.structure.free_parameters)
 
     def required_z2(self, current: CandidateModel, screened: Screened) -> float:
-        """The z^2 that a hypothesis needs to be fitted: the screen's threshold and, unless parameters of the device may
-        mask it, a material effect on the readings."""
-        return (
-            screened.threshold**2
-            if self.parameters_may_mask_cause(current.fit)
-            else max(screened.threshold**2, MODEL_SELECTION.material_share**2 * self.n_fit)
-        )
+        """The z^2 that a hypothesis needs to be fitted.
 
-    def physically_meaningful(self, candidate: CandidateModel, accepted: tuple[Hypothesis, ...] = ()) -> bool:
-        """Whether each cause that is not yet `accepted` has an amplitude inside its bounds and its plausible range, fulfils the
-        validity conditions of its law, and can be told apart from other lines of its kind."""
-        structure = candidate.fit.structure
-        if not lines_resolved(self.fitter.recording, candidate.fit, accepted):
-            return False
-        for k, cause in enumerate(structure.causes):
-            if cause.effect != PARAMETER and cause not in accepted and not cause.law.holds(candidate.fit.values(k)):
-                return False
-        for unknown, value in zip(structure.free_parameters, candidate.fit.theta, strict=True):
-            if not unknown.amplitude or structure.cause_of(unknown) in accepted:
-                continue
-            plausible = structure.plausible_range(unknown)
-            if plausible and not plausible[0] <= value <= plausible[1]:
-                return False
-            span = 1e-6 * (unknown.high - unknown.low)
-            if value >= unknown.high - span or (value <= unknown.low + span and unknown.low != unknown.nominal):
-                return False
-        return True
-
-    def justified(self, before: CandidateModel, after: CandidateModel) -> bool:
-        """Whether `after` improves enough on `before`, and its new causes are physically meaningful."""
-        return self.improves_enough(before, after) and self.physically_meaningful(after, before.fit.structure.causes)
+        Where noise alone is left, or almost: the screen's threshold and, unless parameters of the device may mask it, a
+        material effect. Where more is left, the best are fitted whatever their score: it is taken against a residual that
+        still holds the cause.
+        """
+        if not current.errors.is_noise:
+            return 0.0
+        if self.parameters_may_mask_cause(current.fit):
+            return screened.threshold**2
+        n = self.samples(current.fitted, current.errors)
+        return max(screened.threshold**2, MODEL_SELECTION.material_share**2 * n)
 
     def improves_enough(self, before: CandidateModel, after: CandidateModel) -> bool:
-        """Whether `after` lowers the objective and the held-out deviance enough for its additional parameters.
+        """Whether `after` leaves enough less than `before`, for its additional parameters, on both kinds of records.
 
         The held-out gain counts as much as the gain on the records to fit, up to the same amount: chance gives z^2 = 10 on
         both no more often than 17 on the first and 2 on the second. Less is required of the held-out records where the
-        device's parameters masked the cause, and where the held-out records cannot show it.
+        device's parameters masked the cause, and where the held-out records cannot show it. Where more than noise is left, the
+        gain must not be that of one block.
         """
-        gain, confirmed = before.fit.objective - after.fit.objective, before.held_out_deviance - after.held_out_deviance
+        errors = self.reference((before, after))
+        gain = self.fit_loss(before, errors) - self.fit_loss(after, errors)
+        confirmed = self.held_out_loss(before, errors) - self.held_out_loss(after, errors)
+        n, n_held = (self.samples(m, errors) for m in (after.fitted, after.held_out))
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
-        needed = MODEL_SELECTION.least_gain + added * np.log(max(self.n_fit, 2))
+        needed = MODEL_SELECTION.least_gain + added * np.log(max(n, 2))
         if (
             before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain
         ):  # parameters of the device masked it, so the readings hardly show it
             return gain > needed and confirmed > -MODEL_SELECTION.largest_contradiction
         if (
             self.unseen_in_held_out(before)
-            and gain > MODEL_SELECTION.most_of_mismatch * (before.fit.objective - self.n_fit)
+            and before.fitted.excess - after.fitted.excess > MODEL_SELECTION.most_of_mismatch * before.fitted.excess
             and confirmed > -MODEL_SELECTION.largest_contradiction
         ):
             return gain > needed
         if (
             gain + min(confirmed, gain) <= needed + MODEL_SELECTION.least_confirmed
-            or gain <= MODEL_SELECTION.material_share**2 * self.n_fit
+            or gain <= MODEL_SELECTION.material_share**2 * n
         ):
             return False
-        return confirmed > max(
-            MODEL_SELECTION.least_confirmed,
-            MODEL_SELECTION.worthwhile_share * max(before.held_out_deviance - self.n_held, 0.0),
-        )
+        q = np.maximum(before.held_out.plain_mean, 1.0)
+        worthwhile = MODEL_SELECTION.worthwhile_share * n_held * float(np.max(1 - 1 / q, initial=0.0))
+        if confirmed <= max(MODEL_SELECTION.least_confirmed, worthwhile):
+            return False
+        return errors.is_noise or wins_by_block(before.held_out, after.held_out)
 
     def unseen_in_held_out(self, candidate: CandidateModel) -> bool:
-        """Whether the residual fails the residual test on the records to fit, and passes it on the held-out records."""
-        most = RESIDUAL_TESTS.error_ratio**2 - 1
-        return (
-            candidate.fit.objective - self.n_fit > most * self.n_fit
-            and candidate.held_out_deviance - self.n_held < most * self.n_held
-        )
+        """Whether the residual exceeds the noise on the records to fit, but not on the held-out records."""
+        most = RESIDUAL_TESTS.error_ratio**2
+        return bool(np.any(candidate.fitted.white_mean > most) and np.all(candidate.held_out.white_mean < most))
 
     def within_model_form_error(self, bare: CandidateModel, current: CandidateModel, k: int) -> bool:
         """Whether cause k explains no more than the model-form error of another accepted cause (geometric mean of the squares
@@ -157,32 +178,52 @@ class ModelSelection:
         vague = bool(own) and all(
             abs(fit.theta[i] - fit.structure.free_parameters[i].nominal) < STATISTICS.z_95 * sd[i] for i in own
         )
-        loss = max(bare.held_out_deviance - current.held_out_deviance, 0.0) * max(
-            bare.fit.objective - current.fit.objective, 0.0
-        )
+        # beside k, another cause may take the place of an accepted one
         return self._explained_by_model_form_error(
-            loss, bare, MODEL_SELECTION.vague_factor if vague else 1.0
-        )  # beside k, another cause may take the place of an accepted one
+            _lost(bare, current), bare, MODEL_SELECTION.vague_factor if vague else 1.0
+        )
 
     def residual_within_model_form_error(self, current: CandidateModel) -> bool:
         """Whether the residual is no larger than the model-form error of a cause, so that further causes could not be trusted.
         False where parameters of the device may mask a cause, and where the noise is known from the residual alone."""
         if self.parameters_may_mask_cause(current.fit) or not self.fitter.noise.known.all():
             return False
-        left = max(current.held_out_deviance - self.n_held, 0.0) * max(current.fit.objective - self.n_fit, 0.0)
-        return self._explained_by_model_form_error(left, current)
+        return self._explained_by_model_form_error(current.fitted.excess * current.held_out.excess, current)
 
     def _explained_by_model_form_error(self, squares: float, current: CandidateModel, times: float = 1.0) -> bool:
         """Whether `squares`, the product of those on the records to fit and on the held-out records, is at most the same product
         for the model-form error of a cause, multiplied by `times`."""
-        most = self.fit_candidate(
-            Structure(current.fit.structure.device), steps=40
-        )  # the model without one cause may diverge
-        for j, cause in enumerate(current.fit.structure.causes):
+        if not any(cause.prior.model_form_error for cause in current.causes):
+            return False
+        most = self.fit_candidate(Structure(current.fit.structure.device), steps=40)
+        for j, cause in enumerate(current.causes):
             if form_error := cause.prior.model_form_error:
                 without_one = self.fit_candidate(restart(current.fit).without(j))
-                held_out_loss = min(without_one.held_out_deviance, most.held_out_deviance) - current.held_out_deviance
-                fit_loss = min(without_one.fit.objective, most.fit.objective) - current.fit.objective
-                if squares < (form_error * times) ** 4 * max(held_out_loss, 0.0) * max(fit_loss, 0.0):
+                # the model without one cause may diverge
+                if squares < (form_error * times) ** 4 * min(_lost(without_one, current), _lost(most, current)):
                     return True
         return False
+
+
+def _lost(bare: CandidateModel, full: CandidateModel) -> float:
+    """Product of the squares that `bare` leaves beyond `full` on the records to fit and on the held-out records."""
+    return max(bare.fitted.excess - full.fitted.excess, 0.0) * max(bare.held_out.excess - full.held_out.excess, 0.0)
+
+
+def wins_by_block(before: Misfit, after: Misfit) -> bool:
+    """Whether `after` leaves less than `before` in more than one lucky block.
+
+    The paired differences of the blocks' squares, or of their logarithms, have a positive sum with confidence, by a bootstrap of
+    the blocks, which count as independent (B. Efron, R. Tibshirani, An Introduction to the Bootstrap, 1993, ch. 8.6). Squares ask
+    where most of the mismatch is, logarithms in most blocks; a short record often holds nearly all of its mismatch in two blocks,
+    and only the second question has an answer there. Squares of each channel count over what `after` leaves of it, and noise is
+    added to those of each block, so that quiet blocks do not vote.
+    """
+    scale = np.maximum(after.plain_mean, 1.0)
+    old, new = (np.sum((m.plain + m.n_plain) / scale, axis=1) for m in (before, after))
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(0, len(old), (MODEL_SELECTION.block_draws, len(old)))
+    gains = (old - new, np.log(np.maximum(old, 1e-300) / np.maximum(new, 1e-300)))
+    return bool(
+        np.sum(gains[0]) > 0 and any(np.mean(gain[drawn].sum(axis=1) <= 0) < MODEL_SELECTION.block_p for gain in gains)
+    )

@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, written
+from ctrlgen.diagnosis.selection.attribution import Attribution, Share
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.verdict import unconfirmed
 from ctrlgen.diagnosis.settings import STATISTICS
@@ -33,19 +34,29 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Worth:
+    """Root mean square error of one channel on the held-out records, `without` a cause and `with_it` [unit]."""
+
+    without: float
+    with_it: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Finding:
     """One cause that the device file leaves out.
 
-    alternatives: (effect, location) of other causes that explain the recording equally well in its place.
-    held_out_gain: rise of the held-out deviance without the cause, over the deviance of the device as described.
-    source: publication of the effect's law. cause: the hypothesis.
+    alternatives: other causes that explain the recording equally well in its place. share: of the mismatch, of energy, None
+    where it was read from the data. worth: by channel the held-out error without the cause and with it. source: publication
+    of the effect's law. cause: the hypothesis.
     """
 
     effect: str
     location: str
     parameters: dict[str, Estimate]
-    alternatives: tuple[tuple[str, str], ...]
-    held_out_gain: float
+    alternatives: tuple[Hypothesis, ...]
+    share: Share | None
+    worth: dict[str, Worth]
     source: str
     cause: Hypothesis
 
@@ -68,10 +79,14 @@ class ChannelError:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The answer: verdict, findings and supporting analyses; `search` and `fitter` hold how it was found."""
+    """The answer: verdict, findings and supporting analyses; `search` and `fitter` hold how it was found.
+
+    attribution: shares of the causes and of the rest.
+    """
 
     verdict: str
     findings: tuple[Finding, ...]
+    attribution: Attribution
     held_out: dict[str, ChannelError]
     residual_tests: ResidualTests
     residual_location: dict[str, Any]
@@ -118,9 +133,9 @@ class Diagnosis:
         return device.model_copy(update={"effect": (*device.effect, *read)})
 
 
-def held_out_errors(fitter: Fitter, search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:
+def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:
     """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known."""
-    found = {}
+    found, fitter = {}, search.fitter
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
@@ -156,8 +171,8 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
     return found
 
 
-def findings(search: SearchResult, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
-    """The causes of the chosen model with intervals and alternatives, that with the largest held-out gain first."""
+def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
+    """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first."""
     fit, rows = search.chosen.fit, []
     estimates = estimated_values(fit, profiles)
     for k, cause in enumerate(fit.structure.causes):
@@ -171,11 +186,18 @@ def findings(search: SearchResult, profiles: tuple[Profile, ...] = ()) -> tuple[
             if fixed := cause.prior.of(p).fixed_range:
                 middle = sum(fixed) / 2
                 parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
-        rivals = tuple((t.cause.effect, t.cause.location) for t in search.rivals[k] if t.cause)
+        rivals = tuple(t.cause for t in search.rivals[k] if t.cause)
         source = "parameter of the device file" if cause.effect == PARAMETER else cause.law.source
-        gain = float(
-            (search.without_cause[k].held_out_deviance - search.chosen.held_out_deviance)
-            / search.nominal.held_out_deviance
-        )
-        rows.append(Finding(cause.effect, cause.location, parameters, rivals, gain, source, cause))
-    return tuple(sorted(rows, key=lambda f: -f.held_out_gain))
+        worth = _worth(search, k)
+        rows.append(Finding(cause.effect, cause.location, parameters, rivals, shares.shares[k], worth, source, cause))
+    return tuple(sorted(rows, key=lambda f: -(f.share.value if f.share else 0.0)))
+
+
+def _worth(search: SearchResult, k: int) -> dict[str, Worth]:
+    """The held-out error without cause k, the others refitted, and with it, of each channel."""
+    recording, floor = search.fitter.recording, search.fitter.noise.floor
+    without, with_it = (np.sqrt(t.held_out.plain_mean) * floor for t in (search.without_cause[k], search.chosen))
+    return {
+        channel: Worth(float(a) * difference(1.0, unit), float(b) * difference(1.0, unit), unit)
+        for channel, unit, a, b in zip(recording.channels, recording.units, without, with_it, strict=True)
+    }

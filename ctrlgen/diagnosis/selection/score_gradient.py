@@ -82,7 +82,8 @@ class ScoreGradient:
 
     def sums(self, white: np.ndarray, U: np.ndarray, start: np.ndarray | None) -> Sums:
         """This record's inner products with its whitened residual `white` (n, n_y) and free directions U (n, n_y, k)."""
-        noise, seen = self.fitter.noise, self.spread.seen
+        noise, seen = self.fitter.error, self.spread.seen
+        corner = noise.corner
         usable = noise.usable(self.record.valid)
         SS = [np.zeros((len(s), len(s))) for s in seen]
         tails = [np.zeros((len(ar), len(s))) for ar, s in zip(noise.ar, seen, strict=True)]
@@ -95,6 +96,7 @@ class ScoreGradient:
                     tails[i] = Y[len(Y) - len(tails[i]) :]
                 S = noise.whiten_channel(Y, i)
                 S[~usable[a:b, i]] = 0.0
+                S *= np.minimum(1.0, corner[i] / np.maximum(np.abs(white[a:b, i]), 1e-300))[:, None]  # as in the fit
                 if not np.isfinite(S.sum()):
                     S = np.nan_to_num(S)
                 SS[i] += S.T @ S
@@ -115,6 +117,7 @@ class ScoreGradient:
         r, record, n = self.simulator, self.record, len(self.record.time)
         series = np.isfinite(r.sample_time)
         after, _ = r.simulate_states(record, self.p, start)
+        record = r.aligned(record, self.p)
         before = np.vstack([r.starting_state(record, self.p, start), after[:-1]])
         inputs = (before, *r.inputs(record))
         seen = (before if series else after, record.drive, inputs[3], after)

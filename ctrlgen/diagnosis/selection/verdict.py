@@ -8,37 +8,57 @@ from scipy import stats
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.attribution import Attribution
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, STATISTICS, VERDICT
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 
 
-def verdict(fitter: Fitter, search: SearchResult, tests: ResidualTests, detected: bool = False) -> str:
+def verdict(search: SearchResult, tests: ResidualTests, shares: Attribution, detected: bool = False) -> str:
     """The verdict: one of the five words above; `detected` says whether an effect was detected directly in the readings.
 
-    unexplained: the residual exceeds the noise by more than the model-form error of the causes, or the fit contradicts the
-    stated uncertainty of the device file, as a wrong unit, sign or gain of a recorded column would make it.
-    consistent: no cause is found. ambiguous: other causes explain the recording equally well.
-    partly: causes are found, but a residual within the model-form error remains, the held-out records do not confirm a
-    cause, the noise is not known, or the parameters are too uncertain to predict the held-out records.
-    explained: otherwise.
+    consistent: no cause is found, and what is left is noise or within the tolerance. explained: confirmed causes, and what is
+    left is noise or within the tolerance. ambiguous: another cause explains the recording as well as one of the main ones.
+    partly: confirmed causes take away most of the mismatch, or all of it with parameters too uncertain to predict, or the noise
+    is not known. unexplained: no cause takes away most, or the fit agrees only with numbers that contradict the device file.
     """
-    found, known = detected or search.chosen.fit.structure.causes, bool(fitter.noise.known.all())
-    if contradicts_datasheet(search.chosen.fit):
-        return UNEXPLAINED
-    if (
-        known
-        and not tests.passed
-        and not (found and unexplained_share(fitter, search) <= model_error_allowance(search))
-    ):
-        return UNEXPLAINED
+    fitter, found = search.fitter, detected or search.chosen.causes
+    known = bool(fitter.noise.known.all())
+    enough = (known and tests.passed) or within_tolerance(search)
+    contradicted = bool(contradicts_datasheet(search.chosen.fit))
     if not found:
-        return CONSISTENT
-    if any(search.rivals):
+        return UNEXPLAINED if contradicted or (known and not enough) else CONSISTENT
+    if main_rivals(search, shares):
         return AMBIGUOUS
-    certain = known and tests.passed and not unconfirmed(search) and not poorly_determined(fitter, search)
-    return EXPLAINED if certain else PARTLY
+    if enough and not contradicted and not unconfirmed(search) and not poorly_determined(search):
+        return EXPLAINED
+    sound = enough or not known or shares.explained >= VERDICT.most
+    return PARTLY if sound and not (contradicted and shares.explained < VERDICT.most) else UNEXPLAINED
+
+
+def within_tolerance(search: SearchResult) -> bool:
+    """Whether the held-out errors of all channels are within the tolerance that the recording states."""
+    fitter = search.fitter
+    wanted = [t or 0.0 for t in fitter.recording.tolerance]
+    if not any(wanted):
+        return False
+    left = search.chosen.held_out
+    rms = np.sqrt(left.plain_mean) * fitter.noise.floor
+    noisy = fitter.noise.known & (
+        left.white_mean <= 1 + STATISTICS.chance_excess * np.sqrt(2 / left.n_white.sum(axis=0))
+    )
+    return bool(np.all((rms <= wanted) | noisy))
+
+
+def main_rivals(search: SearchResult, shares: Attribution) -> bool:
+    """Whether a cause with a share near the largest has a rival."""
+    largest = max((s.value for s in shares.shares if s), default=0.0)
+    return any(
+        rivals and (share is None or share.value >= VERDICT.main_share * largest)
+        for rivals, share in zip(search.rivals, shares.shares, strict=True)
+    )
 
 
 def contradicts_datasheet(fit: Fit) -> dict[str, float]:
@@ -60,42 +80,24 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
 
 def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:
     """Causes that the held-out records do not confirm, except where the device's stated parameters alone require them."""
-    chosen = search.chosen
-    return tuple(
-        cause
-        for cause, bare in zip(chosen.fit.structure.causes, search.without_cause, strict=True)
-        if bare.held_out_deviance - chosen.held_out_deviance < MODEL_SELECTION.least_confirmed
-        and bare.fit.penalty - chosen.fit.penalty < 0.5 * (bare.fit.objective - chosen.fit.objective)
-    )
+    compare = ModelSelection(search.fitter, lambda *_, **__: search.chosen)
+    found = []
+    for cause, bare in zip(search.chosen.causes, search.without_cause, strict=True):
+        errors = compare.reference((bare, search.chosen))
+        confirmed = compare.held_out_loss(bare, errors) - compare.held_out_loss(search.chosen, errors)
+        gain = compare.fit_loss(bare, errors) - compare.fit_loss(search.chosen, errors)
+        hidden = bare.fit.penalty - search.chosen.fit.penalty >= 0.5 * gain
+        if confirmed < MODEL_SELECTION.least_confirmed and not hidden:
+            found.append(cause)
+    return tuple(found)
 
 
-def poorly_determined(fitter: Fitter, search: SearchResult) -> bool:
+def poorly_determined(search: SearchResult) -> bool:
     """Whether the chosen model with its parameters as fitted predicts the held-out records significantly worse than the
     device as described. The causes may still be right, and their parameters too uncertain."""
+    fitter = search.fitter
     worse = fitter.held_out_squares(search.chosen.fit) - fitter.held_out_squares(search.nominal.fit)
     return worse > STATISTICS.chance_excess * np.sqrt(2 * _n_held(fitter))
-
-
-def model_error_allowance(search: SearchResult) -> float:
-    """Share of the mismatch (rms) that the chosen causes may leave: the largest model-form error of their laws."""
-    causes = search.chosen.fit.structure.causes
-    return max([VERDICT.model_form_error, *(c.prior.model_form_error for c in causes)])
-
-
-def unexplained_share(fitter: Fitter, search: SearchResult) -> float:
-    """Residual of the chosen model beyond the noise, over that of the device as described, both root mean square; the
-    larger value of the records to fit and of the held-out records. An excess below `STATISTICS.chance_excess`
-    standard deviations of chi-square counts as noise."""
-    n_held = _n_held(fitter)
-    after, before = search.chosen, search.nominal
-    shares = [0.0]
-    for left, all_, n in (
-        (after.fit.objective, before.fit.objective, after.fit.n),
-        (after.held_out_deviance, before.held_out_deviance, n_held),
-    ):
-        if left - n > STATISTICS.chance_excess * np.sqrt(2 * n):
-            shares.append(float(np.sqrt((left - n) / max(all_ - n, left - n))))
-    return max(shares)
 
 
 def _n_held(fitter: Fitter) -> int:

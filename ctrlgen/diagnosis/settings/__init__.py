@@ -5,6 +5,7 @@ was chosen on simulated recordings whose causes are known, and another value of 
 """
 
 from ctrlgen.diagnosis.settings.estimation import (
+    DISCREPANCY,
     FIT,
     HELD_OUT_REFIT,
     NOISE,
@@ -31,33 +32,37 @@ from ctrlgen.diagnosis.settings.evidence import (
     UNKNOWN_INPUT,
 )
 from ctrlgen.diagnosis.settings.selection import (
+    ATTRIBUTION,
     CANDIDATE_TERMS,
     DIRECT_DETECTION,
-    LINE_RESOLVABILITY,
     MODEL_SELECTION,
+    OBJECTIONS,
     SCREEN,
     SEARCH,
     SPATIAL_PERIODS,
     SUBSETS,
     VERDICT,
 )
+from ctrlgen.diagnosis.settings.shares import SHARES
 
 __all__ = [
+    "ATTRIBUTION",
     "BOOTSTRAP",
     "CANDIDATE_TERMS",
     "DETECTABILITY",
     "DIRECT_DETECTION",
+    "DISCREPANCY",
     "EXCITATION",
     "EXPERIMENT",
     "FIT",
     "HELD_OUT_REFIT",
-    "LINE_RESOLVABILITY",
     "LOCALISATION",
     "LTV_MODEL",
     "MAPS",
     "MODEL_SELECTION",
     "NOISE",
     "NOISE_UPDATE",
+    "OBJECTIONS",
     "OUTLIERS",
     "PROFILE",
     "REGRESSORS",
@@ -66,6 +71,7 @@ __all__ = [
     "ROBUST_COVARIANCE",
     "SCREEN",
     "SEARCH",
+    "SHARES",
     "SIMULATION",
     "SPARSE_REGRESSION",
     "SPATIAL_PERIODS",

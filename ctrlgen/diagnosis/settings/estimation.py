@@ -95,6 +95,13 @@ class NoiseUpdateSettings:
     largest_residual: float = 1.3
     """Root mean square of the residual over the noise, below which the residual's colour is taken as the noise's. A
     larger residual holds physics that was left out. Judgement."""
+    stated_factor: float = 2.0
+    """Factor by which a stated noise may be wrong. Judgement."""
+    stated_margin: float = 0.05
+    """Relative difference of the residual from the stated noise up to which the statement stands: data sheets round."""
+    noise_alone_p: float = 1e-4
+    """p of whiteness, steady variance and no correlation with the drive, above which a residual is noise alone: three tests a
+    record."""
     other_colour_p: float = 1e-4
     """p of whiteness at rest below which the colour found in the residual is not that of the noise."""
 
@@ -130,6 +137,8 @@ class SimulationSettings:
     """Newton steps a settled pose: poses lie farther apart than samples."""
     settling_sample_time: float = 1e-3
     """Sample time [s] of the model from which the settling time is read. A delay by samples does not change that time."""
+    shortest_spline: int = 4
+    """Samples that a cubic spline through a drive needs."""
     parametric_operations: int = 500
     """Operations on parameters alone from which on they are evaluated once a record: passing their results to every sample
     costs time, too. Judgement."""
@@ -197,6 +206,10 @@ class ResidualTestsSettings:
     are white for every practical purpose."""
     rest_p: float = 1e-6
     """p below which the residual at rest is not noise. Smaller than `whiteness_p`, for the noise was estimated there."""
+    spike: float = 3.9
+    """Standard deviations from which a sample at rest is a spike: normal noise has one in ten thousand."""
+    rare: float = 0.005
+    """Share of spikes below which they are left out of the test for heavy tails, as faults of a sensor. Judgement."""
     coarse_reading: float = 0.5
     """Quantisation step over the noise above which rest is not tested: the tests would see the steps."""
     size_p: float = 1e-3
@@ -229,6 +242,28 @@ class ProfileSettings:
 
 
 @dataclass(frozen=True)
+class DiscrepancySettings:
+    """Discrepancy of the model, and the loss of single samples."""
+
+    ratio: float = 1.1
+    """Root mean square of the whitened residual up to which it is noise: the limit of the residual tests."""
+    uncorrelated: float = 0.05
+    """Correlation below which the sum of the correlation time ends: what follows is its own uncertainty."""
+    fewest_independent: float = 30.0
+    """Correlation times that a record holds at least: of fewer, the correlation time itself is not known. Judgement."""
+    updates: int = 3
+    """Times that discrepancy and fit are estimated in turn: two to three iterations of feasible generalised least squares."""
+    same: float = 0.05
+    """Relative change of the errors' deviation below which they count as unchanged."""
+    blocks: int = 20
+    """Blocks of a record in which squares of two models are compared: enough for a bootstrap, long beside most memories.
+    Judgement."""
+    huber_corner: float = 3.0
+    """Standard deviations from which on a sample counts by its size, no longer by its square. Normal noise exceeds 3 once in
+    370 samples and loses 0.5 % of the efficiency (P. J. Huber)."""
+
+
+@dataclass(frozen=True)
 class RobustCovarianceSettings:
     """Sandwich covariance by blocks of time."""
 
@@ -250,4 +285,5 @@ FIT = FitSettings()
 HELD_OUT_REFIT = HeldOutRefitSettings()
 RESIDUAL_TESTS = ResidualTestsSettings()
 PROFILE = ProfileSettings()
+DISCREPANCY = DiscrepancySettings()
 ROBUST_COVARIANCE = RobustCovarianceSettings()

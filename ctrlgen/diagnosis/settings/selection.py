@@ -114,6 +114,14 @@ class SearchSettings:
     """Rivals fitted for a cause."""
     nearly_best: float = 0.9
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
+    clock_doublings: int = 6
+    """Offsets of the recorders' clocks from which a fit may begin: one sample, doubled so many times less one, early and late."""
+    restarts: int = 4
+    """Other shapes of a law from which it is fitted again, those that begin best: the valleys of one law. Judgement."""
+    beside_clocks: int = 4
+    """Candidates, the best first, beside which an offset of the clocks is tried: each such trial is a fit. Judgement."""
+    subset_share: float = 0.05
+    """Share of what the best smaller set leaves that a larger one must promise beyond it to be fitted. Judgement."""
     smallest_score: float = 0.25
     """Share of the largest z^2 below which candidates are not tried, unless nothing else is."""
 
@@ -137,27 +145,39 @@ class ModelSelectionSettings:
     hidden_penalty: float = 16.0
     """Penalty of the device's stated numbers, beyond twice their count, that makes them suspect of hiding a cause: one
     number four standard deviations off."""
-    worthwhile_share: float = 0.05
-    """Share of the held-out excess over the noise that a further cause must explain. Judgement."""
+    worthwhile_share: float = 0.01
+    """Share of the held-out excess over the noise that a further cause must explain: less is of no use to anyone. Judgement."""
+    block_draws: int = 1000
+    """Bootstrap samples of the blocks: they know a p of 5 % to 0.7 %."""
+    block_p: float = 0.1
+    """p of the bootstrap above which a gain is not that of the recording as a whole."""
+    alike: float = 2.0
+    """Difference of the criterion below which the commoner law is taken: a factor e of likelihood."""
     most_of_mismatch: float = 0.9
     """Share of the mismatch: a cause that explains so much of the records to fit need not be confirmed by held-out
     records that do not show it; and where accepted causes explain so much, only singles and pairs are searched (time
     series). Judgement."""
-    excess_slack: float = 0.01
-    """Share of the excess over the noise, below which a difference of two models does not choose between them."""
-    held_out_slack: float = 0.25
-    """The same for the held-out records, where both models explain the records to fit: neither law is right there.
-    Judgement."""
     vague_factor: float = 5.0
     """Factor on the model-form error of the other laws, for a cause whose amplitude may be zero. Judgement."""
 
 
 @dataclass(frozen=True)
-class LineResolvabilitySettings:
-    """Whether two lines, or a line and the rounding of the readings, can be told apart."""
+class ObjectionsSettings:
+    """What speaks against taking a cause for what its name says."""
 
     apart: float = 0.5
     """Cycles by which two lines must part within the records to fit: nearer, they beat as one."""
+    at_bound: float = 1e-6
+    """Share of a parameter's range within which it is at its bound."""
+    fewest_periods: float = 10.0
+    """Periods of a line that the longest record to fit must hold: of fewer, any slow change looks like one.
+    Judgement."""
+    onset_samples: float = 5.0
+    """Samples between an event and the onset of motion, below which they are one."""
+    rest_samples: float = 20.0
+    """Samples that a drive must stand before or after an onset: less is a reversal."""
+    standing: float = 1e-4
+    """Change of a drive from sample to sample, over its range, up to which it stands still. Judgement."""
     shortest_period: float = 3.0
     """Shortest period along a reading, in its quantisation steps: a shorter one is that of the rounding."""
 
@@ -173,11 +193,31 @@ class DirectDetectionSettings:
 
 
 @dataclass(frozen=True)
+class AttributionSettings:
+    """Shares of the mismatch."""
+
+    most_causes: int = 4
+    """Causes up to which all orders are averaged: 16 subsets. Of more, coming first and coming last."""
+    draws: int = 1000
+    """Bootstrap samples of the blocks: they know the ends of a 95 % interval to a fifth of its width's standard deviation."""
+    least_excess: float = 0.02
+    """Mean square beyond the noise, over the noise's, below which held-out records show no mismatch to share."""
+    diverged: float = 4.0
+    """Energy of a subset, over that of the device as described, that stands for a larger one: a cause without its partner may
+    diverge."""
+    steps: int = 4
+    """Levenberg-Marquardt steps of an incomplete model from the numbers of the complete one. Judgement."""
+
+
+@dataclass(frozen=True)
 class VerdictSettings:
     """The verdict."""
 
-    model_form_error: float = 0.05
-    """Share of the mismatch that a law may leave, where it states no model-form error of its own. Judgement."""
+    most: float = 0.75
+    """Share of the mismatch, of energy, that confirmed causes must take away to explain it partly. Judgement."""
+    main_share: float = 0.25
+    """Share of a cause, over the largest one, from which rivals of it make the whole answer ambiguous: which of two small
+    causes it is does not change the main one. Judgement."""
     impossible_p: float = 1e-6
     """p of the device's stated numbers so far off by chance, below which they contradict the data sheet."""
     named_deviation: float = 2.0
@@ -190,6 +230,7 @@ SPATIAL_PERIODS = SpatialPeriodSettings()
 SUBSETS = SubsetSettings()
 SEARCH = SearchSettings()
 MODEL_SELECTION = ModelSelectionSettings()
-LINE_RESOLVABILITY = LineResolvabilitySettings()
+OBJECTIONS = ObjectionsSettings()
 DIRECT_DETECTION = DirectDetectionSettings()
+ATTRIBUTION = AttributionSettings()
 VERDICT = VerdictSettings()

@@ -1,0 +1,164 @@
+"""What speaks against taking a candidate model's causes for what their names say, whatever the model explains.
+
+An amplitude outside of its law's range, a line that the records are too short to tell, an event at the onset of motion: each
+is another cause under this law's name. A cause that meets an objection is taken out of its candidate, and the report says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ctrlgen.core.units import from_si
+from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.settings import OBJECTIONS
+from ctrlgen.effects import Param
+from ctrlgen.numerics.quantisation_step import quantisation_step
+from ctrlgen.recordings.recording import Record, Recording
+
+
+def objections(
+    recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = (), exact: bool = False
+) -> dict[int, str]:
+    """The reason by cause, by its place in the structure, of each that is not yet `accepted` and meets an objection.
+
+    `exact`: the model leaves noise alone, so that an event or a short line is what it looks like.
+    """
+    causes = fit.structure.causes
+    found: dict[int, str] = {}
+    for k, cause in enumerate(causes):
+        if cause in accepted:
+            continue
+        reason = (
+            _outside_its_range(fit, k)
+            or _on_the_lattice(recording, fit, k)
+            or ("" if exact else _too_few_periods(recording, fit, k) or _at_the_onset(recording, fit, k))
+        )
+        if reason:
+            found[k] = reason
+    for j, k in combinations(range(len(causes)), 2):
+        new = k if causes[k] not in accepted else j
+        if causes[new] not in accepted and new not in found and _same_line(recording, fit, j, k):
+            found[new] = "the records are too short to tell it from another line of its kind"
+    return found
+
+
+def _outside_its_range(fit: Fit, k: int) -> str:
+    """Why the numbers of cause k are not those of its law; empty where they are."""
+    structure, cause = fit.structure, fit.structure.causes[k]
+    if cause.effect != PARAMETER and not cause.law.holds(fit.values(k)):
+        return "its numbers contradict one another"
+    for u, value in zip(structure.free_parameters, fit.theta, strict=True):
+        if u.cause != k or not u.amplitude:
+            continue
+
+        def shown(si: float, unit: str = u.unit) -> str:
+            return f"{from_si(si, unit):.3g} {unit}".removesuffix(" 1")
+
+        plausible = structure.plausible_range(u)
+        if plausible and not plausible[0] <= value <= plausible[1]:
+            return f"{u.name} = {shown(value)} is outside of {shown(plausible[0])} ... {shown(plausible[1])}"
+        span = OBJECTIONS.at_bound * (u.high - u.low)
+        if value >= u.high - span or (value <= u.low + span and u.low != u.nominal):
+            return f"{u.name} is at its bound of {shown(float(value))}"
+    return ""
+
+
+def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:
+    """Whether two causes are lines of one kind at one place that do not part within the records to fit."""
+    a, b = fit.structure.causes[j], fit.structure.causes[k]
+    if a.effect == PARAMETER or not a.prior.repeatable or (a.effect, a.location) != (b.effect, b.location):
+        return False
+    return abs(_line(fit, j) - _line(fit, k)) * _covered(recording, a) < OBJECTIONS.apart
+
+
+def _too_few_periods(recording: Recording, fit: Fit, k: int) -> str:
+    """Why a disturbance of one frequency cannot be told in records so short; empty where it can."""
+    cause = fit.structure.causes[k]
+    if cause.effect == PARAMETER or cause.prior.domain != "disturbance" or recording.kind != "series":
+        return ""
+    if not any(p.unit == "Hz" for p in cause.law.params):
+        return ""
+    periods = _line(fit, k) * _covered(recording, cause)
+    if periods >= OBJECTIONS.fewest_periods:
+        return ""
+    return (
+        f"the records hold {periods:.1f} periods of it, and {OBJECTIONS.fewest_periods:.0f} are needed to tell a line"
+    )
+
+
+def _at_the_onset(recording: Recording, fit: Fit, k: int) -> str:
+    """Why an event is no event of its own: it begins where the drive begins or ceases to move."""
+    cause = fit.structure.causes[k]
+    if cause.effect == PARAMETER or recording.kind != "series":
+        return ""
+    values = fit.values(k)
+    for p in cause.law.params:
+        if cause.prior.of(p).start_from_data != "moments":
+            continue
+        for record in (r for r in recording.records if r.role == "fit"):
+            near = OBJECTIONS.onset_samples * record.sample_time
+            if any(abs(values[p.name] - t) <= near for t in _onsets(record)):
+                return "it happens where the motion begins or ends, as friction, slack and delays do"
+    return ""
+
+
+def _onsets(record: Record) -> np.ndarray:
+    """Times [s] at which a drive that stood still begins to move, or one that moved stands still."""
+    span = np.ptp(record.drive, axis=0)
+    moving = np.any(np.abs(np.diff(record.drive, axis=0)) > OBJECTIONS.standing * span, axis=1)
+    edges = np.flatnonzero(np.diff(moving.astype(int)))
+    long = int(OBJECTIONS.rest_samples)
+    return np.array([
+        record.time[a + 1]
+        for a in edges
+        if not (moving[max(a + 1 - long, 0) : a + 1] if moving[a + 1] else moving[a + 1 : a + 1 + long]).any()
+    ])  # fmt: skip
+
+
+def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> str:
+    """Why cause k is the rounding of its channel, which the readings show by themselves; empty where it is not."""
+    cause = fit.structure.causes[k]
+    channel = f"reading.{cause.at}"
+    if cause.effect == PARAMETER or channel not in recording.channels:
+        return ""
+    i = recording.channels.index(channel)
+    values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
+    read, *_ = detect_directly(cause.law, values) or ({},)
+    steps = (p.name for p in cause.law.params if p.off is None and (_is_spatial_period(cause, p) or p.name in read))
+    shortest = OBJECTIONS.shortest_period * quantisation_step(values)
+    return "it repeats with the steps of the reading" if any(fit.values(k)[name] < shortest for name in steps) else ""
+
+
+def _is_spatial_period(cause: Hypothesis, p: Param) -> bool:
+    return cause.prior.of(p).start_from_data == "spatial_periods"
+
+
+def _line(fit: Fit, k: int) -> float:
+    """Periods a second, or a unit of the path, of cause k; zero for one that has none."""
+    values = fit.values(k)
+    cause = fit.structure.causes[k]
+    for p in cause.law.params:
+        if p.unit == "Hz":
+            return values[p.name]
+        if _is_spatial_period(cause, p):
+            return 1 / values[p.name]
+    return 0.0
+
+
+def _covered(recording: Recording, cause: Hypothesis) -> float:
+    """The longest of the records to fit [s], or how far its reading goes in them [SI]; no end where neither is meant."""
+    records = [r for r in recording.records if r.role == "fit"]
+    params = cause.law.params
+    if any(p.unit == "Hz" for p in params):
+        return max(float(r.time[-1] - r.time[0]) for r in records)
+    channel = f"reading.{cause.at}"
+    if not any(_is_spatial_period(cause, p) for p in params) or channel not in recording.channels:
+        return np.inf
+    i = recording.channels.index(channel)
+    read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
+    return float(np.ptp(read)) if len(read) else np.inf

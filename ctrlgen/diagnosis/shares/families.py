@@ -1,0 +1,145 @@
+"""Families of laws: which of them a share speaks for, and to which of them each effect of the library belongs.
+
+A recording often tells the family and not the member: what is a function of the direction of motion is dry friction, whichever
+of its laws. A kind speaks for the first family of its row; the others can look the same.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from ctrlgen.diagnosis.shares.regressors import Kind
+from ctrlgen.diagnosis.shares.result import SharesTable
+
+
+class Family(Enum):
+    """Families of laws."""
+
+    FRICTION = "dry friction"
+    HYSTERESIS = "hysteresis"
+    ELASTIC = "elastic nonlinearity"
+    DRIVE = "drive nonlinearity"
+    GAIN = "gain and offset"
+    CROSS_TALK = "cross-talk"
+    DYNAMICS = "dynamics"
+    CREEP = "creep"
+    TIMING = "timing"
+    GEOMETRY = "sensor geometry"
+    PERIODIC = "periodic sensor error"
+    THERMAL = "thermal"
+    EVENTS = "events and disturbances"
+
+
+SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
+    Kind.DIRECTION: (
+        (Family.FRICTION, Family.HYSTERESIS),
+        "Coulomb's force changes its sign with the speed; play and hysteresis do after a short way",
+    ),
+    Kind.PROPORTION: (
+        (Family.GAIN, Family.GEOMETRY),
+        "a wrong stiffness, gain or lever; a turned frame, where several axes move a reading",
+    ),
+    Kind.POSITION: (
+        (Family.ELASTIC, Family.GEOMETRY),
+        "a force that does not rise in proportion, a stop, the bow of a sensor are functions of the place alone",
+    ),
+    Kind.SPEED: (
+        (Family.DYNAMICS, Family.TIMING, Family.FRICTION),
+        "viscous and drag forces; a reading late by tau is off by tau times the speed; friction that falls with speed",
+    ),
+    Kind.ACCELERATION: (
+        (Family.DYNAMICS, Family.TIMING),
+        "forces of inertia, a mass on a spring; a lag of the speed",
+    ),
+    Kind.RATE: (
+        (Family.TIMING, Family.DYNAMICS),
+        "a reading late by tau is off by tau times its rate, one behind a filter also by its second derivative",
+    ),
+    Kind.DRIVE: (
+        (Family.DRIVE, Family.GAIN, Family.ELASTIC),
+        "dead zone, saturation, another gain by sign; in slow motion drive and position are one",
+    ),
+    Kind.TRAVEL_HISTORY: (
+        (Family.HYSTERESIS, Family.FRICTION),
+        "memory of the last reversals of the way, whatever the speed: sums of plays are Prandtl-Ishlinskii's hysteresis",
+    ),
+    Kind.DRIVE_HISTORY: (
+        (Family.HYSTERESIS, Family.DRIVE),
+        "memory of the last reversals of the drive: ferroelectric hysteresis, play of a gear behind the motor",
+    ),
+    Kind.OTHER_AXIS: (
+        (Family.CROSS_TALK, Family.GEOMETRY),
+        "what an axis of its own does not move: guides out of square, Abbe arms, turned frames, heat",
+    ),
+    Kind.DRIVE_LAG: (
+        (Family.CREEP, Family.THERMAL, Family.DYNAMICS, Family.TIMING),
+        "memory of a time constant: creep, slow heat, a second pole, a filter",
+    ),
+    Kind.PRODUCT: (
+        (Family.CROSS_TALK, Family.ELASTIC, Family.HYSTERESIS),
+        "second order of the kinematics, stiffness that another axis changes, hysteresis that differs by side",
+    ),
+    Kind.TEMPERATURE: ((Family.THERMAL,), "expansion, and sensors that see the surroundings"),
+    Kind.RECORD: ((Family.GAIN, Family.EVENTS), "the zero point of each record, or what happened between them"),
+    Kind.PITCH: ((Family.PERIODIC,), "fringes, teeth, resolvers and screws repeat along the way"),
+    Kind.TIME: (
+        (Family.EVENTS, Family.THERMAL, Family.CREEP),
+        "drift and ageing on the clock, whatever was done",
+    ),
+    Kind.LINE: ((Family.EVENTS,), "vibration and mains repeat in time"),
+    Kind.PAST: ((), "says that something is left that lasts longer than a sample, not what"),
+}
+
+FAMILY_OF = {
+    **dict.fromkeys(("coulomb", "stribeck"), Family.FRICTION),
+    **dict.fromkeys(
+        ("hysteresis", "asymmetric_hysteresis", "bouc_wen", "drive_hysteresis", "backlash"), Family.HYSTERESIS
+    ),
+    **dict.fromkeys(("stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
+    **dict.fromkeys(("asymmetric_gain", "dead_zone", "saturation", "heater_resistance"), Family.DRIVE),
+    **dict.fromkeys(
+        ("drive_gain", "lever_ratio", "sensor_gain", "stiffness", "drive_offset", "home_offset"), Family.GAIN
+    ),
+    **dict.fromkeys(("reversed", "stuck", "payload"), Family.GAIN),
+    **dict.fromkeys(("coupling", "heat_crosstalk", "link_compliance", "swapped"), Family.CROSS_TALK),
+    **dict.fromkeys(("asymmetric_viscous", "quadratic_damping", "resonance"), Family.DYNAMICS),
+    **dict.fromkeys(("creep", "log_creep"), Family.CREEP),
+    **dict.fromkeys(("delay", "low_pass"), Family.TIMING),
+    **dict.fromkeys(("abbe_arm", "bow", "cubic_sensor", "finite_rotation", "frame_rotation_x"), Family.GEOMETRY),
+    **dict.fromkeys(("frame_rotation_y", "frame_rotation_z", "raised_point", "screw_motion"), Family.GEOMETRY),
+    **dict.fromkeys(("stitching_error",), Family.GEOMETRY),
+    **dict.fromkeys(("cyclic", "quantisation"), Family.PERIODIC),
+    **dict.fromkeys(("expansion", "second_pole", "temperature_sensitivity", "thermal_lag"), Family.THERMAL),
+    **dict.fromkeys(("degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"), Family.EVENTS),
+}
+"""By effect of the library its family: the place where its name says what it is, not every kind in which it can show."""
+
+
+def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[tuple[Family, float]]:
+    """Families by the share that they could account for, the largest first; those with none are left out.
+
+    Of each channel the gains of the selected kinds count for every family that their row names, and what a kind that was not
+    selected adds counts where nothing selected speaks for the family. The mean and the device's numbers count for gain and
+    offset. Of two with the same share the one that stands earlier in the rows goes first. Channels count by their energy over
+    the variance of their `noise` [SI]; alike without it.
+    """
+    weights = {c.channel: (c.rms / noise[c.channel]) ** 2 if noise else 1.0 for c in table.channels}
+    whole = sum(weights.values()) or 1.0
+    share = dict.fromkeys(Family, 0.0)
+    place = dict.fromkeys(Family, len(Family))
+    for channel in table.channels:
+        own, beside = dict.fromkeys(Family, 0.0), dict.fromkeys(Family, 0.0)
+        for row in channel.kinds:
+            for k, family in enumerate(SPEAKS_FOR[row.kind][0]):
+                if row.selected:
+                    own[family] += row.additional
+                    place[family] = min(place[family], k)
+                else:
+                    beside[family] = max(beside[family], row.additional)
+        own[Family.GAIN] += channel.constant + channel.numbers
+        if table.design.one_way(channel.own):  # friction without a change of direction is an offset
+            own[Family.FRICTION] += channel.constant
+        for family in Family:
+            share[family] += weights[channel.channel] / whole * (own[family] or beside[family])
+    found = [(family, value) for family, value in share.items() if value > 0]
+    return sorted(found, key=lambda pair: (-round(pair[1], 3), place[pair[0]], list(Family).index(pair[0])))

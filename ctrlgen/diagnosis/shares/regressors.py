@@ -1,0 +1,392 @@
+"""What a residual may be a function of: the signals of a record, and smooth functions of them in columns.
+
+A kind of regressor is a set of columns: cubic B-splines of a signal (C. de Boor, A Practical Guide to Splines (1978)), its
+sign, what play operators of several widths leave of it (rate-independent memory, as in Prandtl-Ishlinskii models), what
+low-passes leave of it (memory of a time constant), or products of two signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from itertools import combinations, pairwise
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.signal import lfilter
+
+from ctrlgen.diagnosis.settings import SHARES
+
+FEW = 2  # signals of one kind, up to which each gets all its columns
+
+
+class Kind(Enum):
+    """Kinds of regressor, in the order in which they are preferred where two predict alike.
+
+    First laws that act always, the simpler before what contains it; then memory of time, products, and last what fits
+    something of any residual: a pitch, a trend, a line.
+    """
+
+    DIRECTION = "direction of motion"
+    PROPORTION = "position, in proportion"
+    POSITION = "position"
+    SPEED = "speed"
+    ACCELERATION = "acceleration"
+    RATE = "rate of the reading"
+    DRIVE = "drive"
+    TRAVEL_HISTORY = "travel history"
+    DRIVE_HISTORY = "drive history"
+    OTHER_AXIS = "other axis"
+    DRIVE_LAG = "low-passed drive"
+    PRODUCT = "product of two"
+    TEMPERATURE = "temperature"
+    RECORD = "record"
+    PITCH = "place in a pitch"
+    TIME = "time"
+    LINE = "phase of a line"
+    PAST = "own past"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Signals:
+    """The signals of one record, each (n,) in SI.
+
+    `time` [s] on the clock of the recording, the pose's number for settled poses, whose `sample_time` is infinite; poses
+    stand in the order in which they were taken. `position` by axis, `speed` by axis where it is known (else the derivative
+    of the position is taken), `drive` by actuator, `reading`: what the model predicts, by channel, which tells the axes that
+    a channel sees. `temperature` of the surroundings. `units`: for figures, by 'position x' or 'drive x'.
+    """
+
+    time: np.ndarray
+    sample_time: float
+    position: Mapping[str, np.ndarray] = field(default_factory=dict)
+    speed: Mapping[str, np.ndarray] = field(default_factory=dict)
+    drive: Mapping[str, np.ndarray] = field(default_factory=dict)
+    reading: Mapping[str, np.ndarray] = field(default_factory=dict)
+    temperature: np.ndarray | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the samples are settled poses."""
+        return not np.isfinite(self.sample_time)
+
+    def derivative(self, values: np.ndarray) -> np.ndarray:
+        """d/dt of `values` (n,); for settled poses the step from the pose before."""
+        if self.settled:
+            return np.diff(values, prepend=values[:1])
+        return np.gradient(values, self.sample_time) if len(values) > 1 else np.zeros_like(values)
+
+    def speed_of(self, axis: str) -> np.ndarray:
+        """Speed (n,) of one axis, the step from the pose before for settled poses."""
+        return self.speed[axis] if axis in self.speed else self.derivative(self.position[axis])
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns (N, p) of unit variance and zero mean of one kind, made of one signal, or of two.
+
+    `axes`: the axes that the signal belongs to. `signal` and `unit` name `abscissa` (N,), over which a figure shows them; if
+    `of_abscissa`, they are functions of it and are held beyond its range, else each column is clamped to its own range.
+    """
+
+    kind: Kind
+    signal: str
+    unit: str
+    axes: frozenset[str]
+    abscissa: np.ndarray
+    values: np.ndarray
+
+    @property
+    def of_abscissa(self) -> bool:
+        """Whether the columns are splines of the abscissa."""
+        return self.kind in (
+            Kind.PROPORTION,
+            Kind.POSITION,
+            Kind.SPEED,
+            Kind.ACCELERATION,
+            Kind.DRIVE,
+            Kind.TEMPERATURE,
+            Kind.TIME,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """All columns at the drawn samples: X (N, P), its blocks, and the drives that are no signals of their own (`same_as`)."""
+
+    X: np.ndarray
+    blocks: tuple[Columns, ...]
+    axes: tuple[str, ...]
+    same_as: dict[str, str]
+
+    def clamped(self, train: np.ndarray, test: np.ndarray) -> np.ndarray:
+        """The columns (P, samples) at the `test` samples, none of them beyond what the `train` samples have seen."""
+        X = self.X[test].T.copy()
+        for block, places in zip(self.blocks, self.places, strict=True):
+            if block.of_abscissa:
+                x, seen = block.abscissa[test], np.flatnonzero(train)
+                for end, beyond in ((np.argmin, np.less), (np.argmax, np.greater)):
+                    last = seen[end(block.abscissa[seen])]
+                    out = beyond(x, block.abscissa[last])
+                    X[np.ix_(places, out)] = block.values[last][:, None]
+            else:
+                seen_values = block.values[train]
+                X[places] = np.clip(X[places], seen_values.min(axis=0)[:, None], seen_values.max(axis=0)[:, None])
+        return X
+
+    def one_way(self, own: frozenset[str]) -> bool:
+        """Whether the axes `own` move in one direction only, so that dry friction and an offset are one."""
+        turning = [b for b in self.of_kind(Kind.DIRECTION, own) if np.ptp(np.sign(b.abscissa)) == 2]
+        return bool(own) and not any(
+            min(np.mean(b.abscissa > 0), np.mean(b.abscissa < 0)) > SHARES.one_way for b in turning
+        )
+
+    @cached_property
+    def places(self) -> list[np.ndarray]:
+        """The columns of X of each block."""
+        ends = np.cumsum([0, *(b.values.shape[1] for b in self.blocks)])
+        return [np.arange(a, b) for a, b in pairwise(ends)]
+
+    def kinds(self, own: frozenset[str]) -> dict[Kind, np.ndarray]:
+        """Columns of X by kind, for a channel that sees the axes `own`."""
+        found: dict[Kind, list[np.ndarray]] = {}
+        for block, places in zip(self.blocks, self.places, strict=True):
+            if (kind := kind_for(block, own)) is not None:
+                found.setdefault(kind, []).append(places)
+        return {kind: np.concatenate(found[kind]) for kind in Kind if kind in found}
+
+    def of_kind(self, kind: Kind, own: frozenset[str]) -> Iterator[Columns]:
+        """The blocks of one kind, for a channel that sees the axes `own`."""
+        return (block for block in self.blocks if kind_for(block, own) is kind)
+
+
+def kind_for(block: Columns, own: frozenset[str]) -> Kind | None:
+    """The kind of a block for a channel that sees the axes `own`: what belongs to another axis counts as that; None where it
+    is not looked at."""
+    if not block.axes or block.axes & own:
+        return block.kind
+    return Kind.OTHER_AXIS if block.kind in (Kind.POSITION, Kind.SPEED, Kind.ACCELERATION) else None
+
+
+def own_axes(signals: Sequence[Signals], channel: str) -> frozenset[str]:
+    """The axes that move a reading: those whose part of it, in a linear regression of what the model predicts on positions,
+    speeds and accelerations, is at least `SHARES.own_axis` of the largest one's. All axes where no such reading is given."""
+    axes = tuple(signals[0].position)
+    if len(axes) < 2 or any(channel not in s.reading for s in signals):
+        return frozenset(axes)
+    y = np.concatenate([s.reading[channel] for s in signals])
+    parts, columns = [], []
+    for axis in axes:
+        d = np.concatenate([s.position[axis] for s in signals])
+        own = [d]
+        if not signals[0].settled:
+            v = [s.speed_of(axis) for s in signals]
+            own += [np.concatenate(v), np.concatenate([s.derivative(x) for s, x in zip(signals, v, strict=True)])]
+        columns += own
+        parts.append(len(own))
+    X = np.column_stack([standardised(c) for c in columns])
+    slopes = np.linalg.lstsq(X, y - y.mean(), rcond=1e-8)[0]
+    ends = np.cumsum([0, *parts])
+    moved = [float(np.std(X[:, a:b] @ slopes[a:b])) for a, b in pairwise(ends)]
+    largest = max(moved)
+    return frozenset(axis for axis, part in zip(axes, moved, strict=True) if part >= SHARES.own_axis * largest)
+
+
+def standardised(values: np.ndarray) -> np.ndarray:
+    """`values` (N, ...) of zero mean and unit variance along the first axis; zero where they do not vary."""
+    values = values - values.mean(axis=0)
+    size = values.std(axis=0)
+    return values / np.where(size > 0, size, 1.0)
+
+
+def splines(x: np.ndarray, count: int) -> np.ndarray:
+    """x and `count` + 1 cubic B-splines of it (N, count + 2); knots halfway between equal steps and equal counts.
+
+    A B-spline is at most one anywhere, so that a smoother with bounded coefficients is bounded too.
+    """
+    low, high = float(x.min()), float(x.max())
+    if not high > low:
+        return np.empty((len(x), 0))
+    part = np.linspace(0, 1, count - 1)[1:-1]
+    inner = (np.quantile(x, part) + low + part * (high - low)) / 2
+    knots = np.concatenate([[low] * 4, inner, [high] * 4])
+    basis = BSpline.design_matrix(np.clip(x, low, high), knots, 3).toarray()
+    return np.column_stack([x, basis])
+
+
+def plays(x: np.ndarray, half_widths: np.ndarray) -> np.ndarray:
+    """Play operators P_r <- max(x - r, min(x + r, P_r)) of half widths r (m, k) of inputs x (n, m): (n, m, k).
+
+    They begin at the first input. M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis (1989), ch. 2.
+    """
+    P, out = np.repeat(x[0][:, None], half_widths.shape[1], axis=1), np.empty((len(x), *half_widths.shape))
+    low, high = x[:, :, None] - half_widths, x[:, :, None] + half_widths
+    for k in range(len(x)):
+        P = np.maximum(low[k], np.minimum(high[k], P))
+        out[k] = P
+    return out
+
+
+def direction(speed: np.ndarray, fastest: float) -> np.ndarray:
+    """Sign of the speed, zero where it is below `SHARES.standing` of the fastest."""
+    return np.where(np.abs(speed) > SHARES.standing * fastest, np.sign(speed), 0.0)
+
+
+def low_pass(u: np.ndarray, samples: float) -> np.ndarray:
+    """u (n,) through a first-order lag of a time constant in samples, begun in balance."""
+    a = np.exp(-1 / samples)
+    return lfilter([1 - a], [1.0, -a], u, zi=[a * u[0]])[0]
+
+
+def build_design(signals: Sequence[Signals], rows: Sequence[np.ndarray]) -> Design:
+    """The columns of all kinds at the `rows` drawn from each record; memories run through every sample before."""
+    builder = _Builder(signals, rows)
+    made = [Columns(**{**vars(b), "values": standardised(b.values)}) for b in builder.columns()]
+    varying = [Columns(**{**vars(b), "values": b.values[:, np.any(b.values != 0, axis=0)]}) for b in made]
+    kept = tuple(b for b in varying if b.values.shape[1])
+    N = sum(map(len, rows))
+    X = np.column_stack([b.values for b in kept]) if kept else np.empty((N, 0))
+    return Design(X, kept, tuple(builder.axes), builder.same_as)
+
+
+class _Builder:
+    """The drawn samples of the signals of all records, one after another."""
+
+    def __init__(self, signals: Sequence[Signals], rows: Sequence[np.ndarray]) -> None:
+        self.signals, self.rows, self.settled = signals, rows, signals[0].settled
+        self.axes = list(signals[0].position)
+        self.position = {a: self.drawn([s.position[a] for s in signals]) for a in self.axes}
+        full = {a: [s.speed_of(a) for s in signals] for a in self.axes}
+        self.speed = {a: self.drawn(full[a]) for a in self.axes}
+        fastest = {a: max(float(np.abs(v).max(initial=0.0)) for v in full[a]) for a in self.axes}
+        if self.settled:  # a step counts over the range
+            fastest = {a: float(np.ptp(np.concatenate([s.position[a] for s in signals]))) for a in self.axes}
+        self.direction = {a: direction(self.speed[a], fastest[a]) for a in self.axes}
+        self.acceleration = {
+            a: self.drawn([s.derivative(v) for s, v in zip(signals, full[a], strict=True)]) for a in self.axes
+        }
+        drives = {name: self.drawn([s.drive[name] for s in signals]) for name in signals[0].drive}
+        self.same_as = {name: same for name, u in drives.items() if (same := self._same(u))}
+        self.drive = {name: u for name, u in drives.items() if name not in self.same_as}
+
+    def drawn(self, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """The drawn samples of one array a record."""
+        return np.concatenate([np.asarray(part)[rows] for part, rows in zip(parts, self.rows, strict=True)])
+
+    def _same(self, u: np.ndarray) -> str:
+        """The signal that a drive follows up to `SHARES.same_signal`, '' where there is none or the drive does not vary."""
+        groups = {"position": self.position}
+        if not self.settled:
+            groups |= {"speed": self.speed, "acceleration": self.acceleration}
+        u = standardised(u)
+        alike = [
+            f"{name} of {axis}"
+            for name, group in groups.items()
+            for axis, x in group.items()
+            if abs(float(np.mean(u * standardised(x)))) > SHARES.same_signal
+        ]
+        return alike[0] if alike else ""
+
+    def _unit(self, what: str, name: str) -> str:
+        return self.signals[0].units.get(f"{what} {name}", "")
+
+    def count(self, signals: int) -> int:
+        """Splines of each of so many signals of one kind."""
+        if self.settled:
+            return SHARES.spline_columns_poses
+        return SHARES.spline_columns if signals <= FEW else SHARES.spline_columns_many
+
+    def columns(self) -> Iterator[Columns]:
+        """The blocks of columns, not yet standardised."""
+        nothing: frozenset[str] = frozenset()
+        for a in self.axes:
+            d, v, own = self.position[a], self.speed[a], frozenset([a])
+            unit, speed_unit = self._unit("position", a), self._unit("speed", a)
+            yield Columns(Kind.PROPORTION, a, unit, own, d, d[:, None])
+            yield Columns(Kind.POSITION, a, unit, own, d, splines(d, self.count(len(self.axes))))
+            yield Columns(Kind.DIRECTION, f"speed of {a}", speed_unit, own, v, self.direction[a][:, None])
+            if not self.settled:
+                yield Columns(Kind.SPEED, f"speed of {a}", speed_unit, own, v, splines(v, self.count(len(self.axes))))
+                acc = self.acceleration[a]
+                values = splines(acc, SHARES.spline_columns_many)
+                yield Columns(Kind.ACCELERATION, f"acceleration of {a}", "", own, acc, values)
+        for name, u in self.drive.items():
+            unit = self._unit("drive", name)
+            yield Columns(Kind.DRIVE, name, unit, nothing, u, splines(u, self.count(len(self.drive))))
+        yield from self._memories()
+        yield from self._products()
+        yield from self._slow()
+
+    def _memories(self) -> Iterator[Columns]:
+        """What play operators and low-passes leave of positions and drives."""
+        names = [("position", a) for a in self.axes] + [("drive", u) for u in self.drive]
+        if not names:
+            return
+        inputs = [np.column_stack([np.asarray(getattr(s, what)[name]) for what, name in names]) for s in self.signals]
+        half = np.ptp(np.concatenate(inputs), axis=0) / 2
+        widths = half[:, None] * np.array(SHARES.plays)
+        left = self.drawn([x[:, :, None] - plays(x, widths) for x in inputs])
+        for i, (what, name) in enumerate(names):
+            x, unit = self.drawn([part[:, i] for part in inputs]), self._unit(what, name)
+            kind = Kind.TRAVEL_HISTORY if what == "position" else Kind.DRIVE_HISTORY
+            axes = frozenset([name] if what == "position" else [])
+            values = left[:, i]
+            if not self.settled and len(names) <= 2 * FEW:  # butterflies and loops that differ by side
+                values = np.column_stack([values, values * standardised(x)[:, None], values**2])
+            yield Columns(kind, name, unit, axes, x, values)
+            if what == "drive":
+                yield Columns(Kind.DRIVE_LAG, name, unit, frozenset(), x, self._lags([part[:, i] for part in inputs]))
+
+    def _lags(self, parts: list[np.ndarray]) -> np.ndarray:
+        """Low-passed less direct u and u^2 (N, 2 k); u^2 is what heats."""
+        longest = max(SHARES.longest_lag * max(map(len, parts)), 5.0)
+        lags = np.array(SHARES.pose_lags) if self.settled else np.geomspace(4, longest, SHARES.lags)
+        columns = [
+            self.drawn([low_pass(u**power, samples) - u**power for u in parts]) for samples in lags for power in (1, 2)
+        ]
+        return np.column_stack(columns)
+
+    def _products(self) -> Iterator[Columns]:
+        """Products of two signals of zero mean and unit variance."""
+        signals: list[tuple[str, frozenset[str], np.ndarray]] = []
+        for a in self.axes:
+            own = frozenset([a])
+            signals.append((a, own, self.position[a]))
+            signals.append((f"direction of {a}", own, self.direction[a]))
+            if not self.settled:
+                signals.append((f"speed of {a}", own, self.speed[a]))
+        if len(self.drive) <= FEW:  # their number grows with the square
+            signals += [(u, frozenset(), x) for u, x in self.drive.items()]
+        if self.ambient is not None:
+            signals.append(("temperature", frozenset(), self.ambient))
+        plain = {name: standardised(x) for name, _, x in signals}
+        for (one, at, x), (other, of, _) in combinations(signals, 2):
+            moving = {one, other} - set(self.axes)
+            if at and of and at != of and moving:  # of two axes the positions alone
+                continue
+            yield Columns(Kind.PRODUCT, f"{one} x {other}", "", at | of, x, (plain[one] * plain[other])[:, None])
+
+    @cached_property
+    def ambient(self) -> np.ndarray | None:
+        """Temperature at the drawn samples, where all records have one that varies."""
+        parts = [s.temperature for s in self.signals if s.temperature is not None]
+        if len(parts) < len(self.signals) or not np.ptp(np.concatenate(parts)) > 0:
+            return None
+        return self.drawn(parts)
+
+    def _slow(self) -> Iterator[Columns]:
+        """Temperature, a trend on the common clock, and the zero point of each record."""
+        nothing: frozenset[str] = frozenset()
+        if self.ambient is not None:
+            values = splines(self.ambient, self.count(1))
+            yield Columns(Kind.TEMPERATURE, "temperature", "K", nothing, self.ambient, values)
+        t = self.drawn([s.time for s in self.signals])
+        unit = "" if self.settled else "s"
+        yield Columns(Kind.TIME, "pose" if self.settled else "time", unit, nothing, t, splines(t, self.count(1)))
+        if len(self.rows) > 1:
+            record = np.repeat(np.arange(len(self.rows)), list(map(len, self.rows)))
+            one = (record[:, None] == np.arange(len(self.rows))).astype(float)
+            yield Columns(Kind.RECORD, "record", "", nothing, record.astype(float), one)

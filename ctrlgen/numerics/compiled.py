@@ -1,0 +1,88 @@
+"""CasADi functions compiled to machine code where a C compiler is there, and left to CasADi's virtual machine elsewhere.
+
+Compiled libraries are kept in the user's cache folder under the SHA-256 of their code, so that another diagnosis of the same
+device need not compile them again. The code is compiled without contraction of products and sums: its results are those of the
+virtual machine to the last bit.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import casadi as ca
+
+FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
+SECONDS_PER_CHARACTER = 6e-6  # of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod
+LONGEST = 4_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
+
+
+class Compilable:
+    """`function`, and the library that takes its place once it has run so long that compiling pays."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self.function = function
+        self.seconds = 0.0  # spent in the virtual machine so far
+        self._code: str | None = None
+        self._settled = compiler() is None
+
+    def spent(self, seconds: float) -> bool:
+        """Counts `seconds` of the virtual machine; whether `function` has been replaced by its library."""
+        if self._settled:
+            return False
+        self.seconds += seconds
+        if self._code is None:
+            if self.seconds < 0.05:  # what never runs need not be written as C
+                return False
+            self._code = _c_of(self.function)
+        price = len(self._code) * SECONDS_PER_CHARACTER
+        path = _library(self._code)
+        if not path.exists() and (self.seconds < price or len(self._code) > LONGEST):
+            return False
+        self._settled = True
+        if not path.exists() and not _compile(self._code, path):
+            return False
+        self.function, self._code = ca.external(self.function.name(), str(path)), ""
+        return True
+
+
+@functools.cache
+def compiler() -> str | None:
+    """The C compiler: $CC, cc or gcc; None where there is none or CTRLGEN_NO_COMPILER is set."""
+    if os.environ.get("CTRLGEN_NO_COMPILER"):
+        return None
+    return next((found for name in (os.environ.get("CC"), "cc", "gcc") if name and (found := shutil.which(name))), None)
+
+
+def _c_of(function: ca.Function) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator("step.c")
+        generator.add(function)
+        generator.generate(f"{folder}/")
+        return Path(folder, "step.c").read_text()
+
+
+def _library(code: str) -> Path:
+    digest = hashlib.sha256("\0".join((code, str(compiler()), *FLAGS)).encode()).hexdigest()[:32]
+    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "ctrlgen" / f"{digest}.so"
+
+
+def _compile(code: str, path: Path) -> bool:
+    """Compiles to `path`, which appears as a whole or not at all; whether that was possible."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            source, library = Path(folder, "step.c"), Path(folder, "step.so")
+            source.write_text(code)
+            command = [str(compiler()), *FLAGS, str(source), "-o", str(library), "-lm"]
+            subprocess.run(command, check=True, capture_output=True, timeout=300)
+            library.replace(path)
+        return True
+    except (OSError, subprocess.SubprocessError):
+        return False
