@@ -182,7 +182,9 @@ def _numbers(device: Device) -> Iterator[tuple[str, str]]:
     """(path, location) of every number that is not a count."""
     for path, section, number in numbers(device):
         if not number.whole:
-            owner = "" if isinstance(section, Device) else getattr(section, "name", "")  # of several alike, such as axes
+            owner = (
+                "" if isinstance(section, Device) else getattr(section, "name", "")
+            )  # of several alike, such as axes
             yield path, f"{section.domain}:{f'{owner}.' if owner else ''}{path.rpartition('.')[2]}"
 
 

@@ -25,7 +25,7 @@ from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, restart
 from ctrlgen.diagnosis.selection.screen import Screened
-from ctrlgen.diagnosis.settings import HELD_OUT_REFIT, MODEL_SELECTION, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT, MODEL_SELECTION, RESIDUAL_TESTS, STATISTICS
 
 
 def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> CandidateModel:
@@ -195,7 +195,7 @@ class ModelSelection:
         for the model-form error of a cause, multiplied by `times`."""
         if not any(cause.prior.model_form_error for cause in current.causes):
             return False
-        most = self.fit_candidate(Structure(current.fit.structure.device), steps=40)
+        most = self.fit_candidate(Structure(current.fit.structure.device), steps=FIT.max_steps)
         for j, cause in enumerate(current.causes):
             if form_error := cause.prior.model_form_error:
                 without_one = self.fit_candidate(restart(current.fit).without(j))

@@ -96,6 +96,8 @@ class SearchSettings:
     """Updates of the noise from the residual at most."""
     same_noise: float = 0.05
     """Relative change of the noise below which it counts as unchanged."""
+    same_noise_size: float = 0.02
+    """The same of noise that only the misfit tells: it is the yardstick of everything else. Judgement."""
     candidates_per_round: int = 6
     """Single candidates fitted a round, and as many sets of each size."""
     cheap_factor: int = 3

@@ -1,0 +1,170 @@
+"""The candidates of a round: suspects of the screen alone, in sets and in other shapes, and an offset of the clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, restart, restart_with
+from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.diagnosis.selection.screen import Screened, Suspect
+from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
+
+
+def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
+    """All that is tried beside `current`, the promising ones fitted to their end."""
+    found = fit_each(trials, current.fit, significant(trials, current, screened))
+    if not current.errors.is_noise:
+        found = tuple(restart_elsewhere(trials, t, current, screened) for t in found)
+    found = (*found, *fit_other_clocks(trials, current, found))
+    if trials.selection.parameters_may_mask_cause(current.fit):
+        found = (*found, *_as_stated(trials, current))
+    found = (*found, *fit_subsets(trials, current, screened, found))
+    return _converge_promising(trials, current, found)
+
+
+def significant(trials: Trials, current: CandidateModel, screened: Screened) -> list[Suspect]:
+    """The suspects worth a fit: the best of those that score enough, no more than a third of them of one law."""
+    need = trials.selection.required_z2(current, screened)
+    loud = [s for s in screened.suspects if s.z**2 > need]
+    chosen: list[Suspect] = []
+    for s in loud:
+        same = sum(c.hypothesis.effect == s.hypothesis.effect for c in chosen)
+        if (
+            s.z**2 >= SEARCH.smallest_score * loud[0].z ** 2
+            and same < trials.per_round // 3
+            and len(chosen) < trials.per_round
+        ):
+            chosen.append(s)
+    return chosen
+
+
+def fit_each(trials: Trials, fit: Fit, suspects: Sequence[Suspect]) -> tuple[CandidateModel, ...]:
+    """Each suspect beside what is fitted."""
+    found: list[CandidateModel] = []
+    for s in suspects:
+        trials.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
+        found += trials.tried(restart_with(fit, s.hypothesis, s.start), s.hypothesis, fit)
+    return tuple(found)
+
+
+def restart_elsewhere(
+    trials: Trials, candidate: CandidateModel, before: CandidateModel, screened: Screened
+) -> CandidateModel:
+    """The candidate, its causes that are new begun again in the most promising of the other shapes screened, where more than
+    noise is left: the shapes of one law may lie in several valleys."""
+    others = {s.hypothesis: s.other_starts for s in screened.suspects}
+    for k, cause in enumerate(candidate.causes):
+        if cause in before.causes or candidate.errors.is_noise:
+            continue
+        structure, shapes = restart(candidate.fit), others.get(cause, ())
+        size = cause.law.amplitude().name if shapes else ""
+        begins = [*shapes, *({**shape, size: structure.starts[k][size]} for shape in shapes)]
+        if not begins:
+            continue
+        try:
+            starts = (structure.restarted(k, begin) for begin in begins)
+            promising = sorted(starts, key=trials.fitter.initial_objective)[: SEARCH.restarts]
+            again = (trials.fitter.fit(s, steps=SEARCH.candidate_steps) for s in promising)
+            best = min(again, key=lambda fit: fit.objective)
+            if best.objective < candidate.fit.objective:
+                candidate = trials.converged(scored(trials.fitter, best, candidate.cause))
+        except FAILURES as error:
+            trials.note_failure(cause, error)
+    return candidate
+
+
+def fit_other_clocks(
+    trials: Trials, current: CandidateModel, singles: Sequence[CandidateModel]
+) -> tuple[CandidateModel, ...]:
+    """What an offset of the recorders' clocks explains, alone and beside the best of the `singles`, begun at the best of a few.
+    The screen cannot see it: it shifts the drive itself."""
+    h = min(r.sample_time for r in trials.fitter.recording.records)
+    open_ = (o for o in (h.beside(current.causes) for h in trials.screen.hypotheses) if o is not None)
+    clocks = [o for o in open_ if o.effect != PARAMETER and o.law.shifts_drive]
+    if current.errors.is_noise or not np.isfinite(h):
+        return ()
+    found: list[CandidateModel] = []
+    for cause in clocks:
+        p = cause.law.amplitude()
+        low, high = cause.bounds(p, current.fit.structure.channel_of(cause))
+        starts = [s * 2**k * h for k in range(SEARCH.clock_doublings) for s in (1, -1)]
+        trials.step(f"trying {cause.effect} at {cause.location}")
+        for beside in (current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]):
+            begun = [restart_with(beside.fit, cause, {p.name: s}) for s in starts if low <= s <= high]
+            try:
+                best = min(begun, key=trials.fitter.initial_objective)
+            except FAILURES as error:
+                trials.note_failure(cause, error)
+                continue
+            found += trials.tried(best, cause, beside.fit)
+    return tuple(found)
+
+
+def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
+    """What is suspected of the device with its own numbers as stated: a fit that bends them so far sees what they hide no
+    more."""
+    stated = trials.fitter.fit(replace(restart(current.fit), nominal_starts={}), steps=0)
+    return fit_each(trials, stated, significant(trials, current, trials.screen.run(stated)))
+
+
+def fit_subsets(
+    trials: Trials, current: CandidateModel, screened: Screened, singles: Sequence[CandidateModel]
+) -> list[CandidateModel]:
+    """Sets of suspects that promise more than any single one gave; each size must promise more than the smaller. None where a
+    single one leaves noise alone."""
+    known = bool(trials.fitter.noise.known.all())
+    if known and any(t.errors.is_noise and not current.errors.is_noise for t in singles):
+        return []
+    best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
+    least = min((t.fitted.excess for t in singles), default=np.inf)
+    found: list[CandidateModel] = []
+    for size in (2, 3, 4):
+        explained = least <= (1 - MODEL_SELECTION.most_of_mismatch) * current.fitted.excess
+        if size > 2 and explained and trials.fitter.recording.kind == "series":
+            break
+        left = current.fit.objective - best
+        enough = best + max(trials.selection.required_z2(current, screened), SEARCH.subset_share * left)
+        for suspects in _promising_sets(screened, size, enough, trials.per_round):
+            structure = restart(current.fit)
+            for s in suspects:
+                structure = structure.with_cause(s.hypothesis, s.start)
+            trials.step("trying " + ", ".join(f"{s.hypothesis.effect} at {s.hypothesis.location}" for s in suspects))
+            found += trials.tried(structure, suspects[-1].hypothesis, current.fit)
+        sound = [t for t in found if not trials.objections(t)]
+        best = max([best, *(current.fit.objective - t.fit.objective for t in sound)])
+        least = min([least, *(t.fitted.excess for t in sound)])
+    return found
+
+
+def _promising_sets(screened: Screened, size: int, enough: float, most: int) -> list[tuple[Suspect, ...]]:
+    """The first `most` sets of one size that promise `enough`, no suspect in more than half of them, no two of one family at one
+    place."""
+    chosen: list[tuple[Suspect, ...]] = []
+    used: dict[Hypothesis, int] = {}
+    for promised, suspects in screened.subsets:
+        causes = [s.hypothesis for s in suspects]
+        if len(suspects) != size or promised < enough or len(chosen) >= most:
+            continue
+        often = max(used.get(h, 0) for h in causes) >= max(2, most // 2)
+        if often or len({(h.family, h.location) if h.family else h for h in causes}) < size:
+            continue
+        used.update({h: used.get(h, 0) + 1 for h in causes})
+        chosen.append(suspects)
+    return chosen
+
+
+def _converge_promising(
+    trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel]
+) -> tuple[CandidateModel, ...]:
+    """The candidates, those driven to their end that leave least on the records to fit but are not justified so early."""
+    best = sorted(candidates, key=lambda t: t.fit.objective)[: SEARCH.converged_candidates]
+    early = [
+        t for t in best if t.fit.objective < current.fit.objective and not trials.selection.improves_enough(current, t)
+    ]
+    return tuple(trials.converged(t) if t in early else t for t in candidates)

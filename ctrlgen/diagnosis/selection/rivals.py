@@ -1,0 +1,80 @@
+"""Rivals: what would be suspected in place of a cause, with all the others as they are."""
+
+from __future__ import annotations
+
+from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum, restart
+from ctrlgen.diagnosis.selection.candidates import significant
+from ctrlgen.diagnosis.selection.screen import Suspect
+from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.settings import SEARCH
+
+
+def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateModel:
+    """Each cause against what would be suspected in its place, now that the others are there; not what came alone to those
+    `before`, which has been compared already."""
+    causes = len(current.causes)
+    for k in range(before if causes == before + 1 else causes):
+        for rival in replacements(trials, current, k):
+            better = trials.selection.advantage(rival, current) > SEARCH.rival_difference
+            if better and not trials.objections(rival, current.causes):
+                current = trials.converged(rival)
+                break
+    return current
+
+
+def rivals(trials: Trials, current: CandidateModel, k: int) -> tuple[CandidateModel, ...]:
+    """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude."""
+    there, special = current.causes, current.fit.nested_case(k)
+    alike = [t for t in replacements(trials, current, k) if not _same_name(t.cause, there[k])]
+    alike = [
+        t
+        for t in alike
+        if trials.selection.advantage(current, t) < SEARCH.rival_difference
+        or (special and t.cause and t.cause.effect == special)
+    ]
+    return tuple(t for t in alike if not trials.objections(t, there))
+
+
+def replacements(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
+    """What would be suspected instead of cause k, with all the rest as it is now: refitted, it may have gone astray."""
+    structure = current.fit.structure
+    others = restart(current.fit).without(k)
+    try:
+        bare = trials.fitter.fit(others, steps=0)
+        screened = trials.screen.run(bare)
+    except FAILURES as error:
+        trials.note_failure(structure.causes[k], error)
+        return []
+    without = linearised_optimum(bare)
+    gained = without - current.fit.objective
+    able = [
+        s
+        for s in significant(trials, current, screened)
+        if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
+    ]
+    found: list[CandidateModel] = []
+    for s in able[: SEARCH.most_rivals]:
+        trials.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
+        found += trials.tried(replace_cause(trials, current.fit, k, others, s), s.hypothesis)
+    near = trials.close_contenders(without, current, trials.selection.ranked(found))
+    return trials.selection.ranked([trials.converged(t) if t in near else t for t in found])
+
+
+def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:
+    """The suspect beside the `others` in place of cause k of a fit; of its family, begun with that one's numbers where that is
+    better: what they have in common means the same."""
+    structure = others.with_cause(suspect.hypothesis, suspect.start)
+    cause = fit.structure.causes[k]
+    if cause.family is None or (cause.family, cause.at) != (suspect.hypothesis.family, suspect.hypothesis.at):
+        return structure
+    common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
+    kin = (others.with_cause(suspect.hypothesis, s | common) for s in (suspect.start, *suspect.other_starts))
+    return min((structure, *kin), key=trials.fitter.initial_objective)
+
+
+def _same_name(a: Hypothesis | None, b: Hypothesis) -> bool:
+    """Whether two causes have one name, as harmonics do."""
+    return a is not None and (a.effect, a.location, a.path) == (b.effect, b.location, b.path)

@@ -1,0 +1,139 @@
+"""The trials of a search: structures fitted under what is known of the errors so far, and what came of each.
+
+A structure is fitted once under the same errors. No trial can end the search: one that cannot be built or simulated is noted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.noise_update import update_noise_size
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal, restart
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
+from ctrlgen.diagnosis.selection.objections import objections
+from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.settings import DISCREPANCY, FIT, SEARCH
+
+FAILURES = (ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
+"""What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge."""
+
+
+class Trials:
+    """Fits structures for a search, and keeps what was fitted, screened, `refused` and `failed`.
+
+    It replaces its own fitter as it learns the errors. `step` is called with a sentence before each trial.
+    """
+
+    def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
+        self.fitter, self.screen, self.step = fitter, screen, step
+        self.fitted: dict[frozenset, tuple[CandidateModel, int]] = {}
+        self.screens: dict[frozenset, tuple[Fit, Screened]] = {}
+        self.refused: list[Refusal] = []
+        self.failed: list[str] = []
+        self.per_round = SEARCH.candidates_per_round * (SEARCH.cheap_factor if fitter.recording.kind == "poses" else 1)
+
+    @property
+    def selection(self) -> ModelSelection:
+        """The comparison of candidates under the present noise."""
+        return ModelSelection(self.fitter, self.fit)
+
+    def use(self, fitter: Fitter) -> None:
+        """Goes on with another fitter: fits and screens under other errors are forgotten."""
+        self.fitter = fitter
+        self.screen.fitter = fitter
+        self.fitted.clear()
+        self.screens.clear()
+
+    def new_round(self) -> None:
+        """Forgets what was refused and what failed."""
+        self.refused, self.failed = [], []
+
+    def fit(
+        self,
+        structure: Structure,
+        cause: Hypothesis | None = None,
+        steps: int = SEARCH.candidate_steps,
+        nested: Fit | None = None,
+    ) -> CandidateModel:
+        """Fits and scores one structure, in which that of `nested` is nested. A structure that was fitted before is not
+        fitted again unless its start values are better than that fit."""
+        key = frozenset(structure.causes)
+        known, done = self.fitted.get(key, (None, 0))
+        if known is not None and done >= steps and known.fit.objective <= self.fitter.initial_objective(structure):
+            return replace(known, cause=cause)
+        fit = self.fitter.fit(structure, steps=steps, nested=nested)
+        if known is not None and known.fit.objective <= fit.objective:
+            self.fitted[key] = (known, steps)
+            return replace(known, cause=cause)
+        found = scored(self.fitter, fit, cause)
+        self.fitted[key] = (found, steps)
+        return found
+
+    def tried(self, structure: Structure, cause: Hypothesis | None, nested: Fit | None = None) -> list[CandidateModel]:
+        """The trial; none, with a note, where no such device can be built or simulated."""
+        try:
+            return [self.fit(structure, cause, nested=nested)]
+        except FAILURES as error:
+            self.note_failure(cause, error)
+            return []
+
+    def note_failure(self, cause: Hypothesis | None, error: Exception) -> None:
+        """Keeps why a trial of a cause could not be made."""
+        self.failed.append(f"{_name(cause) if cause else 'a trial'}: {error}")
+
+    def converged(self, candidate: CandidateModel) -> CandidateModel:
+        """The same candidate fitted until it converges; candidates are first fitted for a few steps only."""
+        return self.fit(restart(candidate.fit), candidate.cause, steps=FIT.max_steps)
+
+    def screened(self, candidate: CandidateModel) -> Screened:
+        """The screen of what a candidate leaves."""
+        key = frozenset(candidate.causes)
+        fit, screened = self.screens.get(key, (None, None))
+        if screened is None or fit is not candidate.fit:
+            screened = self.screen.run(candidate.fit)
+            self.screens[key] = candidate.fit, screened
+        return screened
+
+    def objections(self, candidate: CandidateModel, accepted: Sequence[Hypothesis] = ()) -> dict[int, str]:
+        """What speaks against the causes of a candidate that are not yet `accepted`."""
+        exact = candidate.errors.is_noise and bool(self.fitter.noise.known.all())
+        return objections(self.fitter.recording, candidate.fit, accepted, exact)
+
+    def with_errors(self, candidate: CandidateModel) -> CandidateModel:
+        """The same structure under the discrepancy that it leaves itself, estimated and fitted in turn."""
+        for _ in range(DISCREPANCY.updates):
+            fitter = self.fitter.with_errors_of(candidate.fit)
+            if np.allclose(fitter.error.weighted.sd, self.fitter.error.weighted.sd, rtol=DISCREPANCY.same):
+                break
+            self.use(fitter)
+            candidate = self.converged(candidate)
+        return candidate
+
+    def with_noise_update(self, candidate: CandidateModel) -> CandidateModel:
+        """The same structure under the noise that it leaves, where nothing else tells the noise."""
+        if self.fitter.noise.known.all():
+            return candidate
+        for _ in range(SEARCH.most_noise_updates):  # the numbers move as the noise that holds them shrinks
+            before = self.fitter.noise.sd
+            self.use(self.fitter.with_noise(update_noise_size(self.fitter, candidate.fit)))
+            candidate = self.converged(candidate)
+            if np.allclose(before, self.fitter.noise.sd, rtol=SEARCH.same_noise_size):
+                break
+        return candidate
+
+    def close_contenders(
+        self, without: float, best: CandidateModel, others: Sequence[CandidateModel]
+    ) -> list[CandidateModel]:
+        """The first of those that take away nearly as much of the objective `without` as the best one."""
+        least = SEARCH.nearly_best * (without - best.fit.objective)
+        return [t for t in others if without - t.fit.objective >= least][: SEARCH.converged_candidates]
+
+
+def _name(cause: Hypothesis) -> str:
+    return f"{cause.effect} at {cause.location}" + (f" of {cause.of}" if cause.of else "")
