@@ -61,9 +61,7 @@ def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=No
         y = change(move(given, force, numbers=numbers), given) + NOISE * (e if white is None else white(e))
         parts.append(record(given, y, role, first=0.0 if role == "fit" else n * H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
-    fitter = Fitter(recording, estimate_noise(recording, SETTLING))
-    fitter.cache = CACHE
-    return fitter
+    return Fitter(recording, estimate_noise(recording, SETTLING), cache=CACHE)
 
 
 def drives(n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -7,70 +7,61 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, fitter_of, move, played
+from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.estimation.held_out import held_out_deviance
+from ctrlgen.diagnosis.estimation.error_model import ErrorModel
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise_colour
-from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, SearchResult, linearised_optimum
-from ctrlgen.diagnosis.selection.line_resolvability import lines_resolved
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum
+from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.objections import objections
+from ctrlgen.diagnosis.selection.rivals import replace_cause
 from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
-from ctrlgen.diagnosis.selection.search import Searcher
-from ctrlgen.diagnosis.selection.verdict import (
-    AMBIGUOUS,
-    CONSISTENT,
-    EXPLAINED,
-    PARTLY,
-    UNEXPLAINED,
-    unconfirmed,
-    verdict,
-)
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 
 
-def searcher_of(fitter) -> Searcher:
-    return Searcher(fitter, Screen(fitter, [BACKLASH]), lambda _: None)
+def trials_of(fitter) -> Trials:
+    return Trials(fitter, Screen(fitter, [BACKLASH]), lambda _: None)
 
 
 def test_what_is_left_without_a_cause_is_what_the_free_numbers_cannot_take_over():
-    """A cause beside which the mass has moved by 0.2 %: without it the number moves back."""
+    """A cause beside which the mass has moved by 3e-5, within the corner of the loss: without it the number moves back."""
     fitter = fitter_of()
     best = fitter.fit(Structure(AXIS))
-    off = fitter.fit(Structure(AXIS), theta=best.theta * np.array([1.002, *np.ones(len(best.theta) - 1)]), steps=0)
-    assert off.objective > 20 * best.objective
-    assert linearised_optimum(off) == pytest.approx(best.objective, rel=0.1)
+    off = fitter.fit(Structure(AXIS), theta=best.theta * np.array([1.00003, *np.ones(len(best.theta) - 1)]), steps=0)
+    assert off.objective > 1.4 * best.objective
+    assert linearised_optimum(off) == pytest.approx(best.objective, rel=0.02)
 
 
 def test_a_structure_is_fitted_again_from_a_better_start_only():
     fitter = fitter_of()
-    searcher = searcher_of(fitter)
-    poor = searcher.fit_candidate(Structure(AXIS), steps=40)
+    trials = trials_of(fitter)
+    poor = trials.fit(Structure(AXIS), steps=40)
     poor = replace(poor, fit=replace(poor.fit, chi2=10 * poor.fit.chi2))  # as if it had ended in a far minimum
-    searcher.fitted[frozenset()] = poor, 40
-    again = searcher.fit_candidate(Structure(AXIS))
+    trials.fitted[frozenset()] = poor, 40
+    again = trials.fit(Structure(AXIS))
     assert again.fit.objective < 0.2 * poor.fit.objective
-    assert searcher.fit_candidate(Structure(AXIS)).fit is again.fit
+    assert trials.fit(Structure(AXIS)).fit is again.fit
 
 
 def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     """A line of 50 Hz that was taken for one of 60 Hz: no descent leads from one to the other."""
     hum = Hypothesis("vibration", "disturbance:axis", "axis")
     fitter = fitter_of(lambda u: move(u) + 20 * NOISE * np.sin(2 * np.pi * 50.0 * H * np.arange(len(u)) + 0.4))
-    searcher = searcher_of(fitter)
+    trials = trials_of(fitter)
     start = {"amplitude": 10 * NOISE, "frequency": 60.0, "phase": 0.0}
-    nominal, stuck = (
-        searcher.fit_candidate(s, steps=40) for s in (Structure(AXIS), Structure(AXIS).with_cause(hum, start))
-    )
+    nominal, stuck = (trials.fit(s, steps=40) for s in (Structure(AXIS), Structure(AXIS).with_cause(hum, start)))
     others = tuple({**start, "frequency": f} for f in (100.0, 50.0, 33.0))
     screened = Screened((Suspect(hum, start, 100.0, 1.0, 0, others),), np.eye(1), 4.0, {})
-    found = searcher.restart_elsewhere(stuck, nominal, screened)
-    assert not stuck.fit.is_noise and found.fit.is_noise
+    found = restart_elsewhere(trials, stuck, nominal, screened)
+    assert not stuck.errors.is_noise and found.errors.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
-    assert searcher.restart_elsewhere(found, nominal, screened) is found
+    assert restart_elsewhere(trials, found, nominal, screened) is found
 
 
 @pytest.mark.parametrize("breakaway, sd, special", [(1.0, 0.03, "coulomb"), (1.4, 0.03, None), (1.4, 0.3, "coulomb")])
@@ -89,18 +80,17 @@ def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common(
     model = fitter_of()
     fit = model.fit(Structure(AXIS).with_cause(dahl, rubbing), steps=0)
     rubbed = replace(model.fit_records[0], observed=model.predict(fit, model.fit_records[0]))
-    searcher = searcher_of(model)
-    model.recording = replace(model.recording, records=(rubbed,))
+    trials = trials_of(replace(model, recording=replace(model.recording, records=(rubbed,))))
     far, bare = {"force": 0.001, "reach": 3e-6, "smoothing": 1e-9}, Structure(AXIS)
-    begun = searcher.replace_cause(fit, 0, bare, Suspect(other, far, 100.0, 1.0, 0)).starts[0]
+    begun = replace_cause(trials, fit, 0, bare, Suspect(other, far, 100.0, 1.0, 0)).starts[0]
     assert begun == {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
     elsewhere = Hypothesis("backlash", "stage:axis", "axis")
-    assert searcher.replace_cause(fit, 0, bare, Suspect(elsewhere, {"gap": 1e-8}, 100.0, 1.0, 0)).starts == (
+    assert replace_cause(trials, fit, 0, bare, Suspect(elsewhere, {"gap": 1e-8}, 100.0, 1.0, 0)).starts == (
         {"gap": 1e-8},
     )
     near = {"force": 0.01, "reach": 2e-8, "smoothing": 1e-9}
     wrong = replace(fit, theta=fit.theta * np.array([*np.ones(len(fit.theta) - 1), 100.0]))
-    assert searcher.replace_cause(wrong, 0, bare, Suspect(other, near, 100.0, 1.0, 0)).starts[0] == near
+    assert replace_cause(trials, wrong, 0, bare, Suspect(other, near, 100.0, 1.0, 0)).starts[0] == near
 
 
 def test_the_price_of_a_number_is_what_the_fit_knows_of_it():
@@ -128,7 +118,7 @@ def test_a_colour_that_the_rest_has_not_is_not_the_noises(at_rest, learnt):
         replace(r, observed=moved[r.role] + coloured(len(r.time), colours[r.role])[:, None])
         for r in fitter.recording.records
     )
-    fitter.recording = replace(fitter.recording, records=records)
+    fitter = replace(fitter, recording=replace(fitter.recording, records=records))
     noise = update_noise_colour(fitter, fitter.fit(Structure(AXIS)))
     assert (noise is not fitter.noise) == learnt
     assert not learnt or noise.ar[0][0] == pytest.approx(0.6, abs=0.08)
@@ -139,120 +129,53 @@ def test_a_guessed_noise_is_corrected_downward_alone(times, learnt):
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
     guessed = np.ones(1, bool)
-    fitter.noise = replace(fitter.noise, sd=times * fitter.noise.sd, ar=(np.zeros(0),), guessed=guessed)
+    fitter = fitter.with_noise(replace(fitter.noise, sd=times * fitter.noise.sd, ar=(np.zeros(0),), guessed=guessed))
     noise = update_noise(fitter, fit)
     assert (noise is not fitter.noise) == learnt
     assert not learnt or (noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in noise.notes[0])
 
 
-@pytest.mark.parametrize(
-    "share, passed, rivals, says",
-    [(0.0, True, 0, EXPLAINED), (0.04, False, 0, PARTLY), (0.06, False, 0, UNEXPLAINED), (0.04, False, 1, AMBIGUOUS)],
-)
-def test_what_leaves_a_twentieth_of_the_mismatch_is_part_of_the_answer(share, passed, rivals, says):
-    fitter = fitter_of(played)
-    nominal = replace(fitter.fit(Structure(AXIS)), chi2=1e7)
-    fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
-    left = fit.n + share**2 * (nominal.objective - fit.n)
-    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), held_out_deviance(fitter, fit), 0.0)
-    bare = CandidateModel(nominal, 1e9, 0.0)
-    search = SearchResult(bare, chosen, (bare,), ((chosen,) * rivals,), (), None)
-    assert verdict(fitter, search, ResidualTests((1.2,), {}, passed)) == says
-    nothing = replace(search, chosen=search.nominal, without_cause=(), rivals=())
-    for left in (nominal.chi2, 0.5 * nominal.n):  # also where only the rest is no noise
-        clean = CandidateModel(replace(nominal, chi2=left, penalty=0.0), 0.0, 0.0)
-        said = verdict(fitter, replace(nothing, chosen=clean, nominal=clean), ResidualTests((1.2,), {}, passed))
-        assert said == (CONSISTENT if passed else UNEXPLAINED)
-
-
-@pytest.mark.parametrize("share, says", [(0.09, PARTLY), (0.11, UNEXPLAINED)])
-def test_a_law_that_says_how_rough_it_is_may_leave_as_much(share, says):
-    """What drifts wanders, by a tenth."""
-    drift = Hypothesis("drift", "sensor:axis", "axis")
-    fitter = fitter_of()
-    bare = CandidateModel(replace(fitter.fit(Structure(AXIS)), chi2=1e7), 1e7, 0.0)
-    fit = fitter.fit(Structure(AXIS).with_cause(drift, {"rate": 1e-7}), steps=0)
-    left = fit.n + share**2 * (bare.fit.objective - fit.n)
-    chosen = CandidateModel(replace(fit, chi2=left, penalty=0.0), held_out_deviance(fitter, bare.fit), 0.0)
-    search = SearchResult(bare, chosen, (bare,), ((),), (), None)
-    assert verdict(fitter, search, ResidualTests((1.2,), {}, False)) == says
-
-
-@pytest.mark.parametrize("mismatch, sizes", [(2e4, {2, 3}), (2e6, {2})])
-def test_three_at_once_are_sought_only_while_most_is_unexplained(monkeypatch, mismatch, sizes):
-    searcher = searcher_of(fitter_of(played))
-    current = searcher.fit_candidate(Structure(AXIS))
-    excess = current.fit.objective - searcher.selection.n_fit
-    assert excess > 1e4
-    searcher.mismatch, tried = mismatch, set()
+@pytest.mark.parametrize("explained, sizes", [(0.89, {2, 3}), (0.91, {2})])
+def test_three_at_once_are_sought_only_while_more_than_a_tenth_is_unexplained(monkeypatch, explained, sizes):
+    trials = trials_of(fitter_of(played))
+    current, tried = trials.fit(Structure(AXIS)), set()
+    single = replace(current, fitted=left((1 - explained) * current.fitted.excess))
+    promised = current.fit.objective
 
     def refuse(structure, *_, **__):
         tried.add(len(structure.causes))
         raise ValueError("no such device can be built")
 
-    monkeypatch.setattr(searcher, "fit_candidate", refuse)
+    monkeypatch.setattr(trials, "fit", refuse)
     starts = {BACKLASH: {"gap": 3e-8}, LATE: {"gain": 0.01, "tau": 1.0, "decades": 3.0}, LIMIT: {"level": 0.5}}
     three = tuple(Suspect(h, s, 100.0, 1.0, k) for k, (h, s) in enumerate(starts.items()))
-    together = ((0.8 * excess, three[:2]), (0.9 * excess, three))
-    searcher.fit_subsets(current, Screened(tuple(three), np.eye(3), 4.0, {}, together), ())
+    together = ((0.8 * promised, three[:2]), (0.9 * promised, three))
+    assert fit_subsets(trials, current, Screened(tuple(three), np.eye(3), 4.0, {}, together), (single,)) == []
     assert tried == sizes
+    assert trials.failed == [
+        f"{three[n - 1].hypothesis.effect} at {three[n - 1].hypothesis.location}: no such device can be built"
+        for n in sizes
+    ]
 
 
 def test_nothing_is_sought_in_what_the_form_of_a_law_leaves():
-    """A law that is right to a hundredth of itself, which takes away 1e6 squares, may leave 100."""
+    """A law that is right to a hundredth of itself, which takes away 1e6 squares of each kind, may leave 100."""
     fitter = fitter_of()
-    weigh = ModelSelection(fitter, lambda *_, **__: trial(1e6))
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
-    gain = fitter.fit(
-        Structure(AXIS).with_cause(Hypothesis("drive_gain", "actuator:axis", "axis"), {"gain": 0.1}), steps=0
-    )
+    cause = Hypothesis("drive_gain", "actuator:axis", "axis")
+    gain = fitter.fit(Structure(AXIS).with_cause(cause, {"gain": 0.1}), steps=0)
 
-    def trial(left, of=fit):
-        return CandidateModel(replace(of, chi2=weigh.n_fit + left, penalty=0.0), weigh.n_held + left, 0.0)
+    def trial(excess, of=fit, penalty=0.0):
+        found = left(excess)
+        return CandidateModel(replace(of, penalty=penalty), errors_of(found), found, found)
 
-    assert weigh.residual_within_model_form_error(trial(60.0)) and not weigh.residual_within_model_form_error(
-        trial(150.0)
-    )
-    assert not weigh.residual_within_model_form_error(trial(60.0, gain))  # its form is right
-    hidden = trial(60.0)
-    assert not weigh.residual_within_model_form_error(replace(hidden, fit=replace(hidden.fit, penalty=100.0)))
-
-
-@pytest.mark.parametrize(
-    "left, held, before_held, worth",
-    [(0.0, 0.0, 0.0, True), (0.2, 0.0, 0.0, False), (0.0, 10.0, 0.0, False), (0.0, 1e4, 1e4, False)],
-)
-def test_what_no_held_out_record_reaches_is_named_where_it_explains_nearly_all(left, held, before_held, worth):
-    """Hit in the record to fit alone, where it leaves 1e4 squares beside 1500 of noise."""
-    searcher = searcher_of(fitter_of(played))
-    nominal = searcher.fit_candidate(Structure(AXIS), steps=40)
-    fit = searcher.fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
-
-    def trial(of, squares, held_squares):
-        return CandidateModel(
-            replace(of, chi2=searcher.selection.n_fit + squares, penalty=0.0),
-            searcher.selection.n_held + held_squares,
-            0.0,
-        )
-
-    before, after = trial(nominal.fit, 1e4, before_held), trial(fit, 1e4 * left, held)
-    assert searcher.selection.improves_enough(before, after) == worth
-    search = SearchResult(before, after, (before,), ((),), (), None)
-    assert unconfirmed(search) == (BACKLASH,)
-    assert verdict(searcher.fitter, search, ResidualTests((1.0,), {}, True)) == PARTLY
-    shown = replace(search, without_cause=(trial(nominal.fit, 1e4, held + 50.0),))
-    assert unconfirmed(shown) == () and verdict(searcher.fitter, shown, ResidualTests((1.0,), {}, True)) == EXPLAINED
-
-
-def test_numbers_that_foresee_worse_than_none_are_not_the_whole_answer():
-    fitter = fitter_of(played)
-    nominal = fitter.fit(Structure(AXIS))
-    fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}))
-    far = replace(fit, theta=fit.theta * np.where([u.cause is None for u in fit.structure.free_parameters], 1.0, 4.0))
-    bare = CandidateModel(nominal, 1e9, 0.0)
-    for of, says in ((fit, EXPLAINED), (far, PARTLY)):  # as where one touch in the record to fit tells little of a stop
-        search = SearchResult(bare, CandidateModel(of, held_out_deviance(fitter, fit), 0.0), (bare,), ((),), (), None)
-        assert verdict(fitter, search, ResidualTests((1.0,), {}, True)) == says
+    weigh = ModelSelection(weighed_by(), lambda *_, **__: trial(1e6))
+    within = weigh.residual_within_model_form_error
+    assert within(trial(60.0)) and not within(trial(150.0))
+    assert not within(trial(60.0, gain))  # its form is right
+    assert not within(trial(60.0, penalty=100.0))  # a number of the device may hide a cause
+    unknown = ModelSelection(weighed_by(known=False), lambda *_, **__: trial(1e6))
+    assert not unknown.residual_within_model_form_error(trial(60.0))
 
 
 class Kinked:
@@ -315,14 +238,27 @@ def test_a_bent_valley_is_followed():
 
 @pytest.mark.parametrize("far", [True, False])
 def test_a_device_far_from_the_readings_is_fitted_from_several_starts(monkeypatch, far):
+    """A hundred times the noise and more: a start a stated deviation to either side of each stated number."""
     fitter, begun = fitter_of(), []
     best = fitter.fit(Structure(AXIS))
-    stated = sum(u.sd is not None for u in best.structure.free_parameters)
-    poor = replace(best, chi2=1e5 * best.chi2 if far else 2 * best.chi2)
-    monkeypatch.setattr(fitter, "fit", lambda s: begun.append(s.nominal_starts) or (best if len(begun) == 4 else poor))
-    found = fitter.fit_described(AXIS)
-    assert len(begun) == (1 + 2 * stated if far else 1) and stated >= 2
-    assert found is (best if far else poor) and begun[0] == {} and all(len(own) == 1 for own in begun[1:])
+    stated = [u for u in best.structure.free_parameters if u.sd]
+    poor = replace(best, chi2=2 * best.chi2)
+    size = (1.001 if far else 0.999) * 100 * fitter.noise.floor
+    monkeypatch.setattr(Fitter, "with_errors_of", lambda self, fit: replace(self, errors=discrepancy(self.noise, size)))
+
+    def fit(self, structure, **_):
+        begun.append(structure.nominal_starts)
+        return best if begun[-1] and len([b for b in begun if b]) == 3 else poor
+
+    monkeypatch.setattr(Fitter, "fit", fit)
+    _, found = fitter.described(AXIS)
+    both = [{u.path: u.nominal + side * u.sd} for u in stated for side in (-1, 1)]
+    assert len(stated) >= 2 and [b for b in begun if b] == (both if far else [])
+    assert found is (best if far else poor)
+
+
+def discrepancy(noise, rms) -> ErrorModel:
+    return ErrorModel(noise, rms, np.ones(len(rms)))
 
 
 @pytest.mark.parametrize("steps, told", [(2.0, False), (8.0, True)])
@@ -332,5 +268,6 @@ def test_fringes_as_short_as_the_steps_of_a_reading_are_its_rounding(steps, told
     fringe = Hypothesis("cyclic", "sensor:axis", "axis")
     start = {"amplitude": NOISE, "period": steps * step, "phase": 0.0}
     fit = fitter.fit(Structure(AXIS).with_cause(fringe, start), steps=0)
-    assert lines_resolved(fitter.recording, fit) == told
-    assert lines_resolved(fitter.recording, fit, accepted=(fringe,))
+    against = objections(fitter.recording, fit)
+    assert against == ({} if told else {0: "it repeats with the steps of the reading"})
+    assert objections(fitter.recording, fit, accepted=(fringe,)) == {}

@@ -1,0 +1,108 @@
+"""Causes taken out of a model, trials that fail, and what a round tells of both."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, BACKLASH, LATE, fitter_of, played
+
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.pruning import all_pruned, pruned
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.trials import Trials
+
+OFFSET = Hypothesis("drive_offset", "actuator:axis", "axis")
+
+
+def nothing(_: str) -> None:
+    pass
+
+
+def at_bound(trials: Trials, candidate: CandidateModel, cause: Hypothesis) -> CandidateModel:
+    """The candidate with the amplitude of `cause` at the upper end of its range."""
+    k = candidate.causes.index(cause)
+    theta = candidate.fit.theta.copy()
+    for i, u in enumerate(candidate.fit.structure.free_parameters):
+        if u.cause == k and u.amplitude:
+            theta[i] = u.high
+    return replace(candidate, fit=replace(candidate.fit, theta=theta))
+
+
+@pytest.fixture(scope="module")
+def pair() -> tuple[Trials, CandidateModel]:
+    """A play and an offset of the drive that stands at its bound."""
+    fitter = fitter_of(played)
+    trials = Trials(fitter, Screen(fitter, [BACKLASH, OFFSET]), nothing)
+    both = Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}).with_cause(OFFSET, {"offset": 0.0})
+    return trials, at_bound(trials, trials.fit(both), OFFSET)
+
+
+def test_of_a_set_with_one_cause_at_its_bound_the_rest_is_kept(pair):
+    trials, candidate = pair
+    trials.new_round()
+    kept = pruned(trials, candidate, ())
+    assert kept is not None and kept.causes == (BACKLASH,)
+    assert kept.fit.values(0)["gap"] == pytest.approx(6e-8, rel=0.05)  # fitted again
+    (refusal,) = trials.refused
+    assert refusal.candidate is candidate and refusal.causes == (OFFSET,) and "at its bound" in refusal.reasons[0]
+
+
+def test_a_cause_that_is_accepted_is_not_objected_to_again(pair):
+    trials, candidate = pair
+    trials.new_round()
+    assert pruned(trials, candidate, (OFFSET,)) is candidate and trials.refused == []
+
+
+def test_a_candidate_of_which_nothing_new_is_left_is_refused_with_its_reason(pair):
+    trials, candidate = pair
+    trials.new_round()
+    assert pruned(trials, candidate, (BACKLASH,)) is None and len(trials.refused) == 1
+
+
+def test_what_is_left_of_two_candidates_stands_once(pair):
+    trials, candidate = pair
+    trials.new_round()
+    alone = trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}))
+    nominal = trials.fit(Structure(AXIS))
+    assert [t.causes for t in all_pruned(trials, nominal, [alone, candidate])] == [(BACKLASH,)]
+
+
+def test_a_trial_that_raises_is_noted_and_the_search_goes_on(monkeypatch):
+    """Everything with a late creep fails, as where a balance does not exist."""
+    fitter = fitter_of(played)
+    real = type(fitter).fit
+
+    def fit(self, structure, *given, **more):
+        if LATE in structure.causes:
+            raise RuntimeError("no balance")
+        return real(self, structure, *given, **more)
+
+    monkeypatch.setattr(type(fitter), "fit", fit)
+    screen = Screen(fitter, [BACKLASH, LATE])
+    loud = screen.run
+
+    def run(fit):
+        found = loud(fit)
+        return replace(found, suspects=tuple(replace(s, z=1e3 * np.sign(s.z)) for s in found.suspects))
+
+    monkeypatch.setattr(screen, "run", run)
+    found = Searcher(fitter, screen, nothing).run(AXIS)
+    assert [c.effect for c in found.chosen.causes] == ["backlash"]
+    assert "log_creep at stage:axis: no balance" in found.rounds[0].failed
+
+
+def test_what_is_refused_although_it_scores_better_stands_in_its_round(monkeypatch):
+    """A play that would explain all, if it were allowed to be one."""
+    fitter = fitter_of(played)
+    trials = "ctrlgen.diagnosis.selection.trials.objections"
+    monkeypatch.setattr(trials, lambda *_: {0: "so it is"} if _[1].structure.causes else {})
+    found = Searcher(fitter, Screen(fitter, [BACKLASH]), nothing).run(AXIS)
+    assert found.chosen.causes == ()
+    (round_,) = found.rounds
+    (refusal,) = round_.refused
+    assert refusal.causes == (BACKLASH,) and refusal.reasons == ("so it is",) and round_.candidates == ()
