@@ -33,6 +33,10 @@ TESTED = {
     "kind": "tested_axis", "name": "tested", "title": "an axis under test", "source": "round numbers",
     "mechanics": {"mass": "1 kg", "damping": "30 N*s/m", "stiffness": "0.2 N/um", "stroke": "100 um", "speed": "5 mm/s", "force": "20 N"},
 }  # fmt: skip
+PAIR = {
+    **{key: TESTED[key] for key in ("title", "source")}, "kind": "tested_axes", "name": "pair",
+    "axis": [{"name": name, **TESTED["mechanics"]} for name in ("a", "b")],
+}  # fmt: skip
 SAMPLE_TIME = 1e-3
 MODEST = 0.5  # typical sizes: a tenth of the bounds where they are narrower than ten of these
 every_effect = pytest.mark.parametrize("effect", Effect.library.values(), ids=Effect.library)
@@ -40,9 +44,9 @@ every_effect = pytest.mark.parametrize("effect", Effect.library.values(), ids=Ef
 
 @cache
 def tables() -> tuple[dict, ...]:
-    """A device with heaters and no inertia, one with inertia, one whose motion is imposed."""
+    """A device with heaters and no inertia, one with inertia, one whose motion is imposed, two of these."""
     files = (DEVICE, AXIS_FILE)
-    return (*(tomllib.loads(path.read_text()) for path in files), TESTED)
+    return (*(tomllib.loads(path.read_text()) for path in files), TESTED, PAIR)
 
 
 def device_of(table: dict, *effects: dict) -> Device:
@@ -147,6 +151,9 @@ def test_vanishes_exactly_when_off_and_only_then(effect, rng):
     raise AssertionError("nothing happens at any channel")
 
 
+MOTION = {"stiffness": "m", "damping": "m/s", "inertia": "m/s^2"}  # what a cross term counts per
+
+
 class Law:
     """One effect's law alone, on channel `index` of six, walked along given signals; everything of typical size 1.
 
@@ -202,7 +209,7 @@ class Law:
             value=every[self.index], rate=None, second_rate=None, all=every,
             index=self.index, partner=self.partner, ambient=held["ambient"],
             sample_time=self.h, rest=self.REST, scale=1.0, travel=1.0, second_order_kinematics=lambda: every,
-            tangent_compliance=lambda: every,
+            tangent_compliance=lambda: every, displacements=every, velocities=every, accelerations=every,
             displacement=held["displacement"], velocity=held["velocity"], force=held["force"], state=held["state"],
             **{s.name: memory[i] for i, s in enumerate(self.effect.states)},
         )  # fmt: skip
@@ -302,6 +309,8 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
     )
     if effect.partner_unit not in (None, "channel"):
         every_unit[law.partner] = effect.partner_unit
+    if effect.pairs and effect.place is Place.FORCE:  # by the motion of the other axis, in the amplitude's name
+        every_unit = [MOTION[effect.amplitude().name]] * 6
 
     def evaluated(scale: dict[str, float]) -> tuple[list[float], list[float], float]:
         def factor(unit: str) -> float:

@@ -99,6 +99,10 @@ LAWS = {
     "bow": ({}, lambda s, p: p.curvature * s.value**2),
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
     "coupling": ({}, lambda s, p: p.gain * s.all[s.partner]),
+    "damping_coupling": ({}, lambda s, p: -p.damping * s.velocities[s.partner]),
+    "inertia_coupling": ({}, lambda s, p: -p.inertia * s.accelerations[s.partner]),
+    "one_sided_stiffening": ({}, lambda s, p: -p.k2 * s.displacement**2),
+    "stiffness_coupling": ({}, lambda s, p: -p.stiffness * s.displacements[s.partner]),
     "creep": (
         {"tau": 0.3, "slow": 0.2},
         lambda s, p: p.gain * (0.8 * s.z + 0.2 * s.w),
@@ -184,7 +188,8 @@ def signals(rng: np.random.Generator, kind: str) -> SimpleNamespace:
         value=every[index], rate=None, second_rate=None, all=every, index=index, partner=5 - index, ambient=rng.uniform(-3, 3),
         sample_time=H, rest=0.3, state=rng.uniform(0.5, 3), scale=1.3, travel=0.7,
         second_order_kinematics=lambda: other, tangent_compliance=lambda: other, displacement=rng.uniform(-1, 1), displacements=every,
-        velocity=rng.uniform(-1, 1), force=rng.uniform(-1, 1), **dict(zip(names, rng.uniform(-1, 1, len(names)), strict=True)),
+        velocities=other, accelerations=other * every, velocity=rng.uniform(-1, 1), force=rng.uniform(-1, 1),
+        **dict(zip(names, rng.uniform(-1, 1, len(names)), strict=True)),
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from battery import laws
 from battery.hexapod_cases import FAULTS
 from battery.plant_hexapod import Faults, Hexapod
 from ctrlgen import load_device
+from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.held_out import held_out_deviance
@@ -118,6 +119,11 @@ def asymmetric_hysteresis(u, t):
     return move(u, force)
 
 
+def one_sided_stiffening(u, t):
+    """2e8 N/m^2 beside a stiffness of 2e5 N/m: 10 % more of it at 100 um on the one side, less on the other."""
+    return move(u, lambda time, q, v, memory: (-2e8 * q**2, memory))
+
+
 def bouc_wen(u, t):
     """F = -k z, dz = dd (1 - (beta sgn(dd z) + gamma)|z|), beta = 8e4/m, gamma = 2e4/m, in steps of a tenth of a sample."""
 
@@ -137,6 +143,7 @@ ON_AXIS = {
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
+    one_sided_stiffening: Planted("stage:axis", {"k2": 2e8}, within={"k2": 0.02}),
     drive_hysteresis: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
     bouc_wen: Planted(
         "stage:axis", {"stiffness": 2e4, "reach": 1e-5, "loop": 0.8}, within={"stiffness": 0.03, "reach": 0.03, "loop": 0.05}
@@ -325,7 +332,36 @@ def test_of_a_table_out_of_balance():
     recover(fitter, device, "payload", Planted("mechanism:axis", {"share": 0.002, "lean": np.radians(40)}))
 
 
+SHARED = {  # of two axes: what each takes for the other's motion (position, speed, acceleration)
+    "stiffness_coupling": ({"stiffness": 40.0}, 0),
+    "damping_coupling": ({"damping": 2.0}, 1),
+    "inertia_coupling": ({"inertia": -0.5}, 2),
+}
+
+
+@pytest.mark.parametrize("effect", SHARED)
+def test_of_what_two_axes_share(effect):
+    own = {
+        "mass": "1 kg*m^2", "damping": "2 N*m*s/rad", "stiffness": "100 N*m/rad",
+        "stroke": "0.1 rad", "speed": "1 rad/s", "force": "20 N*m",
+    }  # fmt: skip
+    table = {
+        "kind": "tested_axes", "name": "pair", "title": "two axes", "source": "round numbers",
+        "axis": [{"name": "a", **own}, {"name": "b", **own}],
+    }  # fmt: skip
+    device = validate(Device.library["tested_axes"], table, "device")
+    truth, order = SHARED[effect]
+    rng, parts, t = np.random.default_rng(8), [], H * np.arange(N)
+    for w, role in (((5, 8), "fit"), ((3, 7), "hold_out")):
+        rate = 2 * np.pi * np.array(w)
+        moved = [0.05 * rate**k * np.sin(t[:, None] * rate + k * np.pi / 2) for k in range(3)]
+        y = 100 * moved[0] + 2 * moved[1] + moved[2] + next(iter(truth.values())) * moved[order][:, ::-1]
+        parts.append(record(np.hstack(moved), y + 1e-3 * rng.standard_normal(y.shape), role))
+    fitter = fitter_of(device, ("reading.a", "reading.b"), ("N*m", "N*m"), (1e-3, 1e-3), "series", parts)
+    recover(fitter, device, effect, Planted("stage:a", truth, "b"))
+
+
 def test_no_law_is_left_out():
     battery = {ALSO.get(name, name) for name in (*laws.DRAW, *FAULTS)}
-    here = {*(law.__name__ for law in ON_AXIS), *ON_HEXAPOD, "payload", "second_pole"}
+    here = {*(law.__name__ for law in ON_AXIS), *ON_HEXAPOD, *SHARED, "payload", "second_pole"}
     assert not set(Effect.library) - battery - here - IN_THE_LOOP

@@ -61,6 +61,20 @@ def test_a_law_acts_on_the_axis_where_it_stands(effect, expected):
     assert not added[:, 1].any()
 
 
+@pytest.mark.parametrize(
+    "effect, motion",
+    [
+        ({"kind": "stiffness_coupling", "stiffness": "40 N*m/rad"}, lambda: 40 * ANGLE),
+        ({"kind": "damping_coupling", "damping": "2 N*m*s/rad"}, lambda: 2 * SPEED),
+        ({"kind": "inertia_coupling", "inertia": "-0.5 N*m*s^2/rad"}, lambda: -0.5 * MOTION[:, 4:]),
+    ],
+    ids=lambda value: value["kind"] if isinstance(value, dict) else "",
+)
+def test_what_two_axes_share_takes_torque_of_each_for_the_motion_of_the_other(effect, motion):
+    added = torque(device_of({"at": "a", "of": "b", **effect})) - torque(device_of())
+    assert added == pytest.approx(motion()[:, ::-1], abs=1e-9 * np.abs(motion()).max())
+
+
 def test_dry_friction_of_the_second_axis_has_the_sign_of_its_own_speed():
     friction = {"kind": "coulomb", "at": "b", "force": "0.5 N*m", "reach": "1e-5 rad", "smoothing": "1e-4 rad/s"}
     added = torque(device_of(friction)) - torque(device_of())
@@ -76,7 +90,9 @@ def test_every_number_and_every_law_has_a_place_of_its_own():
     places = [(h.effect, h.location, h.of) for h in found]
     assert len(set(places)) == len(places)
     assert {"stage:a.mass", "stage:b.mass"} <= {location for _, location, _ in places}
-    for law in ("coulomb", "stiffening", "hysteresis", "coupling"):
+    shared = [place for place in places if place[0].endswith("_coupling")]
+    assert shared == [(f"{x}_coupling", "stage:a", "b") for x in ("damping", "inertia", "stiffness")]
+    for law in ("coulomb", "stiffening", "one_sided_stiffening", "hysteresis", "coupling"):
         assert {"stage:a", "stage:b"} <= {location for effect, location, _ in places if effect == law}, law
 
 

@@ -37,8 +37,9 @@ class Effect:
     the effect's own states, by name
     ambient [K]: rise of the surroundings' temperature; sample_time [s]
     second_order_kinematics(), tangent_compliance(): vectors of the device, see `BalancedPhysics`; only where it has them
-    and, at places of an axis: displacement, displacements (of all axes), velocity (None for a device without inertia),
-        force (that the stage takes at this displacement), and the actuator's state, such as its temperature, with its rest
+    and, at places of an axis: displacement, displacements (of all axes), velocity (None for a device without inertia) and
+        velocities, accelerations (of all axes; None but for an imposed motion), force (that the stage takes at this
+        displacement), and the actuator's state, such as its temperature, with its rest
     """
 
     library: ClassVar[dict[str, type[Effect]]] = {}
@@ -48,8 +49,8 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
-    # What the device must have, of: actuator, ambient, bipolar, force, heat, sample_time, second_order_kinematics, spatial,
-    # state, tangent_compliance, unheated, velocity.
+    # What the device must have, of: acceleration, actuator, ambient, bipolar, force, heat, sample_time,
+    # second_order_kinematics, spatial, state, tangent_compliance, unheated, velocity.
     requires: ClassVar[frozenset[str]] = frozenset()
     # Couples a channel to another one, `of`, whose index is `partner`; a symmetric one acts on both.
     pairs: ClassVar[bool] = False

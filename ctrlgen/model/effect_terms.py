@@ -19,6 +19,7 @@ from ctrlgen.effects import Channel, Effect, Place, State, faults_at
 # no stage goes and a restoring force may have no value (a root of a negative number).
 REACH = 10.0
 REQUIREMENTS = {  # the words of `Effect.requires`, in messages
+    "acceleration": "an imposed motion",
     "actuator": "an actuator, and not an imposed motion",
     "ambient": "the temperature of the surroundings",
     "bipolar": "a drive of both signs",
@@ -136,7 +137,8 @@ class EffectTerms:
         if not at_platform:
             i = min(i, len(self.physics.axes) - 1)
             s.displacement, s.displacements = self.displacement[i], self.displacement
-            s.velocity = self.velocity[i] if self.velocity.numel() else None
+            s.velocities, s.velocity = self.velocity, self.velocity[i] if self.velocity.numel() else None
+            s.accelerations = self.imposed_acceleration
             state = self.physics.state if _has_heaters(self.physics) else None
             s.state = None if state is None else state.expr[i]
             s.rest = None if state is None else self.physics.rest[i]
@@ -149,6 +151,12 @@ class EffectTerms:
         channel = channels(self.physics, place)[s.index]
         s.scale, s.travel = channel.scale, channel.travel_scale
         return s
+
+    @property
+    def imposed_acceleration(self) -> ca.SX | None:
+        """The accelerations (n_axes,) of an imposed motion; None where the forces decide on them."""
+        n = len(self.physics.axes)
+        return self.physics.drive.expr[2 * n : 3 * n] if isinstance(self.physics, ImposedPhysics) else None
 
     @cached_property
     def second_order_kinematics(self) -> ca.SX:
@@ -198,7 +206,8 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
     present = {
         "unheated": not heated, "heat": heated, "state": heated,
         "bipolar": physics.bipolar, "actuator": not isinstance(physics, ImposedPhysics),
-        "velocity": not balanced, "ambient": True, "sample_time": sample_time is not None,
+        "velocity": not balanced, "acceleration": isinstance(physics, ImposedPhysics),
+        "ambient": True, "sample_time": sample_time is not None,
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,
         "second_order_kinematics": isinstance(physics, BalancedPhysics) and physics.second_order_kinematics is not None,

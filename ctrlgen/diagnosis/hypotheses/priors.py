@@ -258,6 +258,9 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
     ),
     "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, parameters=_EVENT),
+    "one_sided_stiffening": LawPrior(
+        "A flexure that is straight at home stiffens alike to both sides: rarer than that. Judgement.", log_prior_odds=-1.0
+    ),
     "resonance": LawPrior(
         "A payload has more than one mode; 1 %: judgement. Octaves of frequency, lightly and well damped.",
         model_form_error=0.01,
@@ -302,9 +305,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     # One amplitude and no shape: the default ------------------------------------------------------------------------------
     **dict.fromkeys(
         (
-            "abbe_arm", "asymmetric_viscous", "coupling", "cubic_sensor", "drive_gain", "drive_offset", "expansion",
-            "frame_rotation_x", "frame_rotation_y", "frame_rotation_z", "heat_crosstalk", "heater_resistance",
-            "link_compliance", "quadratic_damping", "raised_point", "screw_motion", "sensor_gain", "stiffening", "stiffness",
+            "abbe_arm", "asymmetric_viscous", "coupling", "cubic_sensor", "damping_coupling", "drive_gain", "drive_offset",
+            "expansion", "frame_rotation_x", "frame_rotation_y", "frame_rotation_z", "heat_crosstalk", "heater_resistance",
+            "inertia_coupling", "link_compliance", "quadratic_damping", "raised_point", "screw_motion", "sensor_gain",
+            "stiffening", "stiffness", "stiffness_coupling",
         ),
         DEFAULT,
     ),

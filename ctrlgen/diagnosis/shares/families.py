@@ -95,13 +95,14 @@ FAMILY_OF = {
     **dict.fromkeys(
         ("hysteresis", "asymmetric_hysteresis", "bouc_wen", "drive_hysteresis", "backlash"), Family.HYSTERESIS
     ),
-    **dict.fromkeys(("stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
+    **dict.fromkeys(("stiffening", "one_sided_stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
     **dict.fromkeys(("asymmetric_gain", "dead_zone", "saturation", "heater_resistance"), Family.DRIVE),
     **dict.fromkeys(
         ("drive_gain", "lever_ratio", "sensor_gain", "stiffness", "drive_offset", "home_offset"), Family.GAIN
     ),
     **dict.fromkeys(("reversed", "stuck", "payload"), Family.GAIN),
     **dict.fromkeys(("coupling", "heat_crosstalk", "link_compliance", "swapped"), Family.CROSS_TALK),
+    **dict.fromkeys(("damping_coupling", "inertia_coupling", "stiffness_coupling"), Family.CROSS_TALK),
     **dict.fromkeys(("asymmetric_viscous", "quadratic_damping", "resonance"), Family.DYNAMICS),
     **dict.fromkeys(("creep", "log_creep"), Family.CREEP),
     **dict.fromkeys(("delay", "low_pass"), Family.TIMING),

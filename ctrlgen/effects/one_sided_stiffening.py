@@ -1,0 +1,15 @@
+"""A flexure that is bent or loaded already at home: stiffer to one side than to the other."""
+
+from ctrlgen.effects import Effect, Param, Place
+
+
+class OneSidedStiffening(Effect):
+    """E = k_2 d^3/3, hence Delta F = -k_2 d^2 on the actuator bar. Holds for k_2 d well below the stage's own stiffness."""
+
+    place = Place.FORCE
+    requires = frozenset({"force", "bipolar"})
+    source = "L. L. Howell, Compliant Mechanisms (2001): pre-bent and preloaded beams, second order of the deflection"
+    params = (Param("k2", "channel/travel^2", (-10.0, 10.0), "quadratic stiffness", off=0.0),)
+
+    def term(self, s, p):
+        return -p.k2 * s.displacement**2
