@@ -303,9 +303,22 @@ def hexapod() -> Device:
 
 @pytest.mark.parametrize("effect", ON_HEXAPOD)
 def test_of_settled_poses(effect):
-    rng = np.random.default_rng(5)
-    plant, planted = ON_HEXAPOD[effect]
-    parts = []
+    settle(effect, *ON_HEXAPOD[effect])
+
+
+FAR_OFF = {  # as far as a rig that was put up by hand
+    "abbe_arm": (posed(lambda p: p + np.outer(p[:, 1] * 0.4e6, at(3, 1))), Planted("sensor:delta_x", {"arm": 0.4}, "theta_y")),
+    "frame_rotation_x": (rotated("x", 0.08), Planted("mechanism:all", {"angle": 0.08})),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("effect", FAR_OFF)
+def test_of_settled_poses_far_off(effect):
+    settle(effect, *FAR_OFF[effect])
+
+
+def settle(effect: str, plant, planted: Planted) -> None:
+    rng, parts = np.random.default_rng(5), []
     for n, role in ((60, "fit"), (30, "hold_out")):
         u = rng.uniform(0.05, 0.5, (n, 6))
         y = plant(u) * np.repeat([1, 1e-6], 3) + np.repeat([TURNED, SHIFTED], 3) * rng.standard_normal((n, 6))

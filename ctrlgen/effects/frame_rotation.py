@@ -16,7 +16,7 @@ class FrameRotation(Effect, listed=False):
     place = Place.POSE
     requires = frozenset({"spatial"})
     source = "definition"
-    params = (Param("angle", "mrad", (-50.0, 50.0), "rotation of the platform's frame", off=0.0),)
+    params = (Param("angle", "mrad", (-100.0, 100.0), "rotation of the platform's frame", off=0.0),)
     axis: int  # 0, 1, 2 for x, y, z
 
     def term(self, s, p):
