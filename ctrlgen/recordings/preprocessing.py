@@ -9,6 +9,7 @@ import numpy as np
 import scipy  # its parts take a while to import, and come when they are used
 
 ORDER = 4  # of the Butterworth filter, run forward and backward
+ENOUGH = 4.0  # rate of the kept rows over the cut-off: at twice that the filter has 1/250 of an amplitude
 HIGHEST = 0.9  # of half the rate of the kept rows: room for the filter's edge
 
 
@@ -27,6 +28,12 @@ def derivative(values: np.ndarray, sample_time: float, order: int) -> np.ndarray
     for _ in range(order):
         values = np.gradient(values, sample_time)
     return values
+
+
+def enough_rows(sample_time: float, cutoff: float) -> int:
+    """Rows `sample_time` [s] apart of which one must be kept so that the rate is at least `ENOUGH` times a low-pass's `cutoff`
+    [Hz]: further rows are sums of those."""
+    return max(int(1 / (ENOUGH * cutoff * sample_time) * (1 + 1e-9)), 1)
 
 
 def highest_cutoff(sample_time: float, keep_every: int) -> float:

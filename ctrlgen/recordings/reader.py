@@ -242,7 +242,7 @@ class _RecordReader:
         w = self.written
         if w.low_pass is not None:
             incomplete = [name for name, column in values.items() if not np.isfinite(column).all()]
-            highest = preprocessing.highest_cutoff(sample_time, w.keep_every)
+            highest = preprocessing.highest_cutoff(sample_time, self._kept(sample_time))
             too_high = not 0 < w.low_pass.si <= highest
             if too_high:
                 what = f"{w.low_pass.text} is too high for the rows that are kept; write {highest:.4g} Hz or less"
@@ -259,6 +259,11 @@ class _RecordReader:
             if d.of in values
         }
         return values | derivatives
+
+    def _kept(self, sample_time: float) -> int:
+        """One row in so many is kept of those `sample_time` [s] apart."""
+        w = self.written
+        return w.keep_every or (preprocessing.enough_rows(sample_time, w.low_pass.si) if w.low_pass else 1)
 
     def _clock(self, kind: str, clock: np.ndarray | None, n: int) -> tuple[np.ndarray, float]:
         """Time of every row of the file (n,) [s] and the sample time [s], NaN where validation must find it."""
@@ -280,7 +285,8 @@ class _RecordReader:
         ambient: np.ndarray | float | None,
     ) -> Record:
         """The rows that are kept, as a record: the lead-in drives the device, but its readings are not valid."""
-        table, n, every = self.table, len(time), self.written.keep_every
+        table, n = self.table, len(time)
+        every = self._kept(float(np.median(np.diff(time)))) if n > 1 else 1
         kept = slice(*(table.rows or (0, n)), every)
         observed = np.full((n, len(names.observed)), np.nan)
         for i, name in enumerate(names.observed):
@@ -363,8 +369,10 @@ def _preprocessing_notes(written: RecordingFile) -> list[str]:
     steps += [f"derivative {d.order} of {d.of} taken as {name}" for name, d in written.derivatives.items()]
     if written.low_pass is not None:
         steps.insert(0, f"every column low-passed alike at {written.low_pass.text}, forward and backward")
-    if written.keep_every > 1:
+    if (written.keep_every or 1) > 1:
         steps.append(f"one row in {written.keep_every} kept")
+    elif written.keep_every is None and written.low_pass is not None:
+        steps.append("as many rows kept as make four times that, where there are more")
     return ["Before anything else: " + "; ".join(steps) + "."] if steps else []
 
 

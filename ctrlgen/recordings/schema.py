@@ -106,8 +106,9 @@ class RecordingFile(Section):
     """`series`: motion in time; `poses`: a list of settled poses."""
     low_pass: Annotated[Quantity, In("Hz", positive=True)] | None = None
     """Cut-off of a zero-phase low-pass filter, which all columns and `derivatives` of a series pass."""
-    keep_every: Annotated[int, Field(ge=1)] = 1
-    """One row in so many is kept, after the filter."""
+    keep_every: Annotated[int, Field(ge=1)] | None = None
+    """One row in so many is kept, after the filter. Without it all rows are or, after a low-pass, as many as make four times
+    its cut-off: more hold nothing more."""
     columns: dict[str, Column] = {}
     """Columns by signal of the model, such as `"drive.1X"` or `"reading.delta_x"`, for every record."""
     derivatives: dict[str, Derivative] = {}
@@ -267,7 +268,7 @@ class _Check:
     def _check_filter(self) -> None:
         """Filter and derivatives are for series only; a derivative is of a recorded column and has the right dimension."""
         w, units = self.written, signal_units(self.model)
-        series_only = {"derivatives": w.derivatives, "low_pass": w.low_pass, "keep_every": w.keep_every > 1}
+        series_only = {"derivatives": w.derivatives, "low_pass": w.low_pass, "keep_every": (w.keep_every or 1) > 1}
         if w.kind == "poses":
             for key in (key for key, given in series_only.items() if given):
                 self._fault(key, 'is for series only; leave it out, or write kind = "series"')

@@ -144,7 +144,8 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     if stated := recording.noise[i]:
         sd, _ = _with_rounding(stated, np.zeros(0), rounding)
         return _ChannelNoise(sd, "as stated, taken as white", NOISE.stated_samples)
-    thirds = [np.diff(r.observed[r.valid[:, i], i], 3) for r in recording.records]
+    # within the band of a low-pass that the columns passed; beyond it there is no noise left to see
+    thirds = [np.diff(r.observed[r.valid[:, i], i][:: rows_in_band(r)], 3) for r in recording.records]
     # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
     sd = max(_robust_deviation(np.concatenate(thirds)) / np.sqrt(20.0), rounding, 1e-300)
     note = "from the fastest part of the readings, taken as white; a record at rest would tell it better"
@@ -220,6 +221,11 @@ def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np
     return (float(np.hypot(rounding, floor)), np.zeros(0)) if rounding > floor else (sd, a)
 
 
+def rows_in_band(record: Record) -> int:
+    """One row in so many makes twice the cut-off of the low-pass that the columns passed; 1 where they passed none."""
+    return max(round(1 / (2 * record.band * record.sample_time)), 1) if record.band else 1
+
+
 def _robust_deviation(values: np.ndarray) -> float:
     """Standard deviation of normal values (n,) by their median absolute deviation."""
     return float(STATISTICS.mad_to_sd * np.median(np.abs(values - np.median(values))))
@@ -241,11 +247,20 @@ def drive_period(drive: np.ndarray) -> int | None:
     return None
 
 
+def period_of(record: Record) -> float | None:
+    """Period [s] with which the drive of a record repeats, as stated or exactly; None where it does not."""
+    if record.period is not None:
+        return record.period
+    samples = drive_period(record.drive)
+    return None if samples is None else samples * record.sample_time
+
+
 def _period_differences(record: Record, i: int) -> list[np.ndarray]:
     """Differences of neighbouring periods over sqrt(2), so that they have the noise's own size; the first period, which
     holds a transient, is left out, and no period is used twice."""
-    P = drive_period(record.drive) if record.period is None else round(record.period / record.sample_time)
-    if P is None or len(record.time) < 3 * P:
+    period = period_of(record)
+    P = round(period / record.sample_time) if period else 0
+    if not P or len(record.time) < 3 * P:
         return []
     y = np.where(record.valid[:, i], record.observed[:, i], np.nan)
     periods = y[P : len(y) // P * P].reshape(-1, P)

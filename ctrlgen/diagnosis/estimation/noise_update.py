@@ -68,7 +68,8 @@ def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tup
     if not len(edges):
         return None
     a, b = max(edges.reshape(-1, 2), key=lambda stretch: stretch[1] - stretch[0])
-    return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b])
+    highest = 2 * record.band * record.sample_time if record.band else 1.0
+    return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b], highest)
 
 
 def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:

@@ -17,10 +17,13 @@ from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
 MEAN_OVER_MEDIAN = 1 / np.log(2)  # of an exponential variable, as the bins of a noise spectrum are
 
 
-def noise_from_residual(residual: np.ndarray, motion: np.ndarray) -> tuple[float, np.ndarray, float] | None:
+def noise_from_residual(
+    residual: np.ndarray, motion: np.ndarray, highest: float = 1.0
+) -> tuple[float, np.ndarray, float] | None:
     """Standard deviation of the innovations, coefficients (0,) or (1,), and number of independent samples of the estimate.
 
-    `residual` (n,) is observed minus predicted, `motion` (n,) the prediction, of one channel without gaps. None where the
+    `residual` (n,) is observed minus predicted, `motion` (n,) the prediction, of one channel without gaps. Frequencies up to
+    the share `highest` of half the rate count: readings that passed a low-pass hold no noise beyond its cut-off. None where the
     record is too short, the residual is zero, or its slope in the spectrum is that of physics left out at all frequencies.
     """
     n = len(residual)
@@ -28,7 +31,10 @@ def noise_from_residual(residual: np.ndarray, motion: np.ndarray) -> tuple[float
         return None
     window = blackmanharris(n)
     window /= np.sqrt(np.sum(window**2))
-    bins = slice(RESIDUAL_NOISE.first_bin, -1)
+    last = int(RESIDUAL_NOISE.within_band * highest * (n // 2)) if highest < 1 else n // 2
+    if last - RESIDUAL_NOISE.first_bin < RESIDUAL_NOISE.smoothing_bins:
+        return None
+    bins = slice(RESIDUAL_NOISE.first_bin, last)
     power, moving = (periodogram(y - np.mean(y), window)[bins] for y in (residual, motion))
     moving, level = (local_floor(spectrum, RESIDUAL_NOISE.smoothing_bins) for spectrum in (moving, power))
     turn = np.exp(-2j * np.pi * (np.arange(len(power)) + RESIDUAL_NOISE.first_bin) / n)  # exp(-i w) of each bin

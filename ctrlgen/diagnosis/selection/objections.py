@@ -13,6 +13,7 @@ import numpy as np
 
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.noise import period_of
 from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.settings import OBJECTIONS
@@ -36,7 +37,7 @@ def objections(
         reason = (
             _outside_its_range(fit, k)
             or _on_the_lattice(recording, fit, k)
-            or ("" if exact else _too_few_periods(recording, fit, k) or _at_the_onset(recording, fit, k))
+            or ("" if exact else _no_line(recording, fit, k) or _at_the_onset(recording, fit, k))
         )
         if reason:
             found[k] = reason
@@ -76,19 +77,24 @@ def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:
     return abs(_line(fit, j) - _line(fit, k)) * _covered(recording, a) < OBJECTIONS.apart
 
 
-def _too_few_periods(recording: Recording, fit: Fit, k: int) -> str:
-    """Why a disturbance of one frequency cannot be told in records so short; empty where it can."""
+def _no_line(recording: Recording, fit: Fit, k: int) -> str:
+    """Why a disturbance of one frequency is none: the records are too short to tell one, or the drive itself repeats with its
+    harmonic; empty where it may be one."""
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or cause.prior.domain != "disturbance" or recording.kind != "series":
         return ""
     if not any(p.unit == "Hz" for p in cause.law.params):
         return ""
-    periods = _line(fit, k) * _covered(recording, cause)
-    if periods >= OBJECTIONS.fewest_periods:
-        return ""
-    return (
-        f"the records hold {periods:.1f} periods of it, and {OBJECTIONS.fewest_periods:.0f} are needed to tell a line"
-    )
+    line, covered = _line(fit, k), _covered(recording, cause)
+    if line * covered < OBJECTIONS.fewest_periods:
+        fewest = f"{OBJECTIONS.fewest_periods:.0f} are needed to tell a line"
+        return f"the records hold {line * covered:.1f} periods of it, and {fewest}"
+    for record in (r for r in recording.records if r.role == "fit"):
+        period = period_of(record)
+        order = line * period if period else 0.5
+        if period and order > 0.5 and abs(order - round(order)) / period * covered < OBJECTIONS.harmonic:
+            return f"it is harmonic {round(order)} of the drive's period, as whatever the drive causes is"
+    return ""
 
 
 def _at_the_onset(recording: Recording, fit: Fit, k: int) -> str:

@@ -81,6 +81,9 @@ class ResidualNoiseSettings:
     window_bins: float = 2.0
     """Bins that the Blackman-Harris window makes dependent (equivalent noise bandwidth 2.0): so many times fewer
     independent bins (F. J. Harris, Proc. IEEE 66 (1978) 51)."""
+    within_band: float = 0.8
+    """Share of a low-pass's cut-off up to which its noise is seen: the filter of the columns takes 4 % of an amplitude
+    there."""
     first_bin: int = 4
     """Lowest bin that is used: below, the main lobe of the Blackman-Harris window, four bins wide, holds the mean."""
 

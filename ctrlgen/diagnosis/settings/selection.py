@@ -122,7 +122,7 @@ class SearchSettings:
     """Other shapes of a law from which it is fitted again, those that begin best: the valleys of one law. Judgement."""
     beside_clocks: int = 4
     """Candidates, the best first, beside which an offset of the clocks is tried: each such trial is a fit. Judgement."""
-    subset_share: float = 0.05
+    subset_share: float = 0.1
     """Share of what the best smaller set leaves that a larger one must promise beyond it to be fitted. Judgement."""
     smallest_score: float = 0.25
     """Share of the largest z^2 below which candidates are not tried, unless nothing else is."""
@@ -147,8 +147,9 @@ class ModelSelectionSettings:
     hidden_penalty: float = 16.0
     """Penalty of the device's stated numbers, beyond twice their count, that makes them suspect of hiding a cause: one
     number four standard deviations off."""
-    worthwhile_share: float = 0.01
-    """Share of the held-out excess over the noise that a further cause must explain: less is of no use to anyone. Judgement."""
+    worthwhile_share: float = 0.05
+    """Share of the held-out excess over the noise that a further cause must explain: less is within what the discrepancy of
+    the other laws may feign. Judgement."""
     block_draws: int = 1000
     """Bootstrap samples of the blocks: they know a p of 5 % to 0.7 %."""
     block_p: float = 0.1
@@ -174,6 +175,8 @@ class ObjectionsSettings:
     fewest_periods: float = 10.0
     """Periods of a line that the longest record to fit must hold: of fewer, any slow change looks like one.
     Judgement."""
+    harmonic: float = 0.25
+    """Cycles within the records to fit between a line and a harmonic of a periodic drive, below which they are one."""
     onset_samples: float = 5.0
     """Samples between an event and the onset of motion, below which they are one."""
     rest_samples: float = 20.0
