@@ -24,7 +24,8 @@ EMPTY = {
 }  # fmt: skip
 RECORD = {
     **origin({"device.toml": "0" * 64}, 7, ("a note",)),
-    "verdict": "consistent", "findings": [], "residual_location": {"before": EMPTY, "after": EMPTY}, "held_out": {},
+    "verdict": "consistent", "sentence": "Consistent.", "findings": [], "shares": None,
+    "attribution": {"explained": 0.0, "rest": None, "held_out": True}, "residual_location": {"before": EMPTY, "after": EMPTY}, "held_out": {},
     "detectability": {"smallest": {}, "undetectable": []}, "next_experiment": None, "search_history": [],
 }  # fmt: skip
 

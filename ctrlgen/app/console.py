@@ -172,8 +172,11 @@ def print_diagnosis(found: Diagnosis) -> None:
         sentence,
         share_text,
     )
+    from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
 
     out.print(f"[bold]{escape(sentence(found))}[/bold]", soft_wrap=True)
+    for line in shares_sentences(found):
+        out.print(line, markup=False, soft_wrap=True)
     if found.findings:
         table = table_of(
             ("found", "left"),

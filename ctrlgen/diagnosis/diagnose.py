@@ -5,7 +5,8 @@
 3. The device as described is refitted within its stated uncertainty (`estimation.fit`).
 4. Hypotheses are listed: every effect at every location, every parameter of the device (`hypotheses`).
 5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
-6. Every accepted cause gets its share of the mismatch (`selection.attribution`).
+6. Every accepted cause gets its share of the mismatch (`selection.attribution`), and beside it stands of what the residual is a
+   function before and after, whatever the law (`shares`).
 7. Residual tests and the held-out data give the verdict (`estimation.residual_tests`, `selection.verdict`).
 8. Supporting analyses: where the residual is, what was detectable, what to record next (`evidence`).
 """
@@ -38,6 +39,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.verdict import verdict
 from ctrlgen.diagnosis.settings import NOISE, NOISE_UPDATE, SIMULATION
+from ctrlgen.diagnosis.shares.gather import residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
@@ -87,17 +89,18 @@ def _diagnose(
     search = Searcher(fitter, Screen(fitter, suspected, seed), step).run(device)
     step("residual tests")
     tests = run_residual_tests(search.fitter, search.chosen.fit)
-    shares = attribute(search, seed)
+    attribution = attribute(search, seed)
     detected = (*live.findings, *directly_detected_findings(search, effects))
-    answer = verdict(search, tests, shares, bool(detected))
+    answer = verdict(search, tests, attribution, bool(detected))
     step("supporting analyses")
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
     notes = _notes(search, live.notes, outliers, tests.restless, laws, effects)
     return Diagnosis(
         verdict=answer,
-        findings=(*findings(search, shares, likelihoods), *detected),
-        attribution=shares,
+        findings=(*findings(search, attribution, likelihoods), *detected),
+        attribution=attribution,
+        shares=residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed),
         held_out=held_out_errors(search, known),
         residual_tests=tests,
         residual_location=analyses.residual_location,

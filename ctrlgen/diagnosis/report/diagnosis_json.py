@@ -7,8 +7,10 @@ from typing import Any
 
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.report.narrative import sentence
+from ctrlgen.diagnosis.report.shares_sentences import family_shares, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import Share
 from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
+from ctrlgen.diagnosis.shares.result import as_json
 from ctrlgen.reporting.result_schemas import origin
 
 
@@ -32,6 +34,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> dict[str, 
             "rest": _share(diagnosis.attribution.rest),
             "held_out": diagnosis.attribution.held_out,
         },
+        "shares": _shares(diagnosis),
         "residual_location": diagnosis.residual_location,
         "held_out": {channel: dataclasses.asdict(error) for channel, error in diagnosis.held_out.items()},
         "detectability": diagnosis.detectability,
@@ -52,6 +55,27 @@ def _finding(finding: Finding) -> dict[str, Any]:
         },
         "alternatives": [{"effect": h.effect, "location": h.location, "of": h.of} for h in finding.alternatives],
         "source": finding.source,
+    }
+
+
+def _shares(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """The model-free shares before and after, in the recording's units, with the families of laws and what follows."""
+    if diagnosis.shares is None:
+        return None
+    units = dict(zip(diagnosis.recording.channels, diagnosis.recording.units, strict=True))
+    tables = {"before": diagnosis.shares.before, "after": diagnosis.shares.after}
+    families = {
+        when: [{"family": family.value, "share": share} for family, share in family_shares(diagnosis, table)]
+        for when, table in tables.items()
+    }
+    return {
+        "statements": shares_sentences(diagnosis),
+        "reached": {
+            c.channel: {"value": reached.share, "ci95": reached.ci95}
+            for c in diagnosis.shares.before.channels
+            for reached in [diagnosis.shares.reached(c.channel)]
+        },
+        **{when: {**as_json(table, units), "families": families[when]} for when, table in tables.items()},
     }
 
 

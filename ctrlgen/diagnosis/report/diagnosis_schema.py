@@ -82,6 +82,72 @@ class ChannelErrorEntry(Keys):
     )
 
 
+class FractionEntry(Keys):
+    """A part of a residual's energy."""
+
+    value: Number = Field(description="The share.")
+    ci95: Interval = Field(description="95 % interval, by a bootstrap over blocks.")
+
+
+class KindShareEntry(Keys):
+    """What one kind of signal explains of a residual, in blocks that were not used."""
+
+    kind: str = Field(description="Kind of signal.")
+    share: Number = Field(description="Share of the energy that it explains alone, beside a constant.")
+    ci95: Interval = Field(description="95 % interval of share.")
+    additional: Number = Field(description="What it adds to the kinds selected before it, or beside them all.")
+    selected: int | None = Field(description="Place in the forward selection from 1; null where it was not selected.")
+    alike: list[str] = Field(description="Kinds that would have done as well in its place.")
+
+
+class ChannelSharesEntry(Keys):
+    """Of what the residual of one channel is a function."""
+
+    rms: Number = Field(description="Root mean square of the residual [unit].")
+    unit: str = Field(description="Unit of rms.")
+    own_axes: list[str] = Field(description="Axes that the channel sees; others are other axes.")
+    constant: Number = Field(description="Share of the mean.")
+    numbers: Number = Field(description="Share that other values of the device's own free numbers would add.")
+    kinds: list[KindShareEntry] = Field(description="By falling share, the residual's own past last.")
+    total: Number = Field(
+        description="All kinds, constant and numbers: the ceiling of any law that is a function of them."
+    )
+    total_ci95: Interval = Field(description="95 % interval of total.")
+    rest: Number = Field(description="1 - total.")
+    rest_own_past: Number = Field(description="What the residual's own past adds: memory without a name.")
+    spikes: Number = Field(description="Share of samples left out as spikes.")
+    periods: dict[str, Number] = Field(description="Period of a pitch [SI of the axis] and of a line [s].")
+
+
+class FamilyShareEntry(Keys):
+    """A family of laws."""
+
+    family: str = Field(description="Its name.")
+    share: Number = Field(description="Share that it could account for; a signal can speak for several families.")
+
+
+class SharesTableEntry(Keys):
+    """The model-free shares of one residual."""
+
+    channels: dict[str, ChannelSharesEntry] = Field(description="By channel.")
+    blocks: int = Field(description="Blocks of the cross-validation and of the intervals.")
+    same_as: dict[str, str] = Field(description="Drives that are another signal, which stands for them.")
+    families: list[FamilyShareEntry] = Field(
+        description="Families of laws that could account for it, the largest first."
+    )
+
+
+class SharesEntry(Keys):
+    """How much of a residual is a function of what, whatever the law."""
+
+    statements: list[str] = Field(description="What follows, in sentences.")
+    reached: dict[str, FractionEntry] = Field(
+        description="Share of the residual before that the findings take away, by channel; total of before is its ceiling."
+    )
+    before: SharesTableEntry = Field(description="Of what the device as described leaves.")
+    after: SharesTableEntry = Field(description="Of what the model with the findings leaves.")
+
+
 class ResidualPartEntry(Keys):
     """The residual in one part of the recording."""
 
@@ -280,6 +346,9 @@ class DiagnosisRecord(Origin):
     attribution: AttributionEntry = Field(description="How much of the mismatch the findings take away together.")
     findings: list[FindingEntry] = Field(
         description="Causes that the device file leaves out, the most important first."
+    )
+    shares: SharesEntry | None = Field(
+        description="How much of the residual is a function of what; null where the records are too short."
     )
     residual_location: ResidualLocations = Field(description="Where the residual is large, before and after.")
     held_out: dict[str, ChannelErrorEntry] = Field(description="Errors on the held-out records, by channel.")

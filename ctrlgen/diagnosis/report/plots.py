@@ -14,6 +14,7 @@ from scipy.signal import freqz, welch
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.report.narrative import short
 from ctrlgen.diagnosis.report.plot_maps import draw_unknown, draw_where
+from ctrlgen.diagnosis.report.plot_shares import draw_shares
 from ctrlgen.diagnosis.report.plot_uncertainty import (
     draw_confusability,
     draw_intervals,
@@ -37,6 +38,8 @@ def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
     drawings: dict[str, Callable[[], Figure | None]] = {
         "residuals": lambda: draw_residuals(residuals),
         "spectrum": lambda: draw_spectrum(residuals),
+        "shares_before": lambda: _shares(diagnosis, after=False),
+        "shares_after": lambda: _shares(diagnosis, after=True),
         "where": lambda: draw_where(diagnosis),
         "unknown": lambda: draw_unknown(diagnosis),
         "rivals": lambda: draw_rivals(diagnosis),
@@ -47,6 +50,14 @@ def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
     with plt.rc_context(STYLE):
         figures = {name: draw() for name, draw in drawings.items()}
         return {name: svg(figure) for name, figure in figures.items() if figure is not None}
+
+
+def _shares(diagnosis: Diagnosis, after: bool) -> Figure | None:
+    """The model-free shares of one residual; None where there are none, and after no correction."""
+    if diagnosis.shares is None or (after and not diagnosis.search.chosen.causes):
+        return None
+    units = dict(zip(diagnosis.recording.channels, diagnosis.recording.units, strict=True))
+    return draw_shares(diagnosis.shares.after if after else diagnosis.shares.before, units)
 
 
 class Residuals:

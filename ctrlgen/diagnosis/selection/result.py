@@ -21,6 +21,7 @@ from ctrlgen.diagnosis.selection.attribution import Attribution, Share
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.verdict import unconfirmed
 from ctrlgen.diagnosis.settings import STATISTICS
+from ctrlgen.diagnosis.shares.gather import ResidualShares
 from ctrlgen.recordings.recording import Recording
 
 
@@ -81,12 +82,14 @@ class ChannelError:
 class Diagnosis:
     """The answer: verdict, findings and supporting analyses; `search` and `fitter` hold how it was found.
 
-    attribution: shares of the causes and of the rest.
+    attribution: shares of the causes and of the rest. shares: of what the residual is a function, whatever the law, before and
+    after; None where the records are too short.
     """
 
     verdict: str
     findings: tuple[Finding, ...]
     attribution: Attribution
+    shares: ResidualShares | None
     held_out: dict[str, ChannelError]
     residual_tests: ResidualTests
     residual_location: dict[str, Any]

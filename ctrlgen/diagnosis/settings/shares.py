@@ -86,6 +86,10 @@ class SharesSettings:
     """Samples of that median: three in succession can still be a spike."""
     most_spikes: float = 0.01
     """Share of samples up to which such samples are spikes; more of them are structure and are kept. Judgement."""
+    told: float = 0.05
+    """Share below which a sentence does not name what has it: the half width of a usual interval. Judgement."""
+    mostly: float = 0.5
+    """Share from which on a residual is mostly a function of something: the larger half."""
 
 
 SHARES = SharesSettings()

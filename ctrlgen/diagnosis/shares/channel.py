@@ -149,13 +149,27 @@ def rates_of(signals: Sequence[Signals], channel: str, blocks: Blocks) -> np.nda
 def forward_selection(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> tuple[list[Kind], OutOfBlock]:
     """The selected kinds in the order in which each adds most, and their joint prediction.
 
+    The record comes after all others: a constant for each record stands in for whatever differs between them, such as the
+    direction of motion where each moves one way.
+    """
+    chosen: list[Kind] = []
+    now = channel.base
+    for offered in ([kind for kind in kinds if kind is not Kind.RECORD], kinds):
+        chosen, now = _selected(channel, offered, chosen, now)
+    return _in_order(channel, chosen), now
+
+
+def _selected(
+    channel: ChannelSmoothers, kinds: Sequence[Kind], chosen: list[Kind], now: OutOfBlock
+) -> tuple[list[Kind], OutOfBlock]:
+    """The selection that goes on from `chosen`, which predict `now`.
+
     The kinds that predict best what the selected ones leave are tried jointly with these, and the simplest of the good ones
     is taken, until it adds less than `SHARES.least_gain`. Where none adds that much although all kinds together say more,
     pairs are tried: a function of place and one of the direction may show only together. After each step a kind that
     contains what others say, as the history of travel contains direction and position, gives way to a simpler one, or to none.
     """
-    chosen: list[Kind] = []
-    now, everything = channel.base, channel.fit(kinds)
+    everything = channel.fit(kinds)
     while len(chosen) < SHARES.most_steps and (left := [kind for kind in kinds if kind not in chosen]):
         remains = channel.folds.left(now, channel.every_fold)
         alone = {kind: channel.fit([kind], remains).squares.sum() for kind in left}
@@ -171,7 +185,7 @@ def forward_selection(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> tuple
         if after.squares.sum() >= now.squares.sum():  # nothing was added, or gave way to what was there before
             break
         chosen, now = trial, after
-    return _in_order(channel, chosen), now
+    return chosen, now
 
 
 def _best_addition(

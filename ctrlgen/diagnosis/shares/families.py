@@ -105,7 +105,7 @@ FAMILY_OF = {
     **dict.fromkeys(("damping_coupling", "inertia_coupling", "stiffness_coupling"), Family.CROSS_TALK),
     **dict.fromkeys(("asymmetric_viscous", "quadratic_damping", "resonance"), Family.DYNAMICS),
     **dict.fromkeys(("creep", "log_creep"), Family.CREEP),
-    **dict.fromkeys(("delay", "low_pass"), Family.TIMING),
+    **dict.fromkeys(("clock_offset", "delay", "low_pass"), Family.TIMING),
     **dict.fromkeys(("abbe_arm", "bow", "cubic_sensor", "finite_rotation", "frame_rotation_x"), Family.GEOMETRY),
     **dict.fromkeys(("frame_rotation_y", "frame_rotation_z", "raised_point", "screw_motion"), Family.GEOMETRY),
     **dict.fromkeys(("stitching_error",), Family.GEOMETRY),

@@ -1,21 +1,51 @@
-"""Residuals and signals of a fit: what `model_free_shares` takes, from the model simulated along each record."""
+"""The shares of what a fit leaves: residuals and signals from the model simulated along each record."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.shares.channel import share_of
 from ctrlgen.diagnosis.shares.regressors import Signals
-from ctrlgen.diagnosis.shares.result import SharesTable
-from ctrlgen.diagnosis.shares.shares import model_free_shares
+from ctrlgen.diagnosis.shares.result import Share, SharesTable
+from ctrlgen.diagnosis.shares.shares import TooFewSamples, model_free_shares
 from ctrlgen.recordings.recording import Record
 
 
+@dataclass(frozen=True, eq=False)
+class ResidualShares:
+    """The shares of what the device as described leaves (`before`), and of what the accepted model leaves (`after`)."""
+
+    before: SharesTable
+    after: SharesTable
+
+    def reached(self, channel: str) -> Share:
+        """The share of the first residual's energy that the accepted causes take away, on the same samples and blocks:
+        1 - sum e_after^2/sum e_before^2, which the ceiling `total` of `before` is to be compared with."""
+        old, new = (table.of(channel).residual for table in (self.before, self.after))
+        seen = np.isfinite(old) & np.isfinite(new)
+        blocks = self.before.blocks
+        energy, left = (blocks.sums(np.where(seen, e, 0.0) ** 2) for e in (old, new))
+        return share_of(energy - left, energy)
+
+
+def residual_shares(fitter: Fitter, described: Fit, accepted: Fit, seed: int = 0) -> ResidualShares | None:
+    """The shares before and after, over the records to fit and those held out; None where these are too short."""
+    try:
+        before = fit_shares(fitter, described, seed=seed)
+        changed = bool(accepted.structure.causes)
+        return ResidualShares(before, fit_shares(fitter, accepted, seed=seed) if changed else before)
+    except TooFewSamples:
+        return None
+
+
 def fit_shares(fitter: Fitter, fit: Fit, records: Sequence[Record] | None = None, seed: int = 0) -> SharesTable:
-    """The model-free shares of what a fit leaves of `records`, by default of those to fit and those held out."""
+    """The model-free shares of what a fit leaves of `records`, by default of those to fit and those held out.
+
+    Raises TooFewSamples."""
     chosen = [*fitter.fit_records, *fitter.held_out_records] if records is None else records
     gathered = [gather(fitter, fit, record) for record in chosen]
     residuals, signals, sensitivities = (list(part) for part in zip(*gathered, strict=True))
@@ -34,8 +64,8 @@ def gather(fitter: Fitter, fit: Fit, record: Record) -> tuple[np.ndarray, Signal
     start = fit.initial_states[own[0]] if own and fit.initial_states else None
     after, _ = simulator.simulate_states(record, fit.theta, start)
     settled = not np.isfinite(record.sample_time)
-    record = simulator.aligned(record, fit.theta)
-    states = after if settled else np.vstack([simulator.starting_state(record, fit.theta, start), after[:-1]])
+    driven = simulator.aligned(record, fit.theta)
+    states = after if settled else np.vstack([simulator.starting_state(driven, fit.theta, start), after[:-1]])
     z, n_v = states[:, simulator.n_x :], model.v.numel()
     speed = states[:, simulator.n_x - n_v : simulator.n_x]
     predicted = fitter.predict(fit, record)
@@ -48,15 +78,10 @@ def gather(fitter: Fitter, fit: Fit, record: Record) -> tuple[np.ndarray, Signal
         sample_time=record.sample_time,
         position=dict(zip(model.axes, z.T, strict=True)),
         speed=dict(zip(model.axes, speed.T, strict=True)) if n_v else {},
-        drive=dict(zip(drive.channels, record.drive.T, strict=True)),
+        drive=dict(zip(drive.channels, driven.drive.T, strict=True)),
         reading=dict(zip(fitter.recording.channels, predicted.T, strict=True)),
         temperature=record.ambient,
         units=units,
     )
     by_numbers = simulator.sensitivities(record, fit.theta, start)[1][:, :, : len(fit.theta)]
     return np.where(record.valid, record.observed - predicted, np.nan), signals, by_numbers
-
-
-def shown(values: np.ndarray, unit: str) -> np.ndarray:
-    """Differences `values` [SI] in `unit`, unchanged where it is ''."""
-    return np.asarray(difference(values, unit)) if unit else values

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ctrlgen.core.to_json import plain
+from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.shares.blocks import Blocks
 from ctrlgen.diagnosis.shares.regressors import Design, Kind
 
@@ -87,8 +89,8 @@ class SharesTable:
         return next(c for c in self.channels if c.channel == channel)
 
 
-def as_json(table: SharesTable) -> dict[str, Any]:
-    """The table in the types of JSON, without the samples: for diagnosis.json."""
+def as_json(table: SharesTable, units: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """The table in the types of JSON, without the samples: for diagnosis.json. `units` of the residuals by channel; SI without."""
 
     def row(kind: KindShare) -> dict[str, Any]:
         return {
@@ -96,14 +98,19 @@ def as_json(table: SharesTable) -> dict[str, Any]:
             "selected": kind.selected, "alike": [k.value for k in kind.alike],
         }  # fmt: skip
 
+    def shown(c: ChannelShares) -> tuple[float, str]:
+        unit = (units or {}).get(c.channel, "")
+        return (float(difference(c.rms, unit)) if unit else c.rms), unit
+
     rows = {
         c.channel: {
-            "rms": c.rms, "own_axes": sorted(c.own), "constant": c.constant, "numbers": c.numbers,
+            "rms": rms, "unit": unit, "own_axes": sorted(c.own), "constant": c.constant, "numbers": c.numbers,
             "kinds": [row(k) for k in c.kinds], "total": c.total.share, "total_ci95": c.total.ci95, "rest": c.rest,
             "rest_own_past": c.rest_own_past, "spikes": c.spikes,
             "periods": {kind.value: period for kind, period in c.periods.items()},
         }
         for c in table.channels
+        for rms, unit in [shown(c)]
     }  # fmt: skip
     return plain({"channels": rows, "blocks": table.blocks.count, "same_as": table.design.same_as})
 

@@ -35,6 +35,10 @@ from ctrlgen.diagnosis.shares.regressors import Design, Kind, Signals, build_des
 from ctrlgen.diagnosis.shares.result import ChannelShares, KindShare, Share, SharesTable
 
 
+class TooFewSamples(ValueError):
+    """No channel has enough valid samples for shares."""
+
+
 def model_free_shares(
     residuals: Sequence[np.ndarray],
     signals: Sequence[Signals],
@@ -46,8 +50,8 @@ def model_free_shares(
 
     `channels` (n_c,) name the residuals; where `Signals.reading` has that name, the axes that move it count as its own and
     all others as other axes. `sensitivities` (n, n_c, k) of the readings by the k numbers that were fitted, one array a
-    record. `seed` draws the samples. Raises ValueError where no channel has twice `SHARES.fewest_blocks` valid samples, or
-    where records and signals do not match.
+    record. `seed` draws the samples. Raises TooFewSamples where no channel has twice `SHARES.fewest_blocks` valid samples, and
+    ValueError where records and signals do not match.
     """
     if len({s.settled for s in signals}) != 1 or len(residuals) != len(signals):
         raise ValueError("give one Signals a record, all of time series or all of settled poses")
@@ -71,7 +75,7 @@ def model_free_shares(
         spikes = 1 - np.isfinite(np.concatenate(parts)).sum() / np.isfinite(np.concatenate(given)).sum()
         found.append(_shares(name, smoothers, float(spikes)))
     if not found:
-        raise ValueError("no channel has enough valid samples")
+        raise TooFewSamples("no channel has enough valid samples")
     return SharesTable(tuple(found), blocks, design)
 
 

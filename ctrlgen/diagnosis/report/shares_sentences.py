@@ -1,0 +1,129 @@
+"""What the model-free shares say, in sentences: the ceiling beside what the accepted laws reach, and of what kind the rest is."""
+
+from __future__ import annotations
+
+from ctrlgen.diagnosis.report.narrative import number, short
+from ctrlgen.diagnosis.selection.result import Diagnosis
+from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from ctrlgen.diagnosis.settings import SHARES
+from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
+from ctrlgen.diagnosis.shares.regressors import Kind
+from ctrlgen.diagnosis.shares.result import ChannelShares, SharesTable
+
+NAMED = 3  # kinds that a sentence names
+FAMILIES = 2  # families of laws that a sentence names
+CONSTANT, NUMBERS = "a constant", "what other values of the device's own numbers would take away"
+NAMES = {
+    Kind.DIRECTION: "the direction of motion",
+    Kind.PROPORTION: "position, in proportion to it",
+    Kind.PITCH: "the place in a pitch",
+    Kind.RATE: "the rate of the reading",
+    Kind.TRAVEL_HISTORY: "the history of travel",
+    Kind.DRIVE_HISTORY: "the history of the drive",
+    Kind.OTHER_AXIS: "another axis",
+    Kind.DRIVE_LAG: "the low-passed drive",
+    Kind.PRODUCT: "the product of two signals",
+    Kind.RECORD: "a constant for each record",
+}
+
+
+def shares_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Of the channel with the largest residual, in noise units: what explains it and how much the accepted laws reach; then
+    what is left. None where the device as described leaves noise alone, or the records are too short."""
+    shares = diagnosis.shares
+    if shares is None or diagnosis.verdict == CONSISTENT:
+        return []
+    worst = worst_of(diagnosis, shares.before)
+    said = ceiling_sentence(worst)
+    if not diagnosis.search.chosen.causes:
+        return [f"{said}; no law of the library is confirmed for it."]
+    reached = shares.reached(worst.channel)
+    sentences = [f"{said}; the accepted laws reach {per_cent(reached.share)} ({interval(reached.ci95)})."]
+    if not diagnosis.residual_tests.passed:
+        sentences.append(rest_sentence(worst_of(diagnosis, shares.after)))
+    return sentences
+
+
+def family_shares(diagnosis: Diagnosis, table: SharesTable) -> list[tuple[Family, float]]:
+    """Families of laws by the share that they could account for, channels weighed by their energy in noise units."""
+    return ranking(table, noise_of(diagnosis))
+
+
+def noise_of(diagnosis: Diagnosis) -> dict[str, float]:
+    """Standard deviation of the noise [SI] by channel."""
+    return dict(zip(diagnosis.recording.channels, diagnosis.fitter.noise.floor.tolist(), strict=True))
+
+
+def worst_of(diagnosis: Diagnosis, table: SharesTable) -> ChannelShares:
+    """The channel with the largest residual in noise units."""
+    noise = noise_of(diagnosis)
+    return max(table.channels, key=lambda c: c.rms / noise[c.channel])
+
+
+def ceiling_sentence(c: ChannelShares) -> str:
+    """'Direction of motion explains 85 % (80 ... 88 %) of what the device as described leaves in axis'."""
+    leaves = f"of what the device as described leaves in {short(c.channel)}"
+    parts = named_parts(c)
+    if not parts:
+        return f"No signal explains more than {per_cent(SHARES.told)} {leaves}"
+    total = f"{per_cent(c.total.share)} ({interval(c.total.ci95)})"
+    if len(parts) == 1:
+        return f"{_capital(parts[0][0])} explains {total} {leaves}"
+    listed = [f"{name} ({per_cent(share)})" for name, share in parts[:NAMED]]
+    beside = " together with lesser ones" if c.total.share - sum(s for _, s in parts[:NAMED]) > SHARES.told else ""
+    return f"{_capital(', '.join(listed[:-1]))} and {listed[-1]}{beside} explain {total} {leaves}"
+
+
+def rest_sentence(c: ChannelShares) -> str:
+    """'What is left in axis is mostly a function of travel history, 64 % (50 ... 71 %), which ...'."""
+    left = f"What is left in {short(c.channel)}"
+    memory = f"its own past predicts {per_cent(c.rest_own_past)} more" if c.rest_own_past >= SHARES.told else ""
+    name, share = next(iter(named_parts(c)), ("", 0.0))
+    if share <= c.rest_own_past or not name:
+        beside = [memory.replace(" more", " of it")] * bool(memory) + [f"{name} {per_cent(share)}"] * bool(name)
+        told = f": {', '.join(beside)}" if beside else ""
+        return f"{left} is mostly a function of none of the signals looked at{told}."
+    memory = f"; {memory}" if memory else ""
+    if name in (CONSTANT, NUMBERS, NAMES[Kind.RECORD]):
+        return f"{left} is {_mostly(share)} {name}, {per_cent(share)}{memory}."
+    row = max(c.selected, key=lambda row: row.additional)
+    families = [f.value for f in SPEAKS_FOR[row.kind][0][:FAMILIES]]
+    where = f", where {' or '.join(families)} would show" if families else ""
+    return (
+        f"{left} is {_mostly(share)} a function of {name}, {per_cent(share)} ({interval(row.alone.ci95)} alone){where}, "
+        f"which no confirmed law of the library reaches{memory}."
+    )
+
+
+def named_parts(c: ChannelShares) -> list[tuple[str, float]]:
+    """What a residual is a function of with the share that each adds, the largest first; those below `SHARES.told` left out."""
+    parts = [(CONSTANT, c.constant), (NUMBERS, c.numbers)]
+    parts += [(kind_name(c, row.kind), row.additional) for row in c.selected]
+    return sorted((part for part in parts if part[1] >= SHARES.told), key=lambda part: -part[1])
+
+
+def kind_name(c: ChannelShares, kind: Kind) -> str:
+    """'the direction of motion', 'a line of 2.2 Hz'."""
+    if kind is Kind.LINE:
+        return f"a line of {number(1 / c.periods[kind], 3)} Hz"
+    return NAMES.get(kind, kind.value)
+
+
+def per_cent(share: float) -> str:
+    """'85 %'; '99.4 %' near the whole."""
+    value = 100 * share
+    return f"{value:.0f} %" if abs(value) < 99 or round(value, 1) == 100 else f"{value:.1f} %"
+
+
+def interval(ci95: tuple[float, float]) -> str:
+    """'80 ... 88 %'."""
+    low, high = (per_cent(end).removesuffix(" %") for end in ci95)
+    return f"{low} ... {high} %"
+
+
+def _mostly(share: float) -> str:
+    return "mostly" if share >= SHARES.mostly else "in part"
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
