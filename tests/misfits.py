@@ -6,9 +6,19 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.error_model import ErrorModel
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.held_out import refit_to_held_out
 from ctrlgen.diagnosis.estimation.misfit import Misfit
 from ctrlgen.diagnosis.estimation.noise import Noise
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT
 
 BLOCKS = 20
 
@@ -31,6 +41,23 @@ def errors_of(found: Misfit, known: bool = True, tau: float = 1.0) -> ErrorModel
     q = found.plain_mean
     far = known and bool(q[0] > 1.1**2)
     return ErrorModel(noise_of(known=known), np.sqrt(q) if far else np.zeros(1), np.array([tau if far else 1.0]))
+
+
+def held_out_deviance(fitter: Fitter, fit: Fit, steps: int = HELD_OUT_REFIT.max_steps) -> float:
+    """-2 ln likelihood of the held-out records under the posterior of the parameters."""
+    refit = refit_to_held_out(fitter, fit, steps)
+    return fitter.held_out_squares(refit.fit) + refit.penalty + refit.log_det
+
+
+def recovered(fitter: Fitter, device: Device, cause: Hypothesis) -> tuple[CandidateModel, CandidateModel]:
+    """The device as described and the same with a cause begun where the screen suspects it, each to its end under its own errors,
+    as the search fits them."""
+    weighed, described = fitter.described(device)
+    trials = Trials(weighed, Screen(weighed, [cause]), lambda _: None)
+    nominal = scored(weighed, described)
+    best, *_ = trials.screen.run(described).suspects
+    found = trials.fit(Structure(device).with_cause(cause, best.start), cause, steps=FIT.max_steps, nested=described)
+    return nominal, trials.with_errors(found)
 
 
 def weighed_by(known: bool = True, **more) -> SimpleNamespace:

@@ -22,10 +22,11 @@ from axis_records import (
     played,
     record,
 )
+from misfits import errors_of, held_out_deviance, left, weighed_by
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.estimation.held_out import held_out_deviance, refit_to_held_out
+from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.held_out import refit_to_held_out
 from ctrlgen.diagnosis.estimation.isolated_outliers import isolated_outliers
 from ctrlgen.diagnosis.estimation.noise import estimate_noise, stationary_deviation
 from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
@@ -35,19 +36,24 @@ from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, SearchResult
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
-from ctrlgen.diagnosis.selection.line_resolvability import lines_resolved
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
 
 FADING = Hypothesis("degradation", "actuator:axis", "axis")
+
+
+def searched(fitter: Fitter, *hypotheses: Hypothesis) -> SearchResult:
+    return Searcher(fitter, Screen(fitter, list(hypotheses)), lambda _: None).run(AXIS)
 
 
 def test_play_is_followed_through_reversals_between_samples():
@@ -78,7 +84,7 @@ def test_a_limit_is_tried_below_the_largest_drive_of_the_records():
     level = 0.8 * np.abs(drives(1500)[0]).max()
     fitter = fitter_of(lambda u: move(np.clip(u, -level, level)))
     nominal = fitter.fit(Structure(AXIS))
-    found = Searcher(fitter, Screen(fitter, [LIMIT, FADING]), lambda _: None).run(Structure(AXIS))
+    found = searched(fitter, LIMIT, FADING)
     assert [c.effect for c in found.chosen.fit.structure.causes] == ["saturation"]
     assert found.chosen.fit.values(0)["level"] == pytest.approx(level, rel=0.01)
     assert found.chosen.fit.chi2 < 0.1 * nominal.chi2
@@ -88,9 +94,7 @@ def test_readings_on_a_lattice_are_read_off_as_quantised():
     step = 10 * NOISE
     fitter = fitter_of(after=lambda y: step * np.round(y / step + 0.3))
     assert fitter.noise.floor[0] == pytest.approx(step / np.sqrt(12), rel=0.25)
-    (found,) = directly_detected_findings(
-        fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))
-    )
+    (found,) = directly_detected_findings(searched(fitter, FADING))
     assert (found.effect, found.location) == ("quantisation", "sensor:axis")
     assert found.parameters["quantum"].value == pytest.approx(step * 1e6, rel=1e-6)
 
@@ -98,12 +102,7 @@ def test_readings_on_a_lattice_are_read_off_as_quantised():
 def test_printed_digits_below_the_noise_are_no_finding():
     fitter = fitter_of(after=lambda y: np.round(y, 10))
     assert quantisation_step(fitter.fit_records[0].observed[:, 0]) == pytest.approx(1e-10)
-    assert (
-        directly_detected_findings(
-            fitter, Searcher(fitter, Screen(fitter, [FADING]), lambda _: None).run(Structure(AXIS))
-        )
-        == ()
-    )
+    assert directly_detected_findings(searched(fitter, FADING)) == ()
 
 
 def test_a_lattice_needs_every_reading_on_it():
@@ -126,8 +125,8 @@ def test_a_few_readings_have_a_step_only_where_few_are_enough():
 
 
 def test_a_push_on_a_mass_is_no_spike():
-    left = 0.1 * np.random.default_rng(0).standard_normal((900, 1))
-    spikes, pushed = left.copy(), left.copy()
+    quiet = 0.1 * np.random.default_rng(0).standard_normal((900, 1))
+    spikes, pushed = quiet.copy(), quiet.copy()
     spikes[[100, 400, 401], 0] += 30
     pushed[300:305, 0] += [8, 30, 40, 25, 9]
     assert np.flatnonzero(isolated_outliers(spikes)).tolist() == [100, 400, 401]
@@ -135,8 +134,8 @@ def test_a_push_on_a_mass_is_no_spike():
 
 
 def test_a_start_that_is_far_off_is_begun_again_near_off():
-    fitter = fitter_of(played)
-    nominal = fitter.fit(Structure(AXIS))
+    """Under the discrepancy of the device as described, as every candidate is fitted."""
+    fitter, nominal = fitter_of(played).described(AXIS)
     late = Hypothesis("low_pass", "sensor:axis", "axis")
     far = Structure(AXIS).with_cause(late, {"share": 1.5, "tau": 1.0, "damping": 0.3})
     assert fitter.fit(far, nested=nominal, steps=8).objective <= nominal.objective * 1.001
@@ -160,11 +159,12 @@ def test_what_the_form_of_another_law_may_leave_is_given_no_name(first, lost, fi
     structure = Structure(AXIS).with_cause(Hypothesis(first, at, "axis"), begin)
     structure = structure.with_cause(LATE, {"gain": 1.0, "tau": 1.0, "decades": 3.0})
 
-    def fit(left, of=structure):
-        return Fit(of, of.start, (), left, 1500, np.zeros(0), sure * np.eye(len(of.start)), 0.0)
+    def candidate(fitted, held, of=structure):
+        fit = Fit(of, of.start, (), 1500, 1500, np.zeros(0), sure * np.eye(len(of.start)), 0.0)
+        return CandidateModel(fit, errors_of(left(fitted)), left(fitted), left(held))
 
-    weigh = ModelSelection(fitter_of(), lambda *_, **__: CandidateModel(fit(1000.0), 1000.0, 0.0))
-    without, chosen = CandidateModel(fit(fitted, structure.without(1)), lost, 0.0), CandidateModel(fit(0.0), 0.0, 0.0)
+    weigh = ModelSelection(weighed_by(), lambda *_, **__: candidate(1000.0, 1000.0))
+    without, chosen = candidate(fitted, lost, structure.without(1)), candidate(0.0, 0.0)
     assert weigh.within_model_form_error(without, chosen, 1) == doubtful
 
 
@@ -197,13 +197,13 @@ def test_a_stretch_that_is_too_short_tells_no_noise():
 
 def test_a_guessed_noise_is_refined_by_what_the_device_leaves():
     """Nothing rests, repeats or dwells; the readings' own fastest part is motion, tens of times the noise."""
-    guess, fitter = (fitter_of() for _ in range(2))
-    for f in (guess, fitter):
-        f.recording = replace(f.recording, records=tuple(r for r in f.recording.records if r.role != "rest"))
-        f.noise = estimate_noise(replace(f.recording, records=f.recording.records[:1]), SETTLING)
-    assert guess.noise.guessed[0] and guess.noise.floor[0] > 3 * NOISE
-    fitter.noise = update_guessed_noise(fitter, fitter.fit(Structure(AXIS)))
-    assert fitter.noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in fitter.noise.notes[0]
+    fitter = fitter_of()
+    moving = replace(fitter.recording, records=tuple(r for r in fitter.recording.records if r.role != "rest"))
+    guess = estimate_noise(replace(moving, records=moving.records[:1]), SETTLING)
+    assert guess.guessed[0] and guess.floor[0] > 3 * NOISE
+    fitter = replace(fitter, recording=moving, noise=guess)
+    noise = update_guessed_noise(fitter, fitter.fit(Structure(AXIS)))
+    assert noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in noise.notes[0]
 
 
 def test_a_pitch_is_found_that_is_a_thousandth_of_the_path():
@@ -344,8 +344,7 @@ def test_a_drive_that_is_held_stays_held_through_its_sample():
         slow = lfilter([0, 1 - np.exp(-H / 0.3)], [1, -np.exp(-H / 0.3)], u)
         return move(0.97 * u + 0.03 * slow)
 
-    fitter = fitter_of(late)
-    fit = fitter.fit(Structure(AXIS))
+    fitter, fit = fitter_of(late).described(AXIS)
     suspect = Screen(fitter, [lag]).run(fit).suspects[0]
     assert suspect.z**2 > 0.8 * (fit.objective - fit.n)
 
@@ -397,11 +396,15 @@ def test_a_fit_is_judged_where_the_records_leave_its_numbers_and_by_what_it_fitt
     fit = fitter.fit(Structure(AXIS))
     assert run_residual_tests(fitter, fit).passed
     off = replace(fit, theta=fit.theta * np.array([1.02, *np.ones(len(fit.theta) - 1)]))
-    assert not run_residual_tests(fitter, off).passed
-    assert run_residual_tests(fitter, replace(off, J=off.J / 1e4)).passed  # as if nothing were known of it
-    assert not run_residual_tests(
-        fitter, replace(fit, chi2=1.5 * fit.n)
-    ).passed  # what shows in the records to fit alone
+    assert run_residual_tests(fitter, off).p_values["size"] < 1e-6
+    open_ = replace(off, J=off.J / 1e4)  # as if nothing were known of it
+    assert run_residual_tests(fitter, open_).p_values["size"] > 0.1
+    assert not run_residual_tests(fitter, open_).passed  # the records to fit are left far from the numbers
+    (fit_record,) = fitter.fit_records
+    struck = replace(fit_record, observed=fit_record.observed + 1.5 * NOISE * np.sin(np.arange(1500) / 5)[:, None])
+    alone = tuple(struck if r is fit_record else r for r in fitter.recording.records)
+    found = run_residual_tests(replace(fitter, recording=replace(fitter.recording, records=alone)), fit)
+    assert found.p_values["size"] > 0.01 and not found.passed  # what shows in the records to fit alone
 
 
 def test_a_reading_that_moves_with_the_surroundings_at_rest_is_no_noise():
@@ -456,8 +459,9 @@ def test_fringes_that_the_records_cannot_part_are_one():
     for apart, part in ((0.3, False), (0.8, True)):
         starts = tuple({"amplitude": 1e-8, "phase": 0.0, "period": path / periods} for periods in (5.0, 5.0 + apart))
         fit = fitter.fit(Structure(AXIS, (fringe, once_more), starts), steps=0)
-        assert lines_resolved(fitter.recording, fit) == part
-        assert lines_resolved(fitter.recording, fit, (fringe, once_more))
+        told = "the records are too short to tell it from another line of its kind"
+        assert objections(fitter.recording, fit) == ({} if part else {1: told})
+        assert objections(fitter.recording, fit, (fringe, once_more)) == {}
 
 
 @pytest.mark.parametrize("share, meant", [(0.9, True), (1.1, False)])
@@ -467,7 +471,7 @@ def test_a_fringe_that_turns_the_reading_back_is_none(share, meant):
     period = 2e-6
     fitter = fitter_of(after=lambda y: y + share * period / (2 * np.pi) * np.sin(2 * np.pi * y / period + 0.5))
     start = {"amplitude": 0.9 * share * period / (2 * np.pi), "period": period, "phase": 0.5}
-    searcher = Searcher(fitter, Screen(fitter, [fringe]), lambda _: None)
-    trial = searcher.fit_candidate(Structure(AXIS).with_cause(fringe, start), steps=40)
+    trials = Trials(fitter, Screen(fitter, [fringe]), lambda _: None)
+    trial = trials.fit(Structure(AXIS).with_cause(fringe, start), steps=40)
     assert trial.fit.values(0)["amplitude"] == pytest.approx(share * period / (2 * np.pi), rel=0.02)
-    assert searcher.selection.physically_meaningful(trial) == meant
+    assert trials.objections(trial) == ({} if meant else {0: "its numbers contradict one another"})

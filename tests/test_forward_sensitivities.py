@@ -123,6 +123,9 @@ class Counted:
         self.slopes.append(float(x[0]))
         return np.array([x[0] ** 3 - 20.0 * x[0] + 30.0]), np.array([[3 * x[0] ** 2 - 20.0]])
 
+    def normal_matrix(self, J):
+        return J.T @ J
+
 
 def test_slopes_are_worked_out_where_a_step_is_accepted_only():
     problem = Counted()

@@ -189,6 +189,9 @@ class Kinked:
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.residual(x), np.array([[1.0, 0.0], [0.0, 1.0]])
 
+    def normal_matrix(self, J: np.ndarray) -> np.ndarray:
+        return J.T @ J
+
 
 def test_a_number_that_lies_about_its_slope_does_not_hold_the_others():
     assert levenberg_marquardt(Kinked(), np.zeros(2), 40)[0] == pytest.approx(7.0)
@@ -207,6 +210,9 @@ class Linear:
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.residual(x), self.A
+
+    def normal_matrix(self, J: np.ndarray) -> np.ndarray:
+        return J.T @ J
 
 
 def test_a_number_that_nothing_holds_does_not_shorten_the_step_of_the_others():
@@ -229,6 +235,9 @@ class Product:
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.residual(x), np.array([[3e4 * (1 + x[1]), 3e4 * x[0]], [50.0, 0.0]])
+
+    def normal_matrix(self, J: np.ndarray) -> np.ndarray:
+        return J.T @ J
 
 
 def test_a_bent_valley_is_followed():

@@ -35,6 +35,9 @@ class Problem(Protocol):
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The residual (m,) and its Jacobian (m, n)."""
 
+    def normal_matrix(self, J: np.ndarray) -> np.ndarray:
+        """What stands for half the Hessian (n, n) of the objective where `J` was evaluated last: J'J, or more of it."""
+
 
 def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
     """The x (n,) of least |residual|^2 within the bounds, from a starting `x`, in at most so many steps.
@@ -49,7 +52,7 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarr
     x, damping = np.clip(x, low, high), FIRST_DAMPING
     r, J = problem.evaluate(x)
     for _ in range(steps):
-        gradient, H = J.T @ r, J.T @ J
+        gradient, H = J.T @ r, problem.normal_matrix(J)
         least, most = np.maximum(low - x, -problem.step_limit), np.minimum(high - x, problem.step_limit)
         step = _damped_step(H, gradient, least, most, damping)
         if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:

@@ -130,3 +130,14 @@ def huber(white: np.ndarray, corner: np.ndarray) -> tuple[np.ndarray, np.ndarray
     bent = np.sqrt(np.maximum(2 * corner * size - corner**2, 0.0))
     far = size > corner
     return np.where(far, np.sign(white) * bent, white), np.where(far, corner / np.maximum(bent, 1e-300), 1.0)
+
+
+def huber_curvature(white: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """The factor (n, n_y) on the squared derivatives of `huber` by which a step neither overshoots nor stops short.
+
+    2 - c/|r| beyond the corner, 1 within: the parabola that touches the loss at r and lies above it elsewhere, whose minimum is
+    at r = 0 (iteratively reweighted least squares; P. W. Holland, R. E. Welsch, Commun. Statist. A6 (1977) 813). The plain
+    derivatives would take a sample at r to -(r - c), and the next step back.
+    """
+    size = np.abs(white)
+    return 2.0 - np.where(size > corner, corner / np.maximum(size, 1e-300), 1.0)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.error_model import ErrorModel, huber
+from ctrlgen.diagnosis.estimation.error_model import ErrorModel, huber, huber_curvature
 from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
@@ -62,6 +62,7 @@ class LeastSquaresProblem:
         self.log = np.array([_by_logarithm(p) for p in parameters] + [False] * self.n_initial, dtype=bool)
         self.step_limit = np.where(self.log, FIT.longest_log_step, np.inf)
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._curvature = np.ones(0)
 
     def to_scaled(self, values: np.ndarray) -> np.ndarray:
         """x of SI `values`, (k + n_s,)."""
@@ -94,7 +95,9 @@ class LeastSquaresProblem:
         """The residual (m,) alone, without the work that the Jacobian takes."""
         values = self.to_si(x)
         rows = [
-            self._robust(record, simulator.simulate(record, values[: self.k], values[own]))[0].ravel()
+            huber(self._white(record, simulator.simulate(record, values[: self.k], values[own])), self.error.corner)[
+                0
+            ].ravel()
             for record, simulator, own in self._records()
         ]
         return self._with_prior(rows, x)
@@ -105,11 +108,13 @@ class LeastSquaresProblem:
             return self._last[1:]
         values, k = self.to_si(x), self.k
         si_by_scaled = self.si_by_scaled(values)
-        rows, blocks = [], []
+        rows, blocks, curvature = [], [], []
         for record, simulator, own in self._records():
             y, Y = simulator.sensitivities(record, values[:k], values[own])
-            robust, weight = self._robust(record, y)
+            white = self._white(record, y)
+            robust, weight = huber(white, self.error.corner)
             rows.append(robust.ravel())
+            curvature.append(huber_curvature(white, self.error.corner).ravel())
             W = self.error.whiten(_clipped(Y), record.valid).reshape(len(rows[-1]), Y.shape[2]) * weight.reshape(-1, 1)
             J = np.zeros((len(W), len(x)))
             J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
@@ -119,11 +124,18 @@ class LeastSquaresProblem:
             P[row, i] = self.scale[i] / p.sd
         J = np.nan_to_num(np.vstack([*blocks, P, np.eye(len(x))[k:]]), posinf=0.0, neginf=0.0)
         self._last = x.copy(), self._with_prior(rows, x), J
+        self._curvature = np.concatenate(curvature or [np.zeros(0)])
         return self._last[1:]
 
-    def _robust(self, record: Record, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values whose squares are the loss of the readings `y` (n, n_y) [SI], and the weights of their derivatives."""
-        return huber(limited(whiten_residual(self.error, record, y)), self.error.corner)
+    def normal_matrix(self, J: np.ndarray) -> np.ndarray:
+        """J'J (k + n_s, k + n_s) of the Jacobian last evaluated, with more weight on readings beyond the corner of the loss."""
+        beyond = np.flatnonzero(self._curvature > 1.0)
+        more = J[beyond] * np.sqrt(self._curvature[beyond] - 1.0)[:, None]
+        return J.T @ J + more.T @ more
+
+    def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
+        """The whitened residual (n, n_y) of the readings `y` [SI]."""
+        return limited(whiten_residual(self.error, record, y))
 
     def _records(self) -> Iterator[tuple[Record, Simulator, slice]]:
         """Each record to fit, its simulator, and the places of its initial states among the variables."""

@@ -8,16 +8,17 @@ memory nor heavy tails after whitening, and a stage that moves by itself has.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
+from scipy.ndimage import median_filter
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.held_out import HeldOutRefit, refit_to_held_out
 from ctrlgen.diagnosis.estimation.misfit import misfit
 from ctrlgen.diagnosis.estimation.noise import cross_correlation, ljung_box, without_lines
-from ctrlgen.diagnosis.settings import DISCREPANCY, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.diagnosis.settings import DISCREPANCY, HELD_OUT_REFIT, OUTLIERS, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record
 
@@ -104,12 +105,28 @@ def _moves_at_rest(fitter: Fitter, fit: Fit, i: int) -> bool:
 
 
 def _is_no_noise(fitter: Fitter, fit: Fit, record: Record, i: int) -> bool:
-    e = fitter.whitened_residual(fit, record)[fitter.noise.usable(record.valid)[:, i], i]
     readings = record.observed[record.valid[:, i], i]
     coarse = quantisation_step(readings) > RESIDUAL_TESTS.coarse_reading * fitter.noise.floor[i]
-    if len(e) < SHORTEST or np.ptp(readings) == 0 or coarse:
+    if np.ptp(readings) == 0 or coarse:
         return False
-    e = without_lines(e)  # a vibration is a candidate of its own, and so are rare spikes
-    far = np.abs(e - np.mean(e)) > RESIDUAL_TESTS.spike * np.std(e)
-    e = e[~far] if np.mean(far) < RESIDUAL_TESTS.rare else e
+    quiet = _without_rare_spikes(record, fitter.predict(fit, record), i)
+    e = fitter.whitened_residual(fit, quiet)[fitter.noise.usable(quiet.valid)[:, i], i]
+    if len(e) < SHORTEST:
+        return False
+    e = without_lines(e)  # a vibration is a candidate of its own
     return min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESIDUAL_TESTS.rest_p
+
+
+def _without_rare_spikes(record: Record, predicted: np.ndarray, i: int) -> Record:
+    """The record with samples of channel i marked not valid that lie off the median of the samples around, where they are rare.
+
+    What jumps and stays does not lie off, and is no fault of a sensor.
+    """
+    e = np.where(record.valid[:, i], record.observed[:, i] - predicted[:, i], 0.0)
+    off = e - median_filter(e, size=OUTLIERS.around, mode="nearest")
+    far = record.valid[:, i] & (np.abs(off) > RESIDUAL_TESTS.spike * np.std(off))
+    if not far.any() or np.mean(far) >= RESIDUAL_TESTS.rare:
+        return record
+    valid = record.valid.copy()
+    valid[far, i] = False
+    return replace(record, valid=valid)
