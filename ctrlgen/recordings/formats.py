@@ -1,6 +1,6 @@
 """Reading measurement files: one reader per format, each giving named columns of numbers.
 
-CSV, MATLAB (.mat up to 7, and 7.3), HDF5, TDMS, MDF4 and JSON. A column of a matrix is named `matrix[k]`, a field
+Text (.csv, .dat, .txt), MATLAB (.mat up to 7, and 7.3), HDF5, TDMS, MDF4 and JSON. A column of a matrix is named `matrix[k]`, a field
 of a MATLAB or JSON structure `structure.field`, a dataset of HDF5 and a channel of TDMS by its path `group/name`.
 """
 
@@ -11,9 +11,10 @@ import difflib
 import io
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
+from itertools import groupby
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -25,6 +26,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
 
 MISSING = {"", "nan", "na", "n/a", "null", "none", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan"}
+FEWEST_ROWS = 2  # of a table among other text
 MOST_LISTED = 5  # bad cells or lines of a file that a message lists; the others are counted
 
 
@@ -89,8 +91,11 @@ class MeasurementTable:
         return InputError(self.path, [Fault(self.path.name, what)])
 
 
-def read_table(path: Path) -> MeasurementTable:
-    """The columns of a measurement file. Raises InputError where it does not exist, cannot be read, or needs a package."""
+def read_table(path: Path, which: int | None = None) -> MeasurementTable:
+    """The columns of a measurement file, of its table `which` from 1 where it holds several.
+
+    Raises InputError where it does not exist, cannot be read, needs a package, or has no such table.
+    """
     if path.is_dir():
         raise InputError(path, [Fault(path.name, "is a folder; name the file inside it")])
     reader = READERS.get(path.suffix.lower())
@@ -107,8 +112,15 @@ def read_table(path: Path) -> MeasurementTable:
         )
     if not path.is_file():
         raise InputError(path, [Fault(path.name, f"does not exist in {path.parent}; check the name")])
+    if which is not None and reader is not read_csv:
+        raise InputError(path, [Fault(path.name, "table: is for text files with several tables; leave it out")])
     try:
-        return reader(path)
+        if which is None:
+            return reader(path)
+        tables = read_tables(path)
+        if which > len(tables):
+            raise InputError(path, [Fault(path.name, f"holds tables 1 to {len(tables)}, not {which}")])
+        return tables[which - 1]
     except InputError:
         raise
     except Exception as error:  # the libraries raise dozens of types for a damaged file
@@ -117,15 +129,30 @@ def read_table(path: Path) -> MeasurementTable:
 
 
 def read_csv(path: Path) -> MeasurementTable:
-    """Text separated by comma, semicolon or tab, with a header unless the first row is numbers; lines with # are skipped."""
-    text = read_text(path)
-    first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
-    separator = next((mark for mark in "\t;," if mark in first), ",")
+    """The only table of a text file. Raises InputError where it holds several."""
+    tables = read_tables(path)
+    if len(tables) > 1:
+        each = ", ".join(f"{k} from line {t.lines[0]}, {len(t.lines)} rows" for k, t in enumerate(tables, 1))
+        raise InputError(path, [Fault(path.name, f"holds {len(tables)} tables ({each}); write table = 1 or another")])
+    return tables[0]
+
+
+def read_tables(path: Path) -> list[MeasurementTable]:
+    """The tables of a text file, separated by comma, semicolon or tab; lines with # are skipped.
+
+    A table is a run of rows of numbers under a header, unless the rows begin at once. Where other text stands around it, its
+    header is the last line above of as many cells; where that repeats a name, columns go by number. Raises InputError.
+    """
+    text = read_text(path).removeprefix("\ufeff")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    separator = next((mark for mark in "\t;," if lines and mark in lines[-1]), ",")
     reader = csv.reader(io.StringIO(text), delimiter=separator)
     rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     rows = [(line, row) for line, row in rows if any(row) and not row[0].startswith("#")]
     if not rows:
         raise InputError(path, [Fault(path.name, "has no rows; write a header and one row per sample")])
+    if len({len(row) for _, row in rows}) > 1 and (found := _runs_of_numbers(rows, path)):
+        return found
     width = len(rows[0][1])
     ragged = [f"line {line} has {len(row)}" for line, row in rows if len(row) != width]
     if ragged:
@@ -134,12 +161,42 @@ def read_csv(path: Path) -> MeasurementTable:
     header = not all(_is_number(cell) for cell in rows[0][1])
     names = rows[0][1] if header else [str(k) for k in range(width)]
     twice = sorted({name for name in names if names.count(name) > 1 and name})
+    if twice and all(_is_number(cell) for _, row in rows[-FEWEST_ROWS:] for cell in row) and not _is_table(rows[1:]):
+        return _runs_of_numbers(rows, path)  # several lines of header
     if twice:
         raise InputError(path, [Fault(path.name, f"column {twice[0]!r} occurs twice in the header; rename one")])
-    body = rows[header:]
-    cells = list(zip(*(row for _, row in body), strict=True)) or [()] * width
+    return [_text_table(path, names, rows[header:])]
+
+
+def _is_table(rows: Sequence[tuple[int, list[str]]]) -> bool:
+    return all(_is_number(cell) for _, row in rows for cell in row)
+
+
+def _text_table(path: Path, names: list[str], body: Sequence[tuple[int, list[str]]]) -> MeasurementTable:
+    cells = list(zip(*(row for _, row in body), strict=True)) or [()] * len(names)
     units = {name: match[1].strip() for name in names if (match := re.search(r"\[([^]]+)\]$", name))}
     return MeasurementTable(path, dict(zip(names, cells, strict=True)), units, tuple(line for line, _ in body))
+
+
+def _runs_of_numbers(rows: Sequence[tuple[int, list[str]]], path: Path) -> list[MeasurementTable]:
+    """The tables among other text: runs of at least `FEWEST_ROWS` rows of numbers of one width. None where rows of numbers of
+    different widths follow each other: there the file is damaged."""
+    found: list[MeasurementTable] = []
+    above: list[list[str]] = []
+    for numeric, group in groupby(rows, key=lambda row: _is_table([row]) and any(row[1])):
+        run = list(group)
+        if not numeric:
+            above = [row for _, row in run]
+            continue
+        width = len(run[0][1])
+        if any(len(row) != width for _, row in run):
+            return []
+        names = next((row for row in reversed(above) if len(row) == width), [])
+        if len(set(names)) < width:
+            names = [str(k) for k in range(width)]
+        if len(run) >= FEWEST_ROWS:
+            found.append(_text_table(path, names, run))
+    return found
 
 
 def _is_number(cell: str) -> bool:
@@ -264,6 +321,6 @@ def _package(name: str, path: Path) -> ModuleType:
 
 
 READERS: dict[str, Callable[[Path], MeasurementTable]] = {
-    ".csv": read_csv, ".mat": read_mat, ".h5": read_hdf5, ".hdf5": read_hdf5, ".tdms": read_tdms, ".mf4": read_mdf4,
+    ".csv": read_csv, ".dat": read_csv, ".txt": read_csv, ".mat": read_mat, ".h5": read_hdf5, ".hdf5": read_hdf5, ".tdms": read_tdms, ".mf4": read_mdf4,
     ".json": read_json,
 }  # fmt: skip

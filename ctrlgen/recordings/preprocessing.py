@@ -19,12 +19,20 @@ def low_passed(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
 
 
 def delayed(values: np.ndarray, time: np.ndarray, lag: float) -> np.ndarray:
-    """`values` (n,) of `lag` [s] before each `time` (n,): linear between samples, NaN before the first."""
-    return np.interp(time - lag, time, values, left=np.nan, right=np.nan)
+    """`values` (n,) of `lag` [s] before each `time` (n,): linear between samples, NaN beyond the first and the last."""
+    return resampled(values, time, time - lag)
+
+
+def resampled(values: np.ndarray, clock: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """`values` (m,) of the instants `clock` (m,) [s] at each `time` (n,) [s]: linear between them, NaN beyond."""
+    return np.interp(time, clock, values, left=np.nan, right=np.nan)
 
 
 def derivative(values: np.ndarray, sample_time: float, order: int) -> np.ndarray:
-    """The derivative of `order` 1 or 2 in time of `values` (n,) by central differences, one-sided at the ends."""
+    """The derivative of `order` 1 or 2 in time of `values` (n,) by central differences, one-sided at the ends; of order -1 the
+    integral from the first one by the trapezoidal rule."""
+    if order == -1:
+        return scipy.integrate.cumulative_trapezoid(values, dx=sample_time, initial=0.0)
     for _ in range(order):
         values = np.gradient(values, sample_time)
     return values

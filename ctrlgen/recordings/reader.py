@@ -195,12 +195,14 @@ class _RecordReader:
         self.folder, self.written, self.table, self.columns, self.where = folder, written, table, columns, where
         self.faults: list[Fault] = []
         self.files: dict[str, MeasurementTable | None] = {}
+        self.rows = table.rows
 
     def read(self, names: validation.ChannelNames) -> Record | None:
         """The record before validation; None where drives or clock cannot be read. `valid`: the channel has a column."""
         table, kind = self.table, self.written.kind
         read = {name: self._column(f"{self.where}.columns.{name!r}", column) for name, column in self.columns.items()}
         values = {name: column for name, column in read.items() if column is not None}
+        foreign = {name: values.pop(name) for name in list(values) if self.columns[name].sample_rate}
         clock = None if table.time is None else self._column(f"{self.where}.time", table.time)
         ambient = self._ambient(table.conditions.ambient)
         sizes = {name: len(column) for name, column in values.items()}
@@ -217,6 +219,7 @@ class _RecordReader:
             return None
         time, period = self._clock(kind, clock, n)
         if kind == "series" and n > 1:
+            values |= {name: self._resampled(name, column, time) for name, column in foreign.items()}
             values = self._preprocessed(values, time)
         if any(name not in values for name in names.drives):
             return None
@@ -230,12 +233,20 @@ class _RecordReader:
         n = len(time)
         late = {name: c.later.si for name, c in self.columns.items() if c.later and name in values}
         values = values | {name: preprocessing.delayed(values[name], time, lag) for name, lag in late.items()}
-        rows = slice(*(self.table.rows or (0, n)))
+        moved = [np.isfinite(values[name]) for name in values if name in late or self.columns[name].sample_rate]
+        self.rows = _inner_rows(moved, *(self.table.rows or (0, n)))
+        rows = slice(*self.rows)
         inside = self._filtered({k: v[rows] for k, v in values.items()}, float(np.median(np.diff(time))))
         whole = {name: np.full(n, np.nan) for name in inside}
         for name, column in inside.items():
             whole[name][rows] = column
         return whole
+
+    def _resampled(self, name: str, values: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """A column (m,) of another recorder at the record's `time` (n,) [s]; both began at once."""
+        rate = self.columns[name].sample_rate
+        clock = np.arange(len(values)) / (rate.si if rate else 1.0)
+        return preprocessing.resampled(values, clock, time - time[0])
 
     def _filtered(self, values: dict[str, np.ndarray], sample_time: float) -> dict[str, np.ndarray]:
         """The columns after the file's low-pass, with its derivatives; empty, with a fault, where that cannot be done."""
@@ -287,7 +298,7 @@ class _RecordReader:
         """The rows that are kept, as a record: the lead-in drives the device, but its readings are not valid."""
         table, n = self.table, len(time)
         every = self._kept(float(np.median(np.diff(time)))) if n > 1 else 1
-        kept = slice(*(table.rows or (0, n)), every)
+        kept = slice(*(self.rows or (0, n)), every)
         observed = np.full((n, len(names.observed)), np.nan)
         for i, name in enumerate(names.observed):
             observed[:, i] = values.get(name, np.nan)
@@ -319,8 +330,9 @@ class _RecordReader:
     def _table(self, path: Path) -> MeasurementTable:
         """A file's columns. Raises InputError; for a file that is not kept with the recording it says where to get it."""
         stated = self.written.sha256.get(path.name)
+        which = self.table.table if path.name == Path(self.table.file).name else None
         if stated is None:
-            return read_table(path)
+            return read_table(path, which)
         source = f"{self.written.source or 'its source is not stated'}; file {path.name}, SHA-256 {stated}"
         if not path.is_file():
             what = f"is not here; the recording does not bring it along. Source: {source}. Put it at {path.resolve()}"
@@ -331,7 +343,7 @@ class _RecordReader:
         ):  # rows, units and filters were chosen for that file and would mean something else in another
             what = f"is another file, SHA-256 {actual}. Wanted: {source}. If you mean this one, state its SHA-256 in [sha256]"
             raise InputError(path, [Fault(path.name, what)])
-        return read_table(path)
+        return read_table(path, which)
 
     def _column(self, where: str, column: Column) -> np.ndarray | None:
         """A column in SI (n,); None, with a fault, where it cannot be read."""
@@ -362,10 +374,21 @@ class _RecordReader:
         return column.scale * values * (scale[0] - scale[1]) + scale[1]
 
 
+def _inner_rows(moved: Sequence[np.ndarray], first: int, last: int) -> tuple[int, int]:
+    """The rows from `first` to one before `last` without those at either end at which one of the columns that were `moved` in
+    time has no number: where each (n,) is False."""
+    for known in moved:
+        rows = first + np.flatnonzero(known[first:last])
+        first, last = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (first, last)
+    return first, last
+
+
 def _preprocessing_notes(written: RecordingFile) -> list[str]:
     """One note that says what was done to the columns before validation; none where nothing was."""
     columns = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.later}
     steps = [f"{name} taken as {c.later.text} later than its rows" for name, c in columns.items() if c.later]
+    used = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.sample_rate}
+    steps += [f"{name} of another recorder read linearly between its samples" for name in used]
     steps += [f"derivative {d.order} of {d.of} taken as {name}" for name, d in written.derivatives.items()]
     if written.low_pass is not None:
         steps.insert(0, f"every column low-passed alike at {written.low_pass.text}, forward and backward")

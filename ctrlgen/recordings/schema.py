@@ -29,22 +29,28 @@ class Column(Section):
     tolerance: str | None = None
     """Error of this reading that does not matter, with its unit, such as `"2 um"`. Left out: the noise is what matters."""
     file: str | None = None
-    """Another file than the record's, with the same samples row by row. Left out: the record's file."""
+    """Another file than the record's. Left out: the record's file. Without a clock of its own it has the same samples row by
+    row.
+    """
+    sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Rows a second of a file of another recorder, which begins with the record; it is read linearly between its rows."""
     scale: float = 1.0
     """Factor that brings the column's numbers to `unit`: newtons per volt of a recorded amplifier voltage, -1 for
     reversed polarity.
     """
     later: Annotated[Quantity, In("s")] | None = None
-    """How much later than its row's time a number acts: the one cycle after which a recorded command takes effect."""
+    """How much later than its row's time a number acts: the one cycle after which a recorded command takes effect; earlier
+    where negative. Rows at the record's ends that this leaves without a number are left out.
+    """
 
 
 class Derivative(Section):
-    """A signal that was not recorded: the derivative of another one in time, by central differences."""
+    """A signal that was not recorded: the derivative of another one in time, by central differences, or its integral."""
 
     of: str
     """Name of the recorded signal."""
-    order: Literal[1, 2]
-    """Order of the derivative in time."""
+    order: Literal[-1, 1, 2]
+    """Order of the derivative in time; -1 is the integral from the record's first row, by the trapezoidal rule."""
 
 
 class Conditions(Section):
@@ -59,6 +65,8 @@ class RecordTable(Section):
 
     file: str
     """The measurement file, relative to recording.toml; its ending tells the format."""
+    table: Annotated[int, Field(ge=1)] | None = None
+    """Which table of a text file that holds several, from 1."""
     role: Literal["fit", "hold_out", "rest"]
     """`fit`: parameters are estimated from it; `hold_out`: it only judges predictions; `rest`: nothing moves, it gives
     the noise. Without a `hold_out`, part of the longest record is held out.
@@ -257,7 +265,7 @@ class _Check:
         for i, other in enumerate(self.written.record[:k]):
             a, b = record.used_rows, other.used_rows
             if (
-                record.file == other.file
+                (record.file, record.table) == (other.file, other.table)
                 and max(a[0], b[0]) < min(a[1], b[1])
                 and "rest" not in (record.role, other.role)
                 and self._observed(record) & self._observed(other)

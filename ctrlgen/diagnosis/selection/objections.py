@@ -37,7 +37,7 @@ def objections(
         reason = (
             _outside_its_range(fit, k)
             or _on_the_lattice(recording, fit, k)
-            or ("" if exact else _no_line(recording, fit, k) or _at_the_onset(recording, fit, k))
+            or ("" if exact else _no_line(recording, fit, k) or _no_event(recording, fit, k))
         )
         if reason:
             found[k] = reason
@@ -97,19 +97,21 @@ def _no_line(recording: Recording, fit: Fit, k: int) -> str:
     return ""
 
 
-def _at_the_onset(recording: Recording, fit: Fit, k: int) -> str:
-    """Why an event is no event of its own: it begins where the drive begins or ceases to move."""
+def _no_event(recording: Recording, fit: Fit, k: int) -> str:
+    """Why an event is none of its own: it is slow, as physics that was left out is, or begins where the drive begins or ceases
+    to move; empty where it may be one."""
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or recording.kind != "series":
         return ""
+    moments = [p.name for p in cause.law.params if cause.prior.of(p).start_from_data == "moments"]
     values = fit.values(k)
-    for p in cause.law.params:
-        if cause.prior.of(p).start_from_data != "moments":
-            continue
-        for record in (r for r in recording.records if r.role == "fit"):
-            near = OBJECTIONS.onset_samples * record.sample_time
-            if any(abs(values[p.name] - t) <= near for t in _onsets(record)):
-                return "it happens where the motion begins or ends, as friction, slack and delays do"
+    for record in (r for r in recording.records if r.role == "fit" and moments):
+        near = OBJECTIONS.onset_samples * record.sample_time
+        sharp = max(OBJECTIONS.sharp * float(record.time[-1] - record.time[0]), near)
+        if values.get("rise", 0.0) > sharp:
+            return f"its rise of {values['rise']:.3g} s is slow beside the record; an event is sharp"
+        if any(abs(values[name] - t) <= near for name in moments for t in _onsets(record)):
+            return "it happens where the motion begins or ends, as friction, slack and delays do"
     return ""
 
 

@@ -177,6 +177,9 @@ class ObjectionsSettings:
     Judgement."""
     harmonic: float = 0.25
     """Cycles within the records to fit between a line and a harmonic of a periodic drive, below which they are one."""
+    sharp: float = 0.02
+    """Rise of an event over the length of the record, above which it is no event: a fiftieth is what a figure of the record
+    shows as a step. Judgement."""
     onset_samples: float = 5.0
     """Samples between an event and the onset of motion, below which they are one."""
     rest_samples: float = 20.0
