@@ -8,11 +8,17 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
+from conftest import AXIS_FILE
 from numpy import abs, cos, cross, exp, sign, sin, sqrt, tanh
 from scipy.integrate import solve_ivp
 
 import ctrlgen.effects  # noqa: F401  fills the library
+from ctrlgen import load_device
+from ctrlgen.diagnosis.estimation.simulator import Simulator
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.effects import Effect
+from ctrlgen.recordings.recording import Record
 
 ROUNDING = 1e-12
 COUNT, H = 6, 0.01
@@ -97,6 +103,7 @@ LAWS = {
     "backlash": ({}, lambda s, p: 0.999 * (s.w - s.displacement)),
     "bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.stiffness * s.z),
     "bow": ({}, lambda s, p: p.curvature * s.value**2),
+    "clock_offset": None,  # below: it shifts the recorded drive
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
     "coupling": ({}, lambda s, p: p.gain * s.all[s.partner]),
     "damping_coupling": ({}, lambda s, p: -p.damping * s.velocities[s.partner]),
@@ -362,6 +369,34 @@ def test_a_delay_without_slopes_is_exact_for_parabolas_beyond_a_sample_and_lines
     assert read_late(y, older, 0.3, False)[1:] == pytest.approx(y((9 - older[1:]) * 0.3), rel=1e-12)
     line = np.polynomial.Polynomial(rng.uniform(-1, 1, 2))
     assert read_late(line, SHARES, 0.3, False) == pytest.approx(line((9 - SHARES) * 0.3), rel=1e-12)
+
+
+def shifted(drive, tau: float, linear: bool) -> np.ndarray:
+    """The drive (n, 1) of a record of 50 samples of 10 ms under an offset of the clocks of `tau` [s]."""
+    time = 0.3 + H * np.arange(50)
+    u, y = drive(time)[:, None], np.zeros((50, 1))
+    given = Record("fit", "fit", time, H, u, y, linear, None, np.ones(y.shape, bool))
+    simulator = Simulator(load_device(AXIS_FILE), (), ("reading.axis",), H, linear)
+    assert simulator.aligned(given, np.zeros(0)) is given
+    clocks = Hypothesis("clock_offset", "sensor:axis", "axis")
+    stated = Structure(load_device(AXIS_FILE)).with_cause(clocks, {"offset": tau}).device_with_causes
+    found = Simulator(stated, (), ("reading.axis",), H, linear).aligned(given, np.zeros(0)).drive
+    free = Simulator(stated, ("effect[0].offset",), ("reading.axis",), H, linear)
+    assert free.aligned(given, np.array([tau])).drive == pytest.approx(found, rel=1e-12)
+    return found[:, 0]
+
+
+@pytest.mark.parametrize("tau", [-0.023, 0.0047, 0.02])
+def test_clocks_that_do_not_agree_shift_the_drive(tau, rng):
+    """Exact for a cubic of a drive that is linear between samples, and for the mean over a sample of one that is held."""
+    cubic, line = (np.polynomial.Polynomial(rng.uniform(-1, 1, k)) for k in (4, 2))
+    at = 0.3 + H * np.arange(50) + tau
+    inside = (at >= 0.3) & (at <= 0.3 + 49 * H)
+    assert shifted(cubic, tau, True)[inside] == pytest.approx(cubic(at)[inside], rel=1e-9)
+    assert shifted(line, tau, False)[inside] == pytest.approx(line(at)[inside], rel=1e-12)
+    ends = line(np.array([0.3, 0.3 + 49 * H]))
+    beyond = shifted(line, tau, False)[~inside]
+    assert beyond == pytest.approx(np.full(len(beyond), ends[0 if tau < 0 else 1]))
 
 
 def test_a_delay_of_more_than_five_samples_counts_as_five(rng):

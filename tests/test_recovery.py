@@ -30,6 +30,8 @@ from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import estimate_noise
 from ctrlgen.diagnosis.hypotheses import priors
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect
 from ctrlgen.recordings.recording import Recording
@@ -371,7 +373,21 @@ def test_of_what_two_axes_share(effect):
     recover(fitter, device, effect, Planted("stage:a", truth, "b"))
 
 
+@pytest.mark.parametrize("samples", [-3, 2])
+def test_of_two_clocks(samples):
+    """Readings that come late by three samples, or early by two, which no stage can; the screen cannot see it."""
+    rng, parts = np.random.default_rng(3), []
+    for u, role in zip(given(N), ("fit", "hold_out"), strict=True):
+        late = u[np.clip(np.arange(N) + samples, 0, N - 1)]
+        parts.append(record(u, move(late) + NOISE * rng.standard_normal(N), role))
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", parts)
+    clocks, creep = Hypothesis("clock_offset", "sensor:axis", "axis"), Hypothesis("creep", "stage:axis", "axis")
+    found = Searcher(fitter, Screen(fitter, [clocks, creep]), lambda _: None).run(AXIS).chosen
+    assert found.causes == (clocks,) and found.errors.is_noise
+    assert found.fit.values(0)["offset"] == pytest.approx(samples * H, abs=1e-5)
+
+
 def test_no_law_is_left_out():
     battery = {ALSO.get(name, name) for name in (*laws.DRAW, *FAULTS)}
-    here = {*(law.__name__ for law in ON_AXIS), *ON_HEXAPOD, *SHARED, "payload", "second_pole"}
+    here = {*(law.__name__ for law in ON_AXIS), *ON_HEXAPOD, *SHARED, "clock_offset", "payload", "second_pole"}
     assert not set(Effect.library) - battery - here - IN_THE_LOOP

@@ -4,7 +4,8 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class ClockOffset(Effect):
-    """y(t) is the reading under the drive u(t + tau): the recorder of the readings is late by tau on the drive's clock.
+    """y(t) = reading under u(t + tau): the recorder of the readings is late by tau on the drive's clock. Holds for clocks that
+    run alike.
 
     A property of how a recording was made, not of the device: it shifts the recorded drive in simulations of recordings (see
     `estimation.simulator`) and adds nothing to the model's equations, so the C does not change. A reading that comes late can
