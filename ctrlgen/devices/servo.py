@@ -1,36 +1,68 @@
-"""An axis without dynamics, whose position is its command: reading = command."""
+"""An axis without dynamics, whose position is its command, or proportional to its voltage: reading = G u."""
 
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 
-from ctrlgen.core.units import In, Quantity, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Signal
+from pydantic import model_validator
+
+from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
+from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
 
 Travel = Annotated[Quantity, In("deg", positive=True)] | Annotated[Quantity, In("um", positive=True)]
+
+
+class Transducer(Section):
+    """What turns a voltage into the position: a piezo ceramic and its amplifier."""
+
+    domain: ClassVar[str] = "actuator"
+    relative_sd: ClassVar[float | None] = 0.1
+
+    gain: Annotated[Quantity, In("um/V", positive=True)] | Annotated[Quantity, In("rad/V", positive=True)]
+    """Position per voltage G."""
+    drive_limit: Annotated[Quantity, In("V", positive=True)]
+    """Largest voltage of either sign."""
 
 
 class Servo(Device):
     """Command -> position, without force or time; linear or rotary as the unit of `travel`, the largest excursion, says."""
 
     kind: Literal["servo"]
-    """An axis whose reading equals its command."""
+    """An axis whose reading equals its command, or is proportional to its voltage."""
     travel: Travel
     """Largest excursion to either side of zero; an angle makes the axis rotary, a length linear."""
 
+    transducer: Transducer | None = None
+    """Makes the command a voltage. Left out: the command is the position."""
+
+    @model_validator(mode="after")
+    def _gain_of_one_dimension(self) -> Servo:
+        if self.transducer is None:
+            return self
+        unit, per_volt = written_unit(self.travel.text), written_unit(self.transducer.gain.text)
+        if not same_dimension(f"({per_volt})*V", unit):
+            raise ValueError(f"transducer.gain in {per_volt} gives no position in {unit}, the unit of travel")
+        return self
+
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
-        """The identity."""
+        """The identity, or the gain of the transducer."""
         axes, unit, travel = ("axis",), written_unit(self.travel.text), self.travel.si
-        drive = Signal("command", "commanded position", axes, (unit,), "r_", ca.SX.sym("u", 1), (travel,))
+        u, gain = ca.SX.sym("u", 1), p.transducer.gain if self.transducer else 1.0
+        most = self.transducer.drive_limit.si if self.transducer else travel
+        drive = (
+            Signal("command", "commanded position", axes, (unit,), "r_", u, (most,))
+            if self.transducer is None
+            else Signal("drive", "drive", axes, ("V",), "u_", u, (most,))
+        )
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
-            return [Limit("drive", drive.label, axes, unit, signal.drive, -travel, travel)]
+            return [Limit("drive", drive.label, axes, drive.units[0], signal.drive, -most, most)]
 
         return BalancedPhysics(
             axes=axes, components=axes, pose_units=(unit,), pose_scale=(travel,), drive=drive,
             displacement_scale=travel, force_scale=travel, force_unit=unit, travel_unit=unit,
-            force=lambda u, x, d: u, restoring_force=lambda d: d, pose=lambda d: d, limits=limits,
+            force=lambda u, x, d: gain * u, restoring_force=lambda d: d, pose=lambda d: d, limits=limits,
         )  # fmt: skip

@@ -144,10 +144,11 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     if stated := recording.noise[i]:
         sd, _ = _with_rounding(stated, np.zeros(0), rounding)
         return _ChannelNoise(sd, "as stated, taken as white", NOISE.stated_samples)
-    # within the band of a low-pass that the columns passed; beyond it there is no noise left to see
-    thirds = [np.diff(r.observed[r.valid[:, i], i][:: rows_in_band(r)], 3) for r in recording.records]
+    thirds = [d for r in recording.records for d in _third_differences(r, i)]
+    banded = any(r.band for r in recording.records)
     # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
-    sd = max(_robust_deviation(np.concatenate(thirds)) / np.sqrt(20.0), rounding, 1e-300)
+    deviation = _quiet_deviation if banded else _robust_deviation
+    sd = max(deviation(np.concatenate(thirds)) / np.sqrt(20.0), rounding, 1e-300)
     note = "from the fastest part of the readings, taken as white; a record at rest would tell it better"
     return _ChannelNoise(sd, note, sum(map(len, thirds)) / NOISE.robust_cost, guessed=True)
 
@@ -221,9 +222,19 @@ def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np
     return (float(np.hypot(rounding, floor)), np.zeros(0)) if rounding > floor else (sd, a)
 
 
-def rows_in_band(record: Record) -> int:
-    """One row in so many makes twice the cut-off of the low-pass that the columns passed; 1 where they passed none."""
-    return max(round(1 / (2 * record.band * record.sample_time)), 1) if record.band else 1
+def _third_differences(record: Record, i: int) -> list[np.ndarray]:
+    """Third differences of channel i over so many rows as make twice the cut-off of the low-pass that the columns passed:
+    within its band, for beyond it there is no noise left to see. Over neighbouring rows where they passed none."""
+    y = record.observed[record.valid[:, i], i]
+    every = max(round(1 / (2 * record.band * record.sample_time)), 1) if record.band else 1
+    return [np.diff(y[first::every], 3) for first in range(every)]
+
+
+def _quiet_deviation(values: np.ndarray) -> float:
+    """Standard deviation of the quietest values (n,), as if they were normal: within the band of a low-pass the device moves
+    too, and less than the noise only now and then."""
+    share = NOISE.quiet_share
+    return float(np.quantile(np.abs(values), share) / stats.norm.ppf((1 + share) / 2)) if len(values) else 0.0
 
 
 def _robust_deviation(values: np.ndarray) -> float:

@@ -102,7 +102,8 @@ class Trials:
 
     def objections(self, candidate: CandidateModel, accepted: Sequence[Hypothesis] = ()) -> dict[int, str]:
         """What speaks against the causes of a candidate that are not yet `accepted`."""
-        exact = candidate.errors.is_noise and bool(self.fitter.noise.known.all())
+        noise = self.fitter.noise
+        exact = candidate.errors.is_noise and bool(noise.known.all() and not noise.guessed.any())
         return objections(self.fitter.recording, candidate.fit, accepted, exact)
 
     def with_errors(self, candidate: CandidateModel) -> CandidateModel:

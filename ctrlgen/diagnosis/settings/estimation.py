@@ -34,6 +34,9 @@ class NoiseSettings:
     converters have fewer poles."""
     shortest_stretch: int = 200
     """Samples that a stretch must have: 25 for each of eight autoregressive coefficients."""
+    quiet_share: float = 0.1
+    """Share of the differences within the band of a low-pass, the smallest, that are taken as noise alone. Judgement: a noise
+    that is too small is corrected by the residual, one that is too large hides physics."""
     dwell_degree: int = 4
     """Degree of the polynomial subtracted from a dwell. Creep and thermal lag go on there and are smooth. Judgement."""
     stated_samples: float = 1000.0
