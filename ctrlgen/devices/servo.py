@@ -6,7 +6,6 @@ from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
-
 from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit

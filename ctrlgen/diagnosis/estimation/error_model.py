@@ -89,14 +89,26 @@ def error_model(noise: Noise, records: Sequence[Record], residuals: Sequence[np.
         for record, e in zip(records, residuals, strict=True):
             white = noise.whiten(np.where(record.valid, e, 0.0), record.valid)[:, i]
             squares, count = squares + float(white @ white), count + int(noise.usable(record.valid)[:, i].sum())
-        margin = 1 + STATISTICS.noise_size_margin / np.sqrt(2 * max(noise.count[i], 1.0))
-        if count == 0 or squares / count <= (DISCREPANCY.ratio * margin) ** 2:
-            continue
+        most = (DISCREPANCY.ratio * (1 + STATISTICS.noise_size_margin / np.sqrt(2 * max(noise.count[i], 1.0)))) ** 2
         stretches = [e[r.valid[:, i], i] for r, e in zip(records, residuals, strict=True)]
+        if count == 0 or (squares / count <= most and not _slow_excess(noise, i, stretches, most)):
+            continue
         rms[i] = max(np.sqrt(np.mean(np.concatenate(stretches) ** 2)), noise.floor[i])
         if np.isfinite(records[0].sample_time):
             tau[i] = correlation_time(stretches)
     return ErrorModel(noise, rms, tau)
+
+
+def _slow_excess(noise: Noise, i: int, stretches: Sequence[np.ndarray], most: float) -> bool:
+    """Whether the mean square of residuals (n,), over that of autoregressive noise, exceeds `most` beyond chance: whitening such
+    noise takes away slow physics with it, and what is left of them looks like noise."""
+    a = noise.ar[i]
+    if not len(a):
+        return False
+    values = np.clip(np.concatenate(stretches) / noise.floor[i], -DISCREPANCY.huber_corner, DISCREPANCY.huber_corner)
+    correlated = (noise.sd[i] / noise.floor[i] / max(1 - float(np.sum(a)), 1e-3)) ** 2  # spectrum at zero over variance
+    chance = STATISTICS.chance_excess * np.sqrt(2 * max(correlated, 1.0) / max(len(values), 1))
+    return bool(np.mean(values**2) > most * (1 + chance))
 
 
 def correlation_time(stretches: Sequence[np.ndarray]) -> float:
