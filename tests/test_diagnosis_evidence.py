@@ -204,8 +204,8 @@ def test_unknown_physics_is_mapped_and_described_but_not_named():
     assert {m.coordinate for m in describe_unmodelled_force(fitter, fit, warm).maps["axis"]} - share.keys() == {
         "temperature"
     }
-    slow = axis_fitter(stop)
-    fit, left, _ = mapped(slow)
+    slow, fit = axis_fitter(stop).described(AXIS)
+    left = [linearise_along(slow, fit, r) for r in (*slow.fit_records, *slow.held_out_records)]
     term = describe_unmodelled_force(slow, fit, left).empirical_term
     assert term.label == "empirical" and term.held_out_gain > 0.7
     clean = axis_fitter()
@@ -272,8 +272,7 @@ def test_drift_and_creep_get_an_experiment_that_separates_them():
     y = y + NOISE * np.random.default_rng(9).standard_normal(len(u))
     new = Record(**{**found.record.__dict__, "observed": y[:, None]})
     parts = (*fitter.recording.records, new)
-    both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise)
-    both.cache = CACHE
+    both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise, cache=CACHE)
     gained = both.fit(drift.structure).objective - both.fit(creep.structure).objective
     assert 0.7 < gained / found.after**2 < 1.4  # measured, the proposal settles it as far as was promised
 
@@ -350,9 +349,8 @@ def test_a_gain_shows_only_at_the_price_of_what_the_device_states():
 
 def test_evidence_is_numbers_that_json_knows():
     fitter = axis_fitter(lambda t, q, v, memory: (cubic(t, q, v, 0)[0] + 0.02 * detent(t, q, v, 0)[0], 0), n=1000)
-    searcher = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None)
-    search = searcher.run(Structure(AXIS))
-    found = run_supporting_analyses(fitter, search, explained=False)
+    search = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None).run(AXIS)
+    found = run_supporting_analyses(search, explained=False)
     text = json.dumps(
         [found.residual_location, found.detectability, found.next_experiment, found.search_history, found.extra],
         allow_nan=False,
@@ -375,8 +373,7 @@ def test_noise_of_one_colour_is_taken_at_its_density():
     noise = Noise(
         np.array([NOISE * np.sqrt(1 - 0.9**2)]), (np.array([0.9]),), np.array([True]), ("given",), np.array([np.inf])
     )
-    fitter = Fitter(recording, noise)
-    fitter.cache = CACHE
+    fitter = Fitter(recording, noise, cache=CACHE)
     left = mapped(fitter)[1]
     found = estimate_unknown_input(left[0], noise, np.array([K * NOISE]))
     assert np.mean(np.abs(found.f) < 1.96 * found.sd) > 0.9

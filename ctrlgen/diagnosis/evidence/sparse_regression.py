@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.core.units import difference
+from ctrlgen.diagnosis.estimation.error_model import ErrorModel
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.evidence.regressors import Scales, features, scales_of
 from ctrlgen.diagnosis.settings import SPARSE_REGRESSION
@@ -40,8 +42,10 @@ def fit_empirical_term(fitter: Fitter, fit: Fit, models: list[LtvModel], i: int)
     """The term at axis `i` for the residual of `fit`; None where none is selected or the held-out excess does not fall."""
     to_fit = [a for a in models if a.record.role == "fit"]
     size = scales_of(to_fit, i)
-    parts = [_slopes(fitter, a, i, size) for a in to_fit]
+    parts = [_slopes(fitter.error, a, i, size) for a in to_fit]
     names, S = parts[0][1], np.vstack([values for values, _ in parts])
+    corner = np.concatenate([np.tile(fitter.error.corner, len(a.record.valid)) for a in to_fit])
+    S = S * np.minimum(1.0, corner / np.maximum(np.abs(fit.residual[: len(S)]), 1e-300))[:, None]  # as in the fit
     scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
     J, n = fit.J / scale, len(S)  # the rows below the n readings are the prior, in which no regressor appears
@@ -52,7 +56,7 @@ def fit_empirical_term(fitter: Fitter, fit: Fit, models: list[LtvModel], i: int)
     if not np.any(a):
         return None
     delta = (into @ a / scale)[: len(fit.theta)]
-    held = [_held(fitter, fit, h, _slopes(fitter, h, i, size)[0] @ a, delta) for h in models if h.record.role != "fit"]
+    held = [_held(fitter, fit, h, _slopes(fitter.noise, h, i, size)[0] @ a, delta) for h in models if h.record.role != "fit"]
     before, after = (sum(part) for part in zip(*held, strict=True))
     if not (before > 0 and 1 - after / before > SPARSE_REGRESSION.least_share):
         return None
@@ -64,11 +68,11 @@ def fit_empirical_term(fitter: Fitter, fit: Fit, models: list[LtvModel], i: int)
     )
 
 
-def _slopes(fitter: Fitter, a: LtvModel, i: int, size: Scales) -> tuple[np.ndarray, list[str]]:
+def _slopes(noise: Noise | ErrorModel, a: LtvModel, i: int, size: Scales) -> tuple[np.ndarray, list[str]]:
     """Whitened readings per unit [SI] of each regressor (n * n_y, m), and the regressors' names."""
     given = features(a, i, size)
     y = a.readings(np.column_stack(list(given.values())), np.full(len(given), i))
-    return np.nan_to_num(fitter.noise.whiten(y, a.record.valid).reshape(-1, len(given))), list(given)
+    return np.nan_to_num(noise.whiten(y, a.record.valid).reshape(-1, len(given))), list(given)
 
 
 def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n: int) -> np.ndarray:

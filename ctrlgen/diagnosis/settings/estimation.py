@@ -186,9 +186,6 @@ class FitSettings:
 class HeldOutRefitSettings:
     """Parameters refitted to the held-out records under their posterior from the fit."""
 
-    nearly_noise: float = 2.0
-    """Objective over the number of samples below which several steps are taken. A larger residual rules the structure
-    out after one."""
     max_steps: int = 4
     """Gauss-Newton steps of a comparison of structures."""
     max_steps_tests: int = 20
