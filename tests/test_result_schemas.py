@@ -25,9 +25,9 @@ EMPTY = {
 RECORD = {
     **origin({"device.toml": "0" * 64}, 7, ("a note",)),
     "verdict": "consistent", "sentence": "Consistent.", "findings": [], "shares": None,
-    "attribution": {"explained": 0.0, "rest": None, "held_out": True}, "residual_location": {"before": EMPTY, "after": EMPTY},
-        "held_out": {},
-    "detectability": {"smallest": {}, "undetectable": []}, "next_experiment": None, "search_history": [],
+    "attribution": {"explained": 0.0, "rest": None, "held_out": True},
+    "residual_location": {"before": EMPTY, "after": EMPTY}, "held_out": {},
+    "spikes": {}, "detectability": {"smallest": {}, "undetectable": []}, "next_experiment": None, "search_history": [],
 }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """The steps of a diagnosis in their order, from a validated recording to the answer.
 
 1. Channels that read one constant value are taken out (`selection.dead_channels`).
-2. The noise of every channel is estimated (`estimation.noise`), and isolated outliers are marked.
+2. The noise of every channel is estimated (`estimation.noise`), and isolated outliers are marked (`isolated_outliers`).
 3. The device as described is refitted within its stated uncertainty (`estimation.fit`).
 4. Hypotheses are listed: every effect at every location, every parameter of the device (`hypotheses`).
 5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
@@ -28,6 +28,7 @@ from ctrlgen.diagnosis.estimation.noise import Noise, estimate_noise
 from ctrlgen.diagnosis.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.diagnosis.estimation.profile_likelihood import profiles
 from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
+from ctrlgen.diagnosis.estimation.spikes import Spikes, find_spikes
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.diagnosis.selection.attribution import attribute
@@ -70,22 +71,17 @@ def diagnose_recording(
 
 
 def _diagnose(
-    device: Device,
-    recording: Recording,
-    seed: int,
-    step: Progress,
-    checkpoint: Checkpoint | None,
-    laws: Sequence[str] | None,
-) -> Diagnosis:
+    device: Device, recording: Recording, seed: int, step: Progress, checkpoint: Checkpoint | None, laws: Sequence[str] | None
+) -> Diagnosis:  # fmt: skip
     effects = selected_laws(laws)
     recording = _relative_ambient(_with_both_roles(recording))
     step("noise")
     live = without_dead_channels(device, recording, effects)
-    fitter = _with_noise(device, Fitter(live.recording, _noise(device, live.recording), checkpoint))
+    fitter = _without_outliers(device, Fitter(live.recording, _noise(device, live.recording), checkpoint))
+    fitter = _with_noise(device, fitter)
     known = fitter.noise.known
     suspected = _hypotheses(device, live.recording, effects)
     step(f"refit of the device as described, {len(suspected)} hypotheses")
-    fitter, outliers = _without_outliers(device, fitter)
     search = Searcher(fitter, Screen(fitter, suspected, seed), step).run(device)
     step("residual tests")
     tests = run_residual_tests(search.fitter, search.chosen.fit)
@@ -95,7 +91,8 @@ def _diagnose(
     step("supporting analyses")
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
-    notes = _notes(search, live.notes, outliers, tests.restless, laws, effects)
+    spikes = find_spikes(search.fitter, search.chosen.fit, known)
+    notes = _notes(search, live.notes, spikes, tests.restless, laws, effects)
     return Diagnosis(
         verdict=answer,
         findings=(*findings(search, attribution, likelihoods), *detected),
@@ -103,17 +100,14 @@ def _diagnose(
         shares=residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed),
         held_out=held_out_errors(search, known),
         residual_tests=tests,
-        residual_location=analyses.residual_location,
-        detectability=analyses.detectability,
-        next_experiment=analyses.next_experiment,
-        search_history=analyses.search_history,
+        spikes=spikes,
         notes=notes,
         device=device,
         recording=search.fitter.recording,
         search=search,
         fitter=search.fitter,
         profiles=likelihoods,
-        extra=analyses.extra,
+        **vars(analyses),
     )
 
 
@@ -141,15 +135,14 @@ def _with_noise(device: Device, fitter: Fitter) -> Fitter:
     return fitter
 
 
-def _without_outliers(device: Device, fitter: Fitter) -> tuple[Fitter, str]:
-    """The fitter without samples that lie off the prediction of the device as described alone, and a note on them."""
+def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
+    """The fitter without samples that lie off the prediction of the device as described alone."""
     weighed, described = fitter.described(device)
-    recording, note = mark_outliers(fitter.recording, lambda record: weighed.predict(described, record))
-    return replace(fitter, recording=recording), note
+    return replace(fitter, recording=mark_outliers(fitter.recording, lambda record: weighed.predict(described, record)))
 
 
 def _notes(
-    search: SearchResult, live: Sequence[str], outliers: str, restless: Sequence[str], laws: Sequence[str] | None,
+    search: SearchResult, live: Sequence[str], spikes: Sequence[Spikes], restless: Sequence[str], laws: Sequence[str] | None,
     effects: Sequence[type[Effect]],
 ) -> tuple[str, ...]:  # fmt: skip
     """What was done to the recording, what is known of its noise, and what could not be tried."""
@@ -158,7 +151,7 @@ def _notes(
         *search.fitter.recording.notes,
         *live,
         *search.fitter.noise.notes,
-        *([outliers] if outliers else []),
+        *(s.sentence for s in spikes),
         *map(RESTLESS.format, restless),
         *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
         *(f"could not be tried: {text}" for text in failed),

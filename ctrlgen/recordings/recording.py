@@ -18,7 +18,8 @@ class Record:
     `linear`: the drive is linear between samples; otherwise it is held. `ambient` (n,) [K], None where not given. `period`
     [s] after which the drive is stated to repeat, None where it is not. `band` [Hz]: cut-off of the low-pass that every
     column passed, half of the amplitude there and less than a hundredth an octave above; None where nothing was filtered.
-    Half of `1/sample_time` is the highest frequency that the rows can hold.
+    Half of `1/sample_time` is the highest frequency that the rows can hold. `spikes`: row, channel and deviation [SI] from its
+    neighbours of each outlier that was marked.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Record:
     valid: np.ndarray
     period: float | None = None
     band: float | None = None
+    spikes: tuple[tuple[int, int, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

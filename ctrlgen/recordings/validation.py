@@ -235,7 +235,7 @@ def _rows(record: Record, a: int, b: int) -> Record:
     ambient = None if record.ambient is None else record.ambient[a:b]
     return replace(
         record, time=record.time[a:b], drive=record.drive[a:b], observed=record.observed[a:b], valid=record.valid[a:b],
-        ambient=ambient,
+        ambient=ambient, spikes=tuple((k - a, i, size) for k, i, size in record.spikes if a <= k < b),
     )  # fmt: skip
 
 
@@ -269,6 +269,7 @@ def _mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) 
     """The record with outliers and stuck stretches NaN and not valid; a note for each kind of mark and for dead channels."""
     observed, valid = record.observed.copy(), record.valid.copy()
     notes: list[str] = []
+    spikes: list[tuple[int, int, float]] = []
     for i, name in enumerate(names.observed):
         if not recorded[i]:
             continue
@@ -282,14 +283,21 @@ def _mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) 
         elif kind == "series":
             stuck = stuck_samples(y, record.drive)
             marks["in stretches that repeat one value to the last bit (stuck or clipped)"] = stuck
-            marks["outliers"] = outliers(np.where(stuck, np.nan, y), record.drive)
+            marks["outliers"] = far = outliers(np.where(stuck, np.nan, y), record.drive)
+            spikes += [(k, i, float(y[k] - chord)) for k, chord in _chords(y, far)]
         for what, chosen in marks.items():
             if chosen.any():
                 first = f"{record.time[chosen.argmax()]:.6g} s" if kind == "series" else f"row {chosen.argmax()}"
                 notes.append(f"{title}: {chosen.sum()} of {len(y)} samples are {what} (first at {first}); not used.")
                 valid[chosen, i] = False
         observed[~valid[:, i], i] = np.nan
-    return replace(record, observed=observed, valid=valid), notes
+    return replace(record, observed=observed, valid=valid, spikes=tuple(spikes)), notes
+
+
+def _chords(y: np.ndarray, marked: np.ndarray) -> list[tuple[int, float]]:
+    """Row and value on the chord between its neighbours of each `marked` sample of `y` (n,)."""
+    rows, kept = np.flatnonzero(marked), np.flatnonzero(~marked & np.isfinite(y))
+    return list(zip(rows.tolist(), np.interp(rows, kept, y[kept]).tolist(), strict=True)) if len(kept) else []
 
 
 def compare_records(records: Sequence[Record], wheres: Sequence[str], names: ChannelNames) -> list[Fault]:

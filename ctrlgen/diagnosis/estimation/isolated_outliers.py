@@ -15,25 +15,24 @@ from ctrlgen.diagnosis.settings import OUTLIERS, STATISTICS
 from ctrlgen.recordings.recording import Record, Recording
 
 
-def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> tuple[Recording, str]:
-    """The recording with outliers of the residual, observed minus `predicted` (n, n_y), marked not valid, and a note.
+def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> Recording:
+    """The recording with outliers of the residual, observed minus `predicted` (n, n_y), marked not valid, and their sizes in
+    `Record.spikes`.
 
     Series only: a mechanism cannot leave and return within two samples, so no physics is taken away; settled poses have no
-    neighbours in time. Records at rest are left as they are. The note is empty where nothing is marked.
+    neighbours in time. Records at rest are left as they are.
     """
     if recording.kind == "poses":
-        return recording, ""
-    records, count = [], 0
-    for record in recording.records:
-        if record.role == "rest":
-            records.append(record)
-            continue
-        residual = np.where(record.valid, record.observed - predicted(record), 0.0)
-        marked = record.valid & isolated_outliers(np.nan_to_num(residual))
-        count += int(marked.sum())
-        records.append(replace(record, valid=record.valid & ~marked) if marked.any() else record)
-    note = f"{count} samples lie off the model's prediction alone, without their neighbours: taken for sensor faults, not used."
-    return replace(recording, records=tuple(records)), note if count else ""
+        return recording
+    records = [r if r.role == "rest" else _marked(r, predicted(r)) for r in recording.records]
+    return replace(recording, records=tuple(records))
+
+
+def _marked(record: Record, predicted: np.ndarray) -> Record:
+    residual = np.nan_to_num(np.where(record.valid, record.observed - predicted, 0.0))
+    marked = record.valid & isolated_outliers(residual)
+    found = tuple((int(k), int(i), float(residual[k, i])) for k, i in np.argwhere(marked))
+    return replace(record, valid=record.valid & ~marked, spikes=(*record.spikes, *found)) if found else record
 
 
 def isolated_outliers(residual: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 from ctrlgen.core.to_json import plain
+from ctrlgen.diagnosis.estimation.spikes import Spikes
 from ctrlgen.diagnosis.report.narrative import sentence
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import Share
@@ -37,6 +38,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> dict[str, 
         "shares": _shares(diagnosis),
         "residual_location": diagnosis.residual_location,
         "held_out": {channel: dataclasses.asdict(error) for channel, error in diagnosis.held_out.items()},
+        "spikes": {s.channel: _spikes(s) for s in diagnosis.spikes},
         "detectability": diagnosis.detectability,
         "next_experiment": diagnosis.next_experiment,
         "search_history": diagnosis.search_history,
@@ -56,6 +58,13 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "alternatives": [{"effect": h.effect, "location": h.location, "of": h.of} for h in finding.alternatives],
         "source": finding.source,
     }
+
+
+def _spikes(spikes: Spikes) -> dict[str, Any]:
+    return {
+        "count": spikes.count, "samples": spikes.samples, "per_thousand": spikes.per_thousand, "size": spikes.size,
+        "unit": spikes.unit, "in_noise": spikes.in_noise,
+    }  # fmt: skip
 
 
 def _shares(diagnosis: Diagnosis) -> dict[str, Any] | None:

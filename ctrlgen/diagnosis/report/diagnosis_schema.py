@@ -148,6 +148,17 @@ class SharesEntry(Keys):
     after: SharesTableEntry = Field(description="Of what the model with the findings leaves.")
 
 
+class SpikesEntry(Keys):
+    """Isolated outliers of one channel: faults of its sensor, which count for nothing else."""
+
+    count: int = Field(description="How many.")
+    samples: int = Field(description="Among so many samples.")
+    per_thousand: Number = Field(description="In a thousand samples.")
+    size: Number = Field(description="Median magnitude [unit].")
+    unit: str = Field(description="Unit of size.")
+    in_noise: Number = Field(description="Size in standard deviations of the noise; null where that is not known.")
+
+
 class ResidualPartEntry(Keys):
     """The residual in one part of the recording."""
 
@@ -352,6 +363,9 @@ class DiagnosisRecord(Origin):
     )
     residual_location: ResidualLocations = Field(description="Where the residual is large, before and after.")
     held_out: dict[str, ChannelErrorEntry] = Field(description="Errors on the held-out records, by channel.")
+    spikes: dict[str, SpikesEntry] = Field(
+        description="Isolated outliers by channel; channels without any are left out."
+    )
     detectability: DetectabilityEntry = Field(description="What this recording could have shown besides.")
     next_experiment: NextExperimentEntry | None = Field(description="Null where no drive would decide anything.")
     search_history: list[RoundEntry] = Field(description="Rounds of the search.")

@@ -80,6 +80,13 @@ def _detected(
 def _only(recording: Recording, kept: list[int]) -> Recording:
     """The recording of these channels alone."""
     channels, units = (tuple(row[i] for i in kept) for row in (recording.channels, recording.units))
-    noise = tuple(recording.noise[i] for i in kept)
-    records = tuple(replace(r, observed=r.observed[:, kept], valid=r.valid[:, kept]) for r in recording.records)
-    return replace(recording, channels=channels, units=units, noise=noise, records=records)
+    noise, tolerance = (tuple(row[i] for i in kept) for row in (recording.noise, recording.tolerance))
+    place = {i: k for k, i in enumerate(kept)}
+    records = tuple(
+        replace(
+            r, observed=r.observed[:, kept], valid=r.valid[:, kept],
+            spikes=tuple((row, place[i], size) for row, i, size in r.spikes if i in place),
+        )
+        for r in recording.records
+    )  # fmt: skip
+    return replace(recording, channels=channels, units=units, noise=noise, tolerance=tolerance, records=records)

@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.estimation.prediction_uncertainty import prediction_uncer
 from ctrlgen.diagnosis.estimation.profile_likelihood import Profile
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
+from ctrlgen.diagnosis.estimation.spikes import Spikes
 from ctrlgen.diagnosis.estimation.structure import Structure, changed
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, written
 from ctrlgen.diagnosis.selection.attribution import Attribution, Share
@@ -83,7 +84,7 @@ class Diagnosis:
     """The answer: verdict, findings and supporting analyses; `search` and `fitter` hold how it was found.
 
     attribution: shares of the causes and of the rest. shares: of what the residual is a function, whatever the law, before and
-    after; None where the records are too short.
+    after; None where the records are too short. spikes: isolated outliers, of the channels that have some.
     """
 
     verdict: str
@@ -96,6 +97,7 @@ class Diagnosis:
     detectability: dict[str, Any]
     next_experiment: dict[str, Any] | None
     search_history: tuple[dict[str, Any], ...]
+    spikes: tuple[Spikes, ...]
     notes: tuple[str, ...]
     device: Device
     recording: Recording

@@ -129,6 +129,11 @@ class OutlierSettings:
     """Samples of one outlier. A mechanism cannot leave and return within two samples."""
     neighbour_share: float = 0.3
     """Share of an outlier that the samples beside it may have: a mass that is pushed moves before and after. Judgement."""
+    beyond_noise: float = 4.0
+    """Standard deviations of the whitened residual from which an isolated sample is counted as a small spike: normal noise has
+    one in 16 000."""
+    beyond_noise_p: float = 1e-4
+    """Probability that normal noise has so many of them, below which they are told: a few dozen channels are looked at."""
 
 
 @dataclass(frozen=True)
