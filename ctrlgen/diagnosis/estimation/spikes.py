@@ -38,7 +38,7 @@ class Spikes:
         beside = "" if self.in_noise is None else f" ({self.in_noise:.2g} standard deviations of the noise)"
         return (
             f"{self.channel}: {self.per_thousand:.2g} of 1000 samples are spikes of typically {self.size:.3g} {self.unit}{beside}; "
-            "a fault of the sensor or its cable, which counts for nothing else here"
+            "taken for faults of the sensor, which change nothing else here"
         )
 
 

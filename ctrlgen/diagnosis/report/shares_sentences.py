@@ -8,14 +8,14 @@ from ctrlgen.diagnosis.selection.verdict import CONSISTENT
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
 from ctrlgen.diagnosis.shares.regressors import Kind
-from ctrlgen.diagnosis.shares.result import ChannelShares, SharesTable
+from ctrlgen.diagnosis.shares.result import ChannelShares, Share, SharesTable
 
 NAMED = 3  # kinds that a sentence names
 FAMILIES = 2  # families of laws that a sentence names
 CONSTANT, NUMBERS = "a constant", "what other values of the device's own numbers would take away"
 NAMES = {
     Kind.DIRECTION: "the direction of motion",
-    Kind.PROPORTION: "position, in proportion to it",
+    Kind.PROPORTION: "a part in proportion to position",
     Kind.PITCH: "the place in a pitch",
     Kind.RATE: "the rate of the reading",
     Kind.TRAVEL_HISTORY: "the history of travel",
@@ -38,7 +38,7 @@ def shares_sentences(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.search.chosen.causes:
         return [f"{said}; no law of the library is confirmed for it."]
     reached = shares.reached(worst.channel)
-    sentences = [f"{said}; the accepted laws reach {per_cent(reached.share)} ({interval(reached.ci95)})."]
+    sentences = [f"{said}; the accepted laws reach {with_interval(reached)}."]
     if not diagnosis.residual_tests.passed:
         sentences.append(rest_sentence(worst_of(diagnosis, shares.after)))
     return sentences
@@ -66,7 +66,7 @@ def ceiling_sentence(c: ChannelShares) -> str:
     parts = named_parts(c)
     if not parts:
         return f"No signal explains more than {per_cent(SHARES.told)} {leaves}"
-    total = f"{per_cent(c.total.share)} ({interval(c.total.ci95)})"
+    total = with_interval(c.total)
     if len(parts) == 1:
         return f"{_capital(parts[0][0])} explains {total} {leaves}"
     listed = [f"{name} ({per_cent(share)})" for name, share in parts[:NAMED]]
@@ -84,7 +84,7 @@ def rest_sentence(c: ChannelShares) -> str:
         told = f": {', '.join(beside)}" if beside else ""
         return f"{left} is mostly a function of none of the signals looked at{told}."
     memory = f"; {memory}" if memory else ""
-    if name in (CONSTANT, NUMBERS, NAMES[Kind.RECORD]):
+    if name in (CONSTANT, NUMBERS, NAMES[Kind.RECORD], NAMES[Kind.PROPORTION]):
         return f"{left} is {_mostly(share)} {name}, {per_cent(share)}{memory}."
     row = max(c.selected, key=lambda row: row.additional)
     families = [f.value for f in SPEAKS_FOR[row.kind][0][:FAMILIES]]
@@ -113,6 +113,12 @@ def per_cent(share: float) -> str:
     """'85 %'; '99.4 %' near the whole."""
     value = 100 * share
     return f"{value:.0f} %" if abs(value) < 99 or round(value, 1) == 100 else f"{value:.1f} %"
+
+
+def with_interval(share: Share) -> str:
+    """'85 % (80 ... 88 %)'; without the interval where its ends show as the share itself."""
+    value, ends = per_cent(share.share), interval(share.ci95)
+    return value if ends == f"{value.removesuffix(' %')} ... {value}" else f"{value} ({ends})"
 
 
 def interval(ci95: tuple[float, float]) -> str:
