@@ -84,7 +84,7 @@ def error_model(noise: Noise, records: Sequence[Record], residuals: Sequence[np.
     only the misfit tells the noise, there is nothing to tell discrepancy from.
     """
     rms, tau = np.zeros(len(noise.sd)), np.ones(len(noise.sd))
-    for i in np.flatnonzero(noise.known):
+    for i in np.flatnonzero(noise.known).tolist():
         squares, count = 0.0, 0
         for record, e in zip(records, residuals, strict=True):
             white = noise.whiten(np.where(record.valid, e, 0.0), record.valid)[:, i]

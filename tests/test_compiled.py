@@ -1,0 +1,76 @@
+"""Functions compiled to machine code: the same numbers to the last bit, kept in the cache, and none where there is no compiler."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from ctrlgen.numerics import compiled
+from ctrlgen.numerics.batched_evaluation import Recursion
+from ctrlgen.numerics.compiled import Compilable
+
+LONG = 1e6  # seconds that would pay for any compilation
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("CTRLGEN_NO_COMPILER", raising=False)
+    compiled.compiler.cache_clear()
+    yield tmp_path / "ctrlgen"
+    compiled.compiler.cache_clear()
+
+
+def friction():
+    """A step with a state, a corner and transcendental functions."""
+    z, v, p = ca.SX.sym("z"), ca.SX.sym("v"), ca.SX.sym("p", 2)
+    after = z + p[0] * (v - z * ca.fabs(v) / p[1])
+    return ca.Function("one", [z, v, p], [after, ca.vertcat(ca.tanh(after), ca.exp(-after) * v)])
+
+
+def test_library_gives_the_numbers_of_the_virtual_machine_to_the_last_bit(cache):
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    rng = np.random.default_rng(1)
+    v, p = rng.standard_normal((1700, 1)), np.tile([0.3, 0.7], (1700, 1))
+    plain = Recursion(friction()).run(np.zeros(1), v, p)
+    quick = Recursion(friction())
+    quick.run(np.zeros(1), v, p)
+    assert quick.one.spent(LONG)
+    quick.unrolled.clear()
+    for a, b in zip(plain, quick.run(np.zeros(1), v, p), strict=True):
+        assert np.array_equal(a, b)
+    assert len(list(cache.glob("*.so"))) == 1
+
+
+def test_same_function_is_compiled_once(cache, monkeypatch):
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    assert Compilable(friction()).spent(LONG)
+    monkeypatch.setattr(compiled.subprocess, "run", lambda *_, **__: pytest.fail("compiled again"))
+    assert Compilable(friction()).spent(0.06)  # a library that is there costs nothing
+
+
+def test_function_that_hardly_runs_is_not_compiled(cache):
+    short = Compilable(friction())
+    assert not short.spent(1e-3)
+    assert not cache.exists()
+
+
+def test_without_a_compiler_nothing_changes(cache, monkeypatch):
+    monkeypatch.setenv("CTRLGEN_NO_COMPILER", "1")
+    compiled.compiler.cache_clear()
+    function = friction()
+    slow = Compilable(function)
+    assert not slow.spent(LONG)
+    assert slow.function is function
+
+
+def test_failing_compiler_leaves_the_virtual_machine(cache, monkeypatch):
+    monkeypatch.setattr(compiled, "FLAGS", ("--no-such-flag",))
+    broken = Compilable(friction())
+    if compiled.compiler() is not None:
+        assert not broken.spent(LONG)
+        assert not list(cache.glob("*.so"))
+        assert not broken.spent(LONG)
