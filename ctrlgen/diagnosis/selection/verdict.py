@@ -53,11 +53,25 @@ def within_tolerance(search: SearchResult) -> bool:
 
 
 def main_rivals(search: SearchResult, shares: Attribution) -> bool:
-    """Whether a cause with a share near the largest has a rival."""
+    """Whether a cause with a share near the largest has a rival of other physics.
+
+    Where more than noise is left, laws of one family at one place are one answer: a discrepancy of any model hides which of them
+    it is.
+    """
     largest = max((s.value for s in shares.shares if s), default=0.0)
+    exact = search.chosen.errors.is_noise
     return any(
-        rivals and (share is None or share.value >= VERDICT.main_share * largest)
-        for rivals, share in zip(search.rivals, shares.shares, strict=True)
+        any(exact or not _one_family(cause, r.cause) for r in rivals)
+        and (share is None or share.value >= VERDICT.main_share * largest)
+        for cause, rivals, share in zip(search.chosen.causes, search.rivals, shares.shares, strict=True)
+    )
+
+
+def _one_family(cause: Hypothesis, rival: Hypothesis | None) -> bool:
+    return (
+        rival is not None
+        and cause.family is not None
+        and (rival.family, rival.location) == (cause.family, cause.location)
     )
 
 
