@@ -56,7 +56,9 @@ def fit_empirical_term(fitter: Fitter, fit: Fit, models: list[LtvModel], i: int)
     if not np.any(a):
         return None
     delta = (into @ a / scale)[: len(fit.theta)]
-    held = [_held(fitter, fit, h, _slopes(fitter.noise, h, i, size)[0] @ a, delta) for h in models if h.record.role != "fit"]
+    held = [
+        _held(fitter, fit, h, _slopes(fitter.noise, h, i, size)[0] @ a, delta) for h in models if h.record.role != "fit"
+    ]
     before, after = (sum(part) for part in zip(*held, strict=True))
     if not (before > 0 and 1 - after / before > SPARSE_REGRESSION.least_share):
         return None

@@ -24,6 +24,7 @@ from ctrlgen.diagnosis.report.narrative import (
 from ctrlgen.diagnosis.report.plots import draw_all
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, per_cent, shares_sentences
 from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
+from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.reporting.html import render
 
 CAPTIONS = {
@@ -89,10 +90,12 @@ def _families(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """Families of laws with the share that they could account for before and after, the largest before first."""
     if diagnosis.shares is None:
         return []
-    after = dict(family_shares(diagnosis, diagnosis.shares.after))
+    before, after = (dict(family_shares(diagnosis, t)) for t in (diagnosis.shares.before, diagnosis.shares.after))
+    shares = {family: (before.get(family, 0.0), after.get(family, 0.0)) for family in {**before, **after}}
     return [
-        {"name": family.value, "before": per_cent(share), "after": per_cent(after.get(family, 0.0))}
-        for family, share in family_shares(diagnosis, diagnosis.shares.before)
+        {"name": family.value, "before": per_cent(first), "after": per_cent(then)}
+        for family, (first, then) in shares.items()
+        if max(first, then) >= SHARES.least_gain
     ]
 
 

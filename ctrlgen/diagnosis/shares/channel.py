@@ -146,8 +146,10 @@ def rates_of(signals: Sequence[Signals], channel: str, blocks: Blocks) -> np.nda
     return np.column_stack([blocks.drawn(first), blocks.drawn(second)])
 
 
-def forward_selection(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> tuple[list[Kind], OutOfBlock]:
-    """The selected kinds in the order in which each adds most, and their joint prediction.
+def forward_selection(
+    channel: ChannelSmoothers, kinds: Sequence[Kind], everything: OutOfBlock
+) -> tuple[list[Kind], OutOfBlock]:
+    """The selected kinds in the order in which each adds most, and their joint prediction; `everything` is that of all kinds.
 
     The record comes after all others: a constant for each record stands in for whatever differs between them, such as the
     direction of motion where each moves one way.
@@ -155,12 +157,12 @@ def forward_selection(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> tuple
     chosen: list[Kind] = []
     now = channel.base
     for offered in ([kind for kind in kinds if kind is not Kind.RECORD], kinds):
-        chosen, now = _selected(channel, offered, chosen, now)
+        chosen, now = _selected(channel, offered, everything, chosen, now)
     return _in_order(channel, chosen), now
 
 
 def _selected(
-    channel: ChannelSmoothers, kinds: Sequence[Kind], chosen: list[Kind], now: OutOfBlock
+    channel: ChannelSmoothers, kinds: Sequence[Kind], everything: OutOfBlock, chosen: list[Kind], now: OutOfBlock
 ) -> tuple[list[Kind], OutOfBlock]:
     """The selection that goes on from `chosen`, which predict `now`.
 
@@ -169,7 +171,6 @@ def _selected(
     pairs are tried: a function of place and one of the direction may show only together. After each step a kind that
     contains what others say, as the history of travel contains direction and position, gives way to a simpler one, or to none.
     """
-    everything = channel.fit(kinds)
     while len(chosen) < SHARES.most_steps and (left := [kind for kind in kinds if kind not in chosen]):
         remains = channel.folds.left(now, channel.every_fold)
         alone = {kind: channel.fit([kind], remains).squares.sum() for kind in left}

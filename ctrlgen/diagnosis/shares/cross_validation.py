@@ -54,6 +54,7 @@ class FoldsOfChannel:
     def __init__(self, common: Folds, extra: Sequence[np.ndarray]) -> None:
         self.common, self.n_common = common, len(common.X)
         self.extra = [np.ascontiguousarray(E.T) for E in extra]
+        self._known: tuple[np.ndarray, list[np.ndarray]] | None = None
         self.gram, self.mean, self.tested = [], [], []
         for k, E in enumerate(self.extra):
             train, test = common.train[k], common.test[k]
@@ -96,6 +97,16 @@ class FoldsOfChannel:
 
         return of_fold
 
+    def _products(self, targets: np.ndarray) -> list[np.ndarray]:
+        """sum over the training samples of x y for every column, one (P,) a fold; those of the last targets are kept."""
+        if self._known is None or self._known[0] is not targets:
+            known = []
+            for k, (train, y) in enumerate(zip(self.common.train, targets, strict=True)):
+                seen = np.where(train, y, 0.0)
+                known.append(np.concatenate([self.common.X @ seen, self.extra[k] @ seen]))
+            self._known = targets, known
+        return self._known[1]
+
     def _tested(self, columns: np.ndarray, k: int) -> np.ndarray:
         """The chosen columns of the test samples of fold k, clamped to what the others have seen."""
         shared = columns < self.n_common
@@ -107,14 +118,15 @@ class FoldsOfChannel:
     def _fit(self, columns: np.ndarray, targets: np.ndarray, n_free: int) -> OutOfBlock:
         """The fit of which the first `n_free` columns are free."""
         common, is_free = self.common, np.arange(len(columns)) < n_free
+        products = self._products(targets) if len(columns) else [np.zeros(0)] * common.count
         found = np.zeros((len(SHARES.ridges), targets.shape[1]))
-        models, X_of = [], self._columns(columns)
+        models = []
         for k in range(common.count):
-            train, test, y, X = common.train[k], common.test[k], targets[k], X_of(k)
+            train, test, y = common.train[k], common.test[k], targets[k]
             n, level = int(train.sum()), float(y[train].mean())
             mean = self.mean[k][columns]
             G = self.gram[k][np.ix_(columns, columns)] / n - np.outer(mean, mean)
-            c = X @ np.where(train, y - level, 0.0) / n
+            c = products[k][columns] / n - level * mean
             tested = self._tested(columns, k) - mean[:, None]
             slopes = []
             for i, ridge in enumerate(SHARES.ridges):

@@ -84,7 +84,8 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
     usable, total = channel.common.usable, max(float(channel.energy.sum()), 1e-300)
     alone = {kind: channel.fit([kind]) for kind in channel.kinds}
     named = [kind for kind in channel.kinds if kind is not Kind.PAST]
-    selected, joint = forward_selection(channel, named)
+    everything = channel.fit(named)
+    selected, joint = forward_selection(channel, named, everything)
     rows, before = [], channel.base
     for place, kind in enumerate(selected, 1):
         after = channel.fit(selected[:place])
@@ -101,7 +102,7 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
             rows.append(KindShare(kind, channel.share(channel.base, fit), gain, None, ()))
     rows.sort(key=lambda row: (row.kind is Kind.PAST, -row.alone.share))
     # all columns at once cost more than they tell where there are few blocks
-    whole = max((channel.whole_share(f) for f in (channel.fit(named), joint)), key=lambda s: s.share)
+    whole = max((channel.whole_share(f) for f in (everything, joint)), key=lambda s: s.share)
     return ChannelShares(
         channel=name,
         rms=float(np.sqrt(total / usable.sum())),
