@@ -63,9 +63,10 @@ def logarithmic(s, p):
 
 
 def weighted(s, p, here):
-    """sum_j w_j (here - play_j)."""
-    w = np.arange(1, 9) ** -p.taper
-    return float(w @ [here - getattr(s, f"play{j}") for j in range(1, 9)]) / w.sum()
+    """sum_j w_j (here - play_j); each play is counted from where it began, at a share of its radius."""
+    j = np.arange(1, 9)
+    w, began = j**-p.taper, np.clip(s.start, -1, 1) * p.reach * j / 8
+    return float(w @ (here - began - [getattr(s, f"play{k}") for k in j])) / w.sum()
 
 
 def dahl_rate(s, p):
@@ -100,7 +101,7 @@ LAWS = {
         lambda s, p: -p.stiffness * s.z * (1 + p.skew * s.displacement / np.hypot(s.displacement, s.travel)),
     ),
     "asymmetric_viscous": ({}, lambda s, p: -abs(p.damping) * max(s.velocity * sign(p.damping), 0) * sign(p.damping)),
-    "backlash": ({}, lambda s, p: 0.999 * (s.w - s.displacement)),
+    "backlash": ({}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
     "bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.stiffness * s.z),
     "bow": ({}, lambda s, p: p.curvature * s.value**2),
     "clock_offset": None,  # below: it shifts the recorded drive
@@ -123,6 +124,8 @@ LAWS = {
     "drift": ({}, lambda s, p: p.rate * s.t),
     "drive_gain": ({}, lambda s, p: p.gain * s.value),
     "drive_hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.share * weighted(s, p, s.value)),
+    "displacement_bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.share * s.z),
+    "displacement_hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.share * weighted(s, p, s.value)),
     "drive_offset": ({}, lambda s, p: p.offset),
     "end_stop": ({"gap": -0.4, "power": 1.5}, stop),
     "expansion": ({}, lambda s, p: p.slope * (s.state - s.rest) * s.value),

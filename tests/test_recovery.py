@@ -334,6 +334,46 @@ def test_of_heaters_with_a_second_lag():
     recover(poses_of(parts, "series"), hexapod(), "second_pole", Planted("actuator:all", {"share": 0.1, "tau": 0.05}))
 
 
+def played(u, radius=2e-5):
+    """A fifth of the way through two hundred plays, which stood at the upper end when the record began."""
+    radii = radius * (np.arange(200) + 0.5) / 200
+    play, out = radii.copy(), []
+    for d in u:
+        play = np.clip(play, d - radii, d + radii)
+        out.append(0.8 * d + 0.2 * play.mean())
+    return np.array(out)
+
+
+def yielding(u):
+    """d - z/5, dz = dd (1 - (4e4 sgn(dd z) + 1e4)|z|/m), in two hundred steps from pose to pose."""
+    z, before, out = 0.0, 0.0, []
+    for d in u:
+        step = (d - before) / 200
+        for _ in range(200):
+            z += step * (1 - (4e4 * np.sign(step * z) + 1e4) * abs(z))
+        before = d
+        out.append(d - 0.2 * z)
+    return np.array(out)
+
+
+IN_ORDER = {  # of poses, whose order is the memory
+    "displacement_hysteresis": (played, Planted("stage:axis", {"share": 0.2, "reach": 2e-5}, within={"share": 0.1, "reach": 0.1})),
+    "displacement_bouc_wen": (yielding, Planted("stage:axis", {"share": 0.2, "reach": 2e-5, "loop": 0.8}, within={"loop": 0.05})),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("effect", IN_ORDER)
+def test_of_poses_one_after_the_other(effect):
+    rng, (law, planted) = np.random.default_rng(9), IN_ORDER[effect]
+    table = {"kind": "servo", "name": "servo", "title": "an axis", "source": "round numbers", "travel": "100 um"}
+    device, parts = validate(Device.library["servo"], table, "device"), []
+    for n, role in ((120, "fit"), (60, "hold_out")):
+        u = rng.uniform(-1e-4, 1e-4, n)
+        parts.append(record(u, law(u) + SHIFTED * rng.standard_normal(n), role, h=np.inf))
+    fitter = fitter_of(device, ("reading.axis",), ("um",), (SHIFTED,), "poses", parts)
+    recover(fitter, device, effect, planted)
+
+
 def test_of_a_table_out_of_balance():
     rng, device = np.random.default_rng(6), load_device(SCENARIOS / "rotary_axis" / "device.toml")
     parts = []

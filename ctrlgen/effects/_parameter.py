@@ -35,7 +35,8 @@ class Param:
 class State:
     """A memory of the effect, zero at rest; `scale` is a typical size in `unit`, counted as in `Param`.
 
-    A `stepped` one changes once a sample, by `update`; a `clock` is the time since the record's common zero.
+    A `stepped` one changes once a sample, by `update`; a `clock` is the time since the record's common zero. With what a
+    `free` one begins is unknown and differs by record: a diagnosis fits it there; elsewhere it begins at zero.
     """
 
     name: str
@@ -43,6 +44,7 @@ class State:
     scale: float
     stepped: bool = False
     clock: bool = False
+    free: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """Weighted play operators of several widths: the elements of rate-independent hysteresis (Prandtl-Ishlinskii).
 
-`hysteresis` of a stage and `drive_hysteresis` of a piezo stack share these expressions and stay two laws: the one is a restoring
-force that slips with the displacement and places reversals between samples, the other a lag of the drive itself, so that their
-terms, units and parameters differ. `asymmetric_hysteresis` and `bouc_wen` are differential laws without plays.
+`hysteresis` of a stage, `drive_hysteresis` of a piezo stack and `displacement_hysteresis` of a stage in balance
+share these expressions and stay three laws: the first is a restoring force that slips with the displacement and places
+reversals between samples, the others are lags of a signal itself, so that their terms, units and parameters differ.
+`asymmetric_hysteresis` and `bouc_wen` are differential laws without plays.
 """
 
 from __future__ import annotations
@@ -11,25 +12,47 @@ from types import SimpleNamespace
 
 import casadi as ca
 
+from ctrlgen.effects._parameter import State
+
 ELEMENTS = 8
 
 
-def play_names() -> list[str]:
-    """Names of the states that hold the plays P_1 to P_8."""
-    return [f"play{j}" for j in range(1, ELEMENTS + 1)]
+def play_states(unit: str) -> tuple[State, ...]:
+    """The plays of a signal in `unit`, counted from where they begin, and `start`: P_j begins at start r_j.
+
+    At rest in the middle start is 0; after a long way down it is 1, after a long way up -1.
+    """
+    plays = (State(name, unit, 1.0, stepped=True) for name in _play_names())
+    return (*plays, State("start", "1", 1.0, stepped=True, free=True))
 
 
-def weighted_lag(s: SimpleNamespace, value: ca.SX, taper: ca.SX) -> ca.SX:
+def beginning(s: SimpleNamespace, radius: ca.SX) -> ca.SX:
+    """Where a play of this `radius` begins: within it."""
+    return radius * ca.fmax(ca.fmin(s.start, 1.0), -1.0)
+
+
+def weighted_lag(s: SimpleNamespace, value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
     """sum_j w_j (value - P_j), w_j ~ j^-taper, sum w_j = 1."""
     weights = [float(j) ** -taper for j in range(1, ELEMENTS + 1)]
-    return sum(w * (value - getattr(s, name)) for w, name in zip(weights, play_names(), strict=True)) / sum(weights)
+    plays = (getattr(s, name) + beginning(s, r) for name, r in zip(_play_names(), _radii(reach), strict=True))
+    return sum(w * (value - play) for w, play in zip(weights, plays, strict=True)) / sum(weights)
 
 
 def updated_plays(s: SimpleNamespace, path: list[ca.SX], reach: ca.SX) -> dict[str, ca.SX]:
     """The plays after the input has taken the values of `path` in turn: P_j stays within r_j = reach j/8 of each value."""
-    new = {}
-    for j, name in enumerate(play_names(), start=1):
-        radius, new[name] = reach * j / ELEMENTS, getattr(s, name)
+    new = {"start": s.start}
+    for name, radius in zip(_play_names(), _radii(reach), strict=True):
+        first = beginning(s, radius)
+        play = getattr(s, name) + first
         for value in path:
-            new[name] = ca.fmax(ca.fmin(new[name], value + radius), value - radius)
+            play = ca.fmax(ca.fmin(play, value + radius), value - radius)
+        new[name] = play - first
     return new
+
+
+def _play_names() -> list[str]:
+    return [f"play{j}" for j in range(1, ELEMENTS + 1)]
+
+
+def _radii(reach: ca.SX) -> list[ca.SX]:
+    return [reach * j / ELEMENTS for j in range(1, ELEMENTS + 1)]

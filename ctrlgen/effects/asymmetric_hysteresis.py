@@ -20,7 +20,7 @@ class AsymmetricHysteresis(Effect):
         Param("reach", "travel", (1e-3, 5.0), "travel over which the force settles"),
         Param("skew", "1", (-0.95, 0.95), "a: relative excess of stiffness far on the positive side"),
     )
-    states = (State("z", "travel", 0.1, stepped=True), State("w", "travel", 1.0, stepped=True))
+    states = (State("z", "travel", 0.1, stepped=True, free=True), State("w", "travel", 1.0, stepped=True))
 
     def term(self, s, p):
         slope = 1 + p.skew * s.displacement / ca.sqrt(s.displacement**2 + s.travel**2)

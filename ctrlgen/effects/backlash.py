@@ -3,6 +3,7 @@
 import casadi as ca
 
 from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects._play_operators import beginning
 from ctrlgen.effects._reversal_points import reversal_point
 
 
@@ -18,16 +19,18 @@ class Backlash(Effect):
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash"
     params = (Param("gap", "travel", (0.0, 1.0), "full width of the gap", off=0.0),)
     states = (
-        State("w", "travel", 1.0, stepped=True),
+        State("w", "travel", 1.0, stepped=True),  # counted from where it begins
+        State("start", "1", 1.0, stepped=True, free=True),  # w begins at start b/2
         State("d", "travel", 1.0, stepped=True),
         State("v", "travel/s", 100.0, stepped=True),
     )
 
     def term(self, s, p):
-        return 0.999 * (s.w - s.displacement)
+        return 0.999 * (s.w + beginning(s, p.gap / 2) - s.displacement)
 
     def update(self, s, p):
-        w = s.w
+        first = beginning(s, p.gap / 2)
+        w = s.w + first
         for d in (reversal_point(s, s.d, s.v), s.displacement):
             w = ca.fmax(ca.fmin(w, d + p.gap / 2), d - p.gap / 2)
-        return {"w": w, "d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
+        return {"w": w - first, "start": s.start, "d": s.displacement, "v": 0 if s.velocity is None else s.velocity}

@@ -5,25 +5,15 @@ import casadi as ca
 from ctrlgen.effects import Effect, Param, Place, State
 
 
-class BoucWen(Effect):
-    """F = -k z, dz = dd (1 - (b sgn(dd z) + 1 - b) |z|/r), n = 1; b = beta/(beta + gamma), r = 1/(beta + gamma).
+class Yielding(Effect, listed=False):
+    """dz = dd (1 - (b sgn(dd z) + 1 - b) |z|/r), n = 1; b = beta/(beta + gamma), r = 1/(beta + gamma): one law, named twice.
 
-    Solved exactly over each step of the displacement, hence rate-independent; |z| is at most r. It dissipates for every b
-    within its bounds. b = 1/2 unloads linearly, b = 1 is Dahl's law. Holds for reversals farther apart than a sample.
+    Solved exactly over each step of the displacement, hence rate-independent; |z| is at most r. b = 1/2 unloads linearly, b = 1
+    is Dahl's law.
     """
 
-    place = Place.FORCE
-    requires = frozenset({"force"})
     source = "Y. K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249; R. Bouc (1967)"
-    params = (
-        Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
-        Param("reach", "travel", (1e-3, 5.0), "travel over which the force settles"),
-        Param("loop", "1", (0.55, 1.0), "b: share of the law that depends on the direction"),
-    )
-    states = (State("z", "travel", 0.1, stepped=True), State("d", "travel", 1.0, stepped=True))
-
-    def term(self, s, p):
-        return -p.stiffness * s.z
+    states = (State("z", "travel", 0.1, stepped=True, free=True), State("d", "travel", 1.0, stepped=True))
 
     def update(self, s, p):
         step = s.displacement - s.d
@@ -34,3 +24,36 @@ class BoucWen(Effect):
         back, on = ca.fmin(way, to_zero), ca.fmax(way - to_zero, 0)
         change = (1 + c * below) * (1 - ca.exp(-c * back)) / c + (1 - above) * (1 - ca.exp(-on))
         return {"z": s.z + ca.sign(step) * p.reach * change, "d": s.displacement}
+
+
+_SHAPE = (
+    Param("reach", "travel", (1e-3, 5.0), "travel over which it settles"),
+    Param("loop", "1", (0.55, 1.0), "b: share of the law that depends on the direction"),
+)
+
+
+class BoucWen(Yielding):
+    """F = -k z, z of `Yielding`: a force. It dissipates for every b within its bounds. Holds for reversals farther apart than a
+    sample.
+    """
+
+    title = "Hysteresis of a material or joint that yields smoothly"
+    place = Place.FORCE
+    requires = frozenset({"force"})
+    params = (Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0), *_SHAPE)
+
+    def term(self, s, p):
+        return -p.stiffness * s.z
+
+
+class DisplacementBoucWen(Yielding):
+    """Delta d = -g z, z of `Yielding`: a lag. Holds for a stage in balance; in a set of poses the memory goes from pose to pose."""
+
+    title = "A joint behind the stage that yields smoothly"
+    place = Place.DISPLACEMENT
+    order = 1
+    requires = frozenset({"balanced"})
+    params = (Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0), *_SHAPE)
+
+    def term(self, s, p):
+        return -p.share * s.z

@@ -1,28 +1,29 @@
 """Hysteresis of a piezo stack: the displacement lags behind the voltage."""
 
-from ctrlgen.effects import Effect, Param, Place, State
-from ctrlgen.effects._play_operators import play_names, updated_plays, weighted_lag
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._play_operators import play_states, updated_plays, weighted_lag
 
 
 class DriveHysteresis(Effect):
     """Delta u = g (sum_j w_j P_j - u), j = 1..8: P_j is the play of u with radius r j/8, w_j ~ j^-q, sum w_j = 1.
 
-    Prandtl-Ishlinskii with play operators, rate-independent. Holds for congruent loops through the origin.
+    Prandtl-Ishlinskii with play operators, rate-independent. Holds for congruent loops through the origin, on actuators that
+    push: where the drive is the displacement itself, its lag is `displacement_hysteresis`.
     """
 
     place = Place.DRIVE
     order = 1
-    requires = frozenset({"actuator"})
+    requires = frozenset({"actuator", "force"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
     params = (
-        Param("share", "1", (0.0, 0.5), "share of the drive that lags", off=0.0),
+        Param("share", "1", (0.0, 0.95), "share of the drive that lags", off=0.0),
         Param("reach", "channel", (1e-3, 2.0), "r: change of drive after which all plays follow"),
         Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
     )
-    states = tuple(State(name, "channel", 1.0, stepped=True) for name in play_names())
+    states = play_states("channel")
 
     def term(self, s, p):
-        return -p.share * weighted_lag(s, s.value, p.taper)
+        return -p.share * weighted_lag(s, s.value, p.reach, p.taper)
 
     def update(self, s, p):
         return updated_plays(s, [s.value], p.reach)

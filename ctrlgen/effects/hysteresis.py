@@ -1,7 +1,7 @@
 """Hysteresis of many small slipping contacts."""
 
 from ctrlgen.effects import Effect, Param, Place, State
-from ctrlgen.effects._play_operators import play_names, updated_plays, weighted_lag
+from ctrlgen.effects._play_operators import play_states, updated_plays, weighted_lag
 from ctrlgen.effects._reversal_points import reversal_point
 
 
@@ -21,13 +21,13 @@ class Hysteresis(Effect):
         Param("taper", "1", (-1.0, 2.0), "q: weight of the small radii over the large ones"),
     )
     states = (
-        *(State(name, "travel", 1.0, stepped=True) for name in play_names()),
+        *play_states("travel"),
         State("d", "travel", 1.0, stepped=True),
         State("v", "travel/s", 100.0, stepped=True),
     )
 
     def term(self, s, p):
-        return -p.stiffness * weighted_lag(s, s.displacement, p.taper)
+        return -p.stiffness * weighted_lag(s, s.displacement, p.reach, p.taper)
 
     def update(self, s, p):
         new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}

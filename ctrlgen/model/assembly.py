@@ -139,6 +139,9 @@ def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: 
         clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
         set_valued_axes=_set_valued_axes(terms, v, parts.own_force),
         bristles=tuple(first + k for k, (m, s, _) in enumerate(memories) if m.effect.set_valued and not s.stepped),
+        free_memories=tuple(
+            first + k for k, (m, s, _) in enumerate(memories) if s.free or (m.effect.set_valued and not s.stepped)
+        ),
         signals=signals,
         force_parts=physics.restoring_force_parts(z),
         limits=tuple(physics.limits(_limited(physics, signals, own_x, z))),

@@ -22,6 +22,7 @@ REQUIREMENTS = {  # the words of `Effect.requires`, in messages
     "acceleration": "an imposed motion",
     "actuator": "an actuator, and not an imposed motion",
     "ambient": "the temperature of the surroundings",
+    "balanced": "a stage in balance, without inertia",
     "bipolar": "a drive of both signs",
     "force": "forces in N or N*m",
     "heat": "heaters",
@@ -206,7 +207,7 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
     present = {
         "unheated": not heated, "heat": heated, "state": heated,
         "bipolar": physics.bipolar, "actuator": not isinstance(physics, ImposedPhysics),
-        "velocity": not balanced, "acceleration": isinstance(physics, ImposedPhysics),
+        "balanced": balanced, "velocity": not balanced, "acceleration": isinstance(physics, ImposedPhysics),
         "ambient": True, "sample_time": sample_time is not None,
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,

@@ -53,6 +53,7 @@ class Model:
     clocks: tuple[int, ...]  # count time
     set_valued_axes: tuple[int, ...]  # axes with inertia on which dry friction may hold the stage at rest
     bristles: tuple[int, ...]  # the states of that friction
+    free_memories: tuple[int, ...]  # states of effects that begin differently in each record
 
     # What is read from the equations
     signals: dict[

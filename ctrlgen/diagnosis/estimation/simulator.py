@@ -76,13 +76,13 @@ class Simulator:
 
     @cached_property
     def free_initial_states(self) -> tuple[int, ...]:
-        """Places in S of the initial states that are fitted: actuators' states, how far dry friction is bent when a record
-        begins, and, with inertia, velocity and displacement."""
+        """Places in S of the initial states that are fitted: actuators' states, how far dry friction is bent and plays stand
+        off when a record begins, and, with inertia, velocity and displacement; of settled poses the plays alone."""
         m = self.model
         if not np.isfinite(self.sample_time):
-            return ()
+            return m.free_memories
         moving = range(self.n_x - m.v.numel(), self.n_s) if m.inertial else ()
-        return (*range(m.n_states), *m.bristles, *moving)
+        return (*range(m.n_states), *m.free_memories, *moving)
 
     @cached_property
     def _observed(self) -> ca.SX:

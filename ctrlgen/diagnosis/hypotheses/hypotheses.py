@@ -156,9 +156,9 @@ def _of_law(
     law: type[Effect], physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
 ) -> Iterator[Hypothesis]:
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
-    if not law.requires <= there or (law.place is Place.HEAT and "heat" not in there):
-        return
     prior = prior_of(law)
+    if not law.requires <= there or prior.unless & there or (law.place is Place.HEAT and "heat" not in there):
+        return
     domain = prior.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
     places = channels(physics, law.place)

@@ -58,6 +58,7 @@ class LawPrior:
     model_form_error: error of the law's form after its parameters are fitted, as a share of what the law explains.
     family: name shared by laws that are forms of one physics; a place has at most one of a family.
     nested_case: the simpler law inside this one; where the fit does not exclude it, it is named as an alternative.
+    unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     repeatable: the law may act more than once at one place, as harmonics do.
     acts_on_all: the law is suspected at all channels at once only.
     domain: where a finding is reported to be; by default what the law's place says.
@@ -69,6 +70,7 @@ class LawPrior:
     model_form_error: float = 0.0
     family: str | None = None
     nested_case: NestedCase | None = None
+    unless: frozenset[str] = frozenset()
     repeatable: bool = False
     acts_on_all: bool = False
     domain: str | None = None
@@ -112,6 +114,10 @@ _EVENTS_ARE_RARE = (
 _DRY_FRICTION = "Forms of one contact. Measured friction differs by a few per cent from any of them; 2 % is judgement."
 _HYSTERESIS = (
     "Forms of one loop. 2 %: nature leaves about a fiftieth of a loop beside any of them, judged on simulated cases."
+)
+_IN_BALANCE = (
+    " In a stage in balance a force that lags and a displacement that lags show the same to first order; there the latter is "
+    "suspected, whose memory stays out of the balance."
 )
 _CREEP = "Forms of one relaxation spectrum; 1 %: judgement."
 
@@ -190,9 +196,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         "From a loss that ends within the recording to a steady one.", parameters={"levels_off": _starts((3.0, 30.0, 1e4))}
     ),
     "drive_hysteresis": LawPrior(
-        "Rarer than hysteresis of the stage, which explains the same in a stage of constant stiffness: judgement. " + _HYSTERESIS,
+        "Rarer than hysteresis of the stage, which explains the same in a stage of constant stiffness: judgement. Heaters have none. "
+        + _HYSTERESIS,
         log_prior_odds=ONE_IN_TEN,
+        unless=frozenset({"heat"}),
         model_form_error=0.02,
+        family="hysteresis",
         parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0)), "taper": _starts((0.0,))},
     ),
     "reversed": LawPrior(
@@ -227,14 +236,16 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     ),
     # Force ----------------------------------------------------------------------------------------------------------------
     "asymmetric_hysteresis": LawPrior(
-        "Rarer than a symmetric loop: judgement. " + _HYSTERESIS,
+        "Rarer than a symmetric loop: judgement. " + _HYSTERESIS + _IN_BALANCE,
         log_prior_odds=ONE_IN_TEN,
+        unless=frozenset({"balanced"}),
         model_form_error=0.02,
         family="hysteresis",
         parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "skew": _starts((-0.6, 0.6))},
     ),
     "bouc_wen": LawPrior(
-        _HYSTERESIS,
+        _HYSTERESIS + _IN_BALANCE,
+        unless=frozenset({"balanced"}),
         model_form_error=0.02,
         family="hysteresis",
         parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "loop": _starts((0.55, 0.9))},
@@ -252,7 +263,8 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     ),
     "force_step": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT),
     "hysteresis": LawPrior(
-        _HYSTERESIS,
+        _HYSTERESIS + _IN_BALANCE,
+        unless=frozenset({"balanced"}),
         model_form_error=0.02,
         family="hysteresis",
         parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
@@ -285,6 +297,18 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         model_form_error=0.01,
         family="creep",
         parameters={"tau": _starts((0.03, 0.3, 3.0, 30.0, 300.0)), "slow": _starts((0.0, 0.25))},
+    ),
+    "displacement_bouc_wen": LawPrior(
+        _HYSTERESIS,
+        model_form_error=0.02,
+        family="hysteresis",
+        parameters={"reach": _peaks(0.01, 0.03, 0.1, 0.3, 1.0), "loop": _starts((0.55, 0.9))},
+    ),
+    "displacement_hysteresis": LawPrior(
+        _HYSTERESIS,
+        model_form_error=0.02,
+        family="hysteresis",
+        parameters={"reach": _peaks(0.03, 0.1, 0.3, 1.0), "taper": _starts((0.5,))},
     ),
     "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
     "lever_ratio": LawPrior(

@@ -93,7 +93,16 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
 FAMILY_OF = {
     **dict.fromkeys(("coulomb", "stribeck"), Family.FRICTION),
     **dict.fromkeys(
-        ("hysteresis", "asymmetric_hysteresis", "bouc_wen", "drive_hysteresis", "backlash"), Family.HYSTERESIS
+        (
+            "hysteresis",
+            "asymmetric_hysteresis",
+            "bouc_wen",
+            "displacement_bouc_wen",
+            "displacement_hysteresis",
+            "drive_hysteresis",
+            "backlash",
+        ),
+        Family.HYSTERESIS,
     ),
     **dict.fromkeys(("stiffening", "one_sided_stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
     **dict.fromkeys(("asymmetric_gain", "dead_zone", "saturation", "heater_resistance"), Family.DRIVE),

@@ -1,0 +1,30 @@
+"""Hysteresis of a joint or guide between stage and mechanism: the displacement lags."""
+
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._play_operators import play_states, updated_plays, weighted_lag
+
+
+class DisplacementHysteresis(Effect):
+    """Delta d = g (sum_j w_j P_j - d), j = 1..8: P_j is the play of d with radius r j/8, w_j ~ j^-q, sum w_j = 1.
+
+    Prandtl-Ishlinskii with play operators, rate-independent; in a set of poses the memory goes from pose to pose in their
+    order. g < 0 leads, as behind a controller that overcompensates. Holds for congruent loops, on stages in balance; with
+    inertia hysteresis is a force.
+    """
+
+    place = Place.DISPLACEMENT
+    order = 1
+    requires = frozenset({"balanced"})
+    source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
+    params = (
+        Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0),
+        Param("reach", "travel", (1e-4, 2.0), "r: travel after which all plays follow"),
+        Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
+    )
+    states = play_states("travel")
+
+    def term(self, s, p):
+        return -p.share * weighted_lag(s, s.value, p.reach, p.taper)
+
+    def update(self, s, p):
+        return updated_plays(s, [s.value], p.reach)
