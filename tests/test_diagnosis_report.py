@@ -82,9 +82,16 @@ def test_the_json_is_the_contract(found):
     assert result["notes"] == list(found.notes)
     assert result["verdict"] == EXPLAINED
     (finding,) = result["findings"]
-    assert set(finding) == {"effect", "location", "parameters", "alternatives", "held_out_gain", "source"}
+    assert set(finding) == {"effect", "location", "of", "parameters", "share", "worth", "alternatives", "source"}
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")
-    assert finding["parameters"]["tau"]["unit"] == "s"
+    assert finding["of"] is None and finding["parameters"]["tau"]["unit"] == "s"
+    share, worth, rest = finding["share"], finding["worth"]["reading.axis"], result["attribution"]["rest"]
+    assert share["value"] == pytest.approx(result["attribution"]["explained"]) and share["value"] > 0.99
+    assert (
+        share["value"] + rest["value"] == pytest.approx(1.0) and share["ci95"][0] <= share["value"] <= share["ci95"][1]
+    )
+    assert worth["unit"] == "nm" and worth["without"] > 10 * worth["with_it"]
+    assert result["sentence"] == sentence(found)
     low, high = finding["parameters"]["gain"]["ci95"]
     assert low < finding["parameters"]["gain"]["value"] < high and low < 0.03 < high
     error = result["held_out"]["reading.axis"]
@@ -94,9 +101,13 @@ def test_the_json_is_the_contract(found):
 
 
 def test_the_json_lists_alternatives_by_name(found):
-    rival = replace(found.findings[0], alternatives=(("thermal_lag", "actuator:axis"),))
+    others = (Hypothesis("thermal_lag", "actuator:axis", "axis"), Hypothesis("swapped", "actuator:a", "a", "b"))
+    rival = replace(found.findings[0], alternatives=others)
     result = diagnosis_record(replace(found, findings=(rival,)), MADE_FROM)
-    assert result["findings"][0]["alternatives"] == [{"effect": "thermal_lag", "location": "actuator:axis"}]
+    assert faults(result, "diagnosis") == [] and result["findings"][0]["alternatives"] == [
+        {"effect": "thermal_lag", "location": "actuator:axis", "of": None},
+        {"effect": "swapped", "location": "actuator:a", "of": "b"},
+    ]
 
 
 def test_numbers_that_are_none_are_null():
@@ -135,7 +146,9 @@ def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(foun
     structure = trial.fit.structure.with_cause(clip, {"share": 1.0, "level": 2.0})
     fit = found.fitter.fit(structure, steps=0)
     steps = {"share": Estimate(1.0, (1.0, 1.0), "1"), "quantum": Estimate(0.01, (0.01, 0.01), "um")}
-    read = Finding("quantisation", "sensor:axis", steps, (), 0.0, "", Hypothesis("quantisation", "sensor:axis", "axis"))
+    read = Finding(
+        "quantisation", "sensor:axis", steps, (), None, {}, "", Hypothesis("quantisation", "sensor:axis", "axis")
+    )
     told = replace(
         found,
         findings=(*found.findings, read),
@@ -202,7 +215,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
         and "<link" not in text
     )
     assert "A flexure or its glue keeps moving" in text and "Explained" in text.split("<h2>")[0]
-    assert text.count("<figure>") == 7 and "seed 7" in text and "0" * 64 in text
+    assert text.count("<figure>") == 9 and "seed 7" in text and "0" * 64 in text
     assert text.index("device.next.toml") < text.index("<figure>")
 
 
@@ -237,7 +250,7 @@ def test_the_page_shows_whatever_evidence_there_is(found):
         detectability={"drift": {"value": float("nan"), "unit": "nm/s"}},
     )  # fmt: skip
     text = page(told, Provenance({}, 0))
-    assert text.count("<figure>") == 7
+    assert text.count("<figure>") == 9
     for words in (
         "more below 1 Hz",
         "20 s",
@@ -250,7 +263,7 @@ def test_the_page_shows_whatever_evidence_there_is(found):
 
 
 def test_a_verdict_says_what_to_do(found):
-    rival = replace(found.findings[0], alternatives=(("thermal_lag", "actuator:axis"),))
+    rival = replace(found.findings[0], alternatives=(Hypothesis("thermal_lag", "actuator:axis", "axis"),))
     told = {v: replace(found, verdict=v, findings=(rival,)) for v in (EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED)}
     told[CONSISTENT] = replace(found, verdict=CONSISTENT, findings=())
     first = {verdict: (sentence(d).split(":")[0], next_steps(d)[0]) for verdict, d in told.items()}
@@ -258,7 +271,7 @@ def test_a_verdict_says_what_to_do(found):
     assert first[CONSISTENT][1].startswith("Nothing to correct") and first[EXPLAINED][1].startswith(
         "Use device.next.toml"
     )
-    assert first[UNEXPLAINED][1].startswith("No known effect is the cause")
+    assert "Check wiring, units and clocks" in next_steps(told[UNEXPLAINED])[1]
     assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[AMBIGUOUS])
     assert "thermal_lag" not in sentence(told[EXPLAINED])
     for settles, said in ((True, "Run the next experiment"), (False, "None of the drives considered")):

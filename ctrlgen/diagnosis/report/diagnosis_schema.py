@@ -354,7 +354,7 @@ class DiagnosisRecord(Origin):
 
     verdict: Verdict = Field(description="The answer in one word.")
     sentence: str = Field(description="The answer in a sentence: cause, size, share, what is left.")
-    attribution: AttributionEntry = Field(description="How much of the mismatch the findings take away together.")
+    attribution: AttributionEntry = Field(description="What the findings take away together, and the rest.")
     findings: list[FindingEntry] = Field(
         description="Causes that the device file leaves out, the most important first."
     )
