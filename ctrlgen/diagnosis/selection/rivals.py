@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum, restart
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum, restart
 from ctrlgen.diagnosis.selection.candidates import significant
 from ctrlgen.diagnosis.selection.screen import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
@@ -25,17 +28,33 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
     return current
 
 
-def rivals(trials: Trials, current: CandidateModel, k: int) -> tuple[CandidateModel, ...]:
-    """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude."""
+def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[CandidateModel, ...]:
+    """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude; with what the
+    `rounds` tried in its place."""
     there, special = current.causes, current.fit.nested_case(k)
-    alike = [t for t in replacements(trials, current, k) if not _same_name(t.cause, there[k])]
-    alike = [
-        t
-        for t in alike
-        if trials.selection.advantage(current, t) < SEARCH.rival_difference
-        or (special and t.cause and t.cause.effect == special)
-    ]
-    return tuple(t for t in alike if not trials.objections(t, there))
+    tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
+    found = [*replacements(trials, current, k), *_in_place_of(k, there, tried)]
+    alike = {
+        t.cause: t
+        for t in reversed(found)
+        if not _same_name(t.cause, there[k])
+        and (
+            trials.selection.advantage(current, t) < SEARCH.rival_difference
+            or (special and t.cause and t.cause.effect == special)
+        )
+    }
+    return tuple(t for t in trials.selection.ranked(list(alike.values())) if not trials.objections(t, there))
+
+
+def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateModel]) -> list[CandidateModel]:
+    """Those `tried` that hold the causes `there`, but another one instead of cause k."""
+    others = set(there) - {there[k]}
+    found = []
+    for t in tried:
+        if len(t.causes) == len(there) and others < set(t.causes) and there[k] not in t.causes:
+            (cause,) = set(t.causes) - others
+            found.append(replace(t, cause=cause))
+    return found
 
 
 def replacements(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:

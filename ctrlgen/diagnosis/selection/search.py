@@ -53,7 +53,7 @@ class Searcher:
         nominal = trials.converged(trials.fit(Structure(device), steps=FIT.max_steps))
         each = range(len(current.causes))
         bare = tuple(self._without(current, k, nominal) for k in each)
-        alike = tuple(rivals(trials, current, k) for k in each)
+        alike = tuple(rivals(trials, current, k, rounds) for k in each)
         return SearchResult(trials.fitter, nominal, current, bare, alike, tuple(rounds), trials.screened(current))
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
