@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -61,6 +63,13 @@ class ChannelSmoothers:
         self.mean = mean_or_zero(self.folds, self.y, self.energy)
         self.refitted = self.fit([])
         self.base = self.refitted if stands_out(self.mean.squares - self.refitted.squares) else self.mean
+
+    def without_numbers(self) -> ChannelSmoothers:
+        """The same without the device's numbers beside its kinds."""
+        bare = copy(self)
+        bare.free = self.free[:0]
+        bare.base = bare.refitted = self.mean
+        return bare
 
     def fit(self, kinds: Iterable[Kind], targets: np.ndarray | None = None) -> OutOfBlock:
         """The residual, or `targets` (folds, N), from the columns of some kinds, the mean and the device's numbers."""
@@ -146,19 +155,37 @@ def rates_of(signals: Sequence[Signals], channel: str, blocks: Blocks) -> np.nda
     return np.column_stack([blocks.drawn(first), blocks.drawn(second)])
 
 
-def forward_selection(
-    channel: ChannelSmoothers, kinds: Sequence[Kind], everything: OutOfBlock
-) -> tuple[list[Kind], OutOfBlock]:
-    """The selected kinds in the order in which each adds most, and their joint prediction; `everything` is that of all kinds.
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The selected kinds of a `channel` in the order in which each adds most, their `joint` prediction and that of all kinds."""
+
+    channel: ChannelSmoothers
+    kinds: list[Kind]
+    joint: OutOfBlock
+    everything: OutOfBlock
+
+
+def select_kinds(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> Selection:
+    """The kinds that say most. Where other values of the device's numbers would take away much that their stated deviations
+    do not allow, these stand in for physics: they are left out where the kinds predict as well without them."""
+    found = forward_selection(channel, kinds)
+    if channel.base is channel.mean:
+        return found
+    bare = forward_selection(channel.without_numbers(), kinds)
+    return bare if as_good(bare.joint, found.joint, channel.energy) else found
+
+
+def forward_selection(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> Selection:
+    """Selected kinds, each beside those before it.
 
     The record comes after all others: a constant for each record stands in for whatever differs between them, such as the
     direction of motion where each moves one way.
     """
     chosen: list[Kind] = []
-    now = channel.base
+    now, everything = channel.base, channel.fit(kinds)
     for offered in ([kind for kind in kinds if kind is not Kind.RECORD], kinds):
         chosen, now = _selected(channel, offered, everything, chosen, now)
-    return _in_order(channel, chosen), now
+    return Selection(channel, _in_order(channel, chosen), now, everything)
 
 
 def _selected(

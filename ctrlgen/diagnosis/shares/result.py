@@ -46,7 +46,7 @@ class ChannelShares:
 
     rms: of the residual [SI]. own: the axes that the channel sees.
     constant: share of the mean. numbers: what other values of the device's own free numbers would add to it, beyond what
-        their stated deviations allowed.
+        their stated deviations allowed; 0 where the kinds predict as well without them.
     kinds: by falling share alone, the own past last.
     total: of all kinds, with the constant and the numbers: the ceiling of any law that is a function of them.
     rest: 1 - total. rest_own_past: what the residual's own past adds to the selected kinds; this part of the rest lasts

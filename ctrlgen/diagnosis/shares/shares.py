@@ -10,7 +10,8 @@ and the rest make up one. A share that chance could show is zero.
 
 Free numbers of the device have moved to stand in for what is missing: of dry friction F sign(v), a fit of viscous damping c v
 leaves F sign(v) - c v, which is no function of the direction. So the sensitivities dy/dp, where they are given, stand
-beside every smoother and beside the mean, wherever they improve the prediction out of block.
+beside every smoother and beside the mean, wherever they improve the prediction out of block. Where their stated deviations
+hold them instead, they would stand in for physics, and are left out if the kinds predict as well without them.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from ctrlgen.diagnosis.shares.blocks import Blocks, make_blocks
 from ctrlgen.diagnosis.shares.channel import (
     ChannelSmoothers,
     as_good,
-    forward_selection,
     mean_or_zero,
     rates_of,
+    select_kinds,
     share_of,
     without_spikes,
 )
@@ -81,11 +82,11 @@ def model_free_shares(
 
 def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShares:
     """Shares alone, forward selection and ceiling of one channel."""
+    named = [kind for kind in channel.kinds if kind is not Kind.PAST]
+    found = select_kinds(channel, named)
+    channel, selected, joint = found.channel, found.kinds, found.joint
     usable, total = channel.common.usable, max(float(channel.energy.sum()), 1e-300)
     alone = {kind: channel.fit([kind]) for kind in channel.kinds}
-    named = [kind for kind in channel.kinds if kind is not Kind.PAST]
-    everything = channel.fit(named)
-    selected, joint = forward_selection(channel, named, everything)
     rows, before = [], channel.base
     for place, kind in enumerate(selected, 1):
         after = channel.fit(selected[:place])
@@ -102,7 +103,7 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
             rows.append(KindShare(kind, channel.share(channel.base, fit), gain, None, ()))
     rows.sort(key=lambda row: (row.kind is Kind.PAST, -row.alone.share))
     # all columns at once cost more than they tell where there are few blocks
-    whole = max((channel.whole_share(f) for f in (everything, joint)), key=lambda s: s.share)
+    whole = max((channel.whole_share(f) for f in (found.everything, joint)), key=lambda s: s.share)
     return ChannelShares(
         channel=name,
         rms=float(np.sqrt(total / usable.sum())),
