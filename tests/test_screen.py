@@ -57,3 +57,15 @@ def test_a_frequency_ends_where_the_sampling_shows_no_higher_one_and_a_ratio_doe
     frequency, share = next(p for p in hum.law.params if p.unit == "Hz"), late.law.amplitude()
     assert hum.bounds(frequency, channel) == (frequency.bounds[0], highest)
     assert share.unit == "1" and late.bounds(share, channel) == share.bounds and share.bounds[1] > highest
+
+
+def test_a_law_that_cannot_be_evaluated_is_dropped_with_its_reason_and_the_others_stay(monkeypatch):
+    def broken(self, s, p):
+        raise ValueError("no such place")
+
+    fitter = axis_fitter()
+    fit = fitter.fit(Structure(AXIS))
+    monkeypatch.setattr(SENSOR_GAIN.law, "term", broken)
+    found = Screen(fitter, [SENSOR_GAIN, DRIVE_GAIN]).run(fit)
+    assert found.dropped == {SENSOR_GAIN: "ValueError: no such place"}
+    assert [suspect.hypothesis for suspect in found.suspects] == [DRIVE_GAIN]

@@ -290,7 +290,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     "backlash": LawPrior(
         "Reversals between two samples are placed to 1 %: measured on simulated play.",
         model_form_error=0.01,
-        parameters={"gap": _peaks(1e-4, 1e-3, 0.01, 0.1)},
+        parameters={"gap": _peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
     ),
     "creep": LawPrior(
         _CREEP,

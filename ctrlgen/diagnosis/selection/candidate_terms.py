@@ -22,6 +22,9 @@ from ctrlgen.effects import Effect, Place
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.phi_functions import lag_increment, phi_matrices
 
+UNUSABLE = (ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
+"""What a law that cannot be written down at a place may end with."""
+
 Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
 REACHED = ("channel", "travel", "travel/s")
 
@@ -82,7 +85,10 @@ class _Term:
 
 
 class CandidateTerms:
-    """The terms of `hypotheses` on the motions of `response`, and one column for every choice of shape."""
+    """The terms of `hypotheses` on the motions of `simulator`, and one column for every choice of shape.
+
+    `unusable`: the hypotheses whose law cannot be written down here, and why.
+    """
 
     def __init__(
         self, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
@@ -91,7 +97,13 @@ class CandidateTerms:
         self.simulator = simulator
         self.terms: list[_Term] = []
         self._known: dict[tuple, int] = {}
-        self.columns = [c for h in hypotheses for c in self._of(h, structure, probes, seen)]
+        self.columns: list[CandidateTerm] = []
+        self.unusable: dict[Hypothesis, str] = {}
+        for h in hypotheses:
+            try:
+                self.columns += list(self._of(h, structure, probes, seen))
+            except UNUSABLE as error:
+                self.unusable[h] = f"{type(error).__name__}: {error}"
 
     def _of(
         self,

@@ -34,7 +34,8 @@ class Screened:
     without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
     `together` sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide
     each other; `undetectable` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
-    whose own effect looks most like theirs, -1 where they do not reach the readings at all."""
+    whose own effect looks most like theirs, -1 where they do not reach the readings at all; `dropped` the hypotheses whose law
+    could not be evaluated, with the reason."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
@@ -42,6 +43,7 @@ class Screened:
     amplitude_sd: dict[tuple[str, str], float]
     subsets: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
     undetectable: dict[Hypothesis, int] = field(default_factory=dict)
+    dropped: dict[Hypothesis, str] = field(default_factory=dict)
 
     def confusability(self, a: Suspect, b: Suspect) -> float:
         """|cos| between two suspects."""
@@ -55,10 +57,10 @@ class Screen:
         self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
         self.peaks: Peaks | None = None
 
-    def run(self, fit: Fit) -> Screened:
-        """All hypotheses that the fit does not contain yet."""
-        beside = (h.beside(fit.structure.causes) for h in self.hypotheses)
-        open_ = [h for h in beside if h is not None]
+    def run(self, fit: Fit, dropped: dict[Hypothesis, str] | None = None) -> Screened:
+        """All hypotheses that the fit does not contain yet, without those `dropped` and any whose law cannot be evaluated."""
+        beside, dropped = (h.beside(fit.structure.causes) for h in self.hypotheses), dropped or {}
+        open_ = [h for h in beside if h is not None and h not in dropped]
         sums: Sums | None = None
         columns: list[CandidateTerm] = []
         U, back = _directions(fit.J)
@@ -67,6 +69,8 @@ class Screen:
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
         ):
             slopes = ScoreGradient(self.fitter, fit, record, open_, seen)
+            if slopes.laws.unusable:  # the columns must be the same on every record
+                return self.run(fit, dropped | slopes.laws.unusable)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)
@@ -75,11 +79,10 @@ class Screen:
             here = slopes.sums(white, free, start)
             sums = here if sums is None else sums.plus(here)
         if not columns or sums is None:
-            return Screened((), np.zeros((0, 0)), np.inf, {})
+            return Screened((), np.zeros((0, 0)), np.inf, {}, dropped=dropped)
         size = np.linalg.norm(fit.J[:first], axis=0)
-        return self._screened(
-            columns, sums, U.T @ fit.residual, np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
-        )
+        likeness = np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
+        return replace(self._screened(columns, sums, U.T @ fit.residual, likeness), dropped=dropped)
 
     def data_hints(self, fit: Fit) -> Callable[[Place, int], DataHints]:
         """What the records show at each place, after what `fit` explains."""

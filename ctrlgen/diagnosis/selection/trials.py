@@ -97,6 +97,7 @@ class Trials:
         fit, screened = self.screens.get(key, (None, None))
         if screened is None or fit is not candidate.fit:
             screened = self.screen.run(candidate.fit)
+            self.failed += [f"{_name(h)}: {why}" for h, why in screened.dropped.items()]
             self.screens[key] = candidate.fit, screened
         return screened
 
