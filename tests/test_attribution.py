@@ -1,0 +1,130 @@
+"""Shares of the mismatch: Shapley's values of energies, and those of causes whose sizes are known."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, BACKLASH, NOISE, H, fitter_of, move, played
+from misfits import BLOCKS, left
+
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.diagnosis.selection import attribution
+from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.settings import ATTRIBUTION
+
+HUM = Hypothesis("vibration", "disturbance:axis", "axis")
+
+
+def shared(monkeypatch, energy, causes: int, held: float = 1.0, blocks=None) -> Attribution:
+    """Shares of `causes` causes where those of a set S leave energy(S) on the records to fit; held out `held` times as much."""
+
+    def misfit_of(present, times=1.0):
+        return left(times * energy(frozenset(present)), blocks=blocks)
+
+    monkeypatch.setattr(
+        attribution,
+        "_left_by",
+        lambda fitter, fit, present, records: misfit_of(present, held if records == ["held"] else 1.0),
+    )
+    fitter = SimpleNamespace(with_errors_of=lambda fit: None, held_out_records=["held"], fit_records=["fit"])
+    trial = {
+        name: SimpleNamespace(
+            fit=SimpleNamespace(structure=SimpleNamespace(causes=(None,) * causes)),
+            fitted=misfit_of(present),
+            held_out=misfit_of(present, held),
+        )
+        for name, present in (("nominal", ()), ("chosen", range(causes)))
+    }
+    return attribute(SimpleNamespace(fitter=fitter, **trial))
+
+
+def values(found: Attribution) -> list[float]:
+    return [s.value for s in (*found.shares, found.rest)]
+
+
+def test_causes_that_add_up_have_what_each_takes_away(monkeypatch):
+    takes = (5e4, 3e4, 1e4)
+    found = shared(monkeypatch, lambda S: 1e5 - sum(takes[k] for k in S), 3)
+    assert values(found) == pytest.approx([0.5, 0.3, 0.1, 0.1]) and found.explained == pytest.approx(0.9)
+    assert found.held_out
+
+
+def test_causes_that_need_each_other_share_what_they_take_together(monkeypatch):
+    """Alone 40 and 20, together 90: the mean over both orders."""
+    table = {(): 1e5, (0,): 6e4, (1,): 8e4, (0, 1): 1e4}
+    found = shared(monkeypatch, lambda S: table[tuple(sorted(S))], 2)
+    assert values(found) == pytest.approx([(0.4 + 0.7) / 2, (0.2 + 0.5) / 2, 0.1])
+
+
+@pytest.mark.parametrize("causes", [1, 3, 4, 5, 7])
+def test_shares_and_the_rest_are_one(monkeypatch, causes):
+    rng = np.random.default_rng(causes)
+    weights = rng.uniform(1, 3, causes)
+
+    def energy(S):
+        return 1e5 * (0.05 + 0.95 * (1 - sum(weights[k] for k in S) / weights.sum()) ** 2)
+
+    found = shared(monkeypatch, energy, causes)
+    assert sum(values(found)) == pytest.approx(1.0) and values(found)[-1] == pytest.approx(0.05)
+    order = np.argsort([s.value for s in found.shares])
+    assert np.array_equal(order, np.argsort(weights))
+
+
+def test_a_set_that_diverges_counts_as_four_times_the_mismatch(monkeypatch):
+    assert ATTRIBUTION.diverged == 4.0
+    table = {(): 1e5, (0,): 1e30, (1,): 5e4, (0, 1): 1e4}
+    found = shared(monkeypatch, lambda S: table[tuple(sorted(S))], 2)
+    assert values(found) == pytest.approx([((1 - 4) + 0.4) / 2, (0.5 + 3.9) / 2, 0.1])
+
+
+def test_where_the_held_out_records_show_no_mismatch_the_shares_are_of_those_to_fit(monkeypatch):
+    """Two hundredths of the noise's squares, of 1000 samples."""
+    for excess, held in ((21.0, True), (19.0, False)):
+        found = shared(monkeypatch, lambda S: 1e5 * (1 - 0.9 * len(S)), 1, held=excess / 1e5)
+        assert found.held_out == held and found.shares[0].value == pytest.approx(0.9)
+
+
+def test_nothing_is_shared_where_nothing_is_wrong_or_nothing_was_found(monkeypatch):
+    none = shared(monkeypatch, lambda S: 1e5, 0)
+    assert none.shares == () and none.rest is None and none.explained == 0.0
+    clean = shared(monkeypatch, lambda S: -10.0, 2)
+    assert clean.shares == (None, None) and clean.rest is None
+
+
+def test_an_interval_is_that_of_the_blocks(monkeypatch):
+    """Blocks alike leave no doubt. Where the cause acts in half of twenty blocks alone, a draw holds 10 of them, give or take 2.2."""
+    assert shared(monkeypatch, lambda S: 1e5 * (1 - 0.5 * len(S)), 1).shares[0].ci95 == pytest.approx((0.5, 0.5))
+    half = np.arange(BLOCKS) % 2 / (BLOCKS / 2)
+
+    def shares_of_blocks(excess, n=1000, blocks=None):
+        return even(excess, n, half if excess < 9e4 else None)
+
+    even = left
+    monkeypatch.setattr("test_attribution.left", shares_of_blocks)
+    share = shared(monkeypatch, lambda S: 1e5 if not S else 5e4, 1).shares[0]
+    assert share.value == pytest.approx(0.5)
+    assert share.ci95 == pytest.approx(
+        (0.5 - 1.96 * np.sqrt(0.25 / BLOCKS), 0.5 + 1.96 * np.sqrt(0.25 / BLOCKS)), abs=0.04
+    )
+
+
+def test_two_causes_have_the_shares_that_were_planted():
+    """A hum of 30 times the noise beside a play of 60 nm: what each adds to the held-out records is known."""
+    hum = 30 * NOISE * np.sin(2 * np.pi * 50.0 * H * np.arange(1500) + 0.4)
+
+    fitter = fitter_of(lambda u: played(u) + hum)
+    search = Searcher(fitter, Screen(fitter, [BACKLASH, HUM]), lambda _: None).run(AXIS)
+    found = attribute(search)
+    (held,) = fitter.held_out_records
+    lost = played(held.drive[:, 0]) - move(held.drive[:, 0])
+    energy = {"backlash": np.sum(lost**2), "vibration": np.sum(hum**2)}
+    by_name = {c.effect: s for c, s in zip(search.chosen.causes, found.shares, strict=True)}
+    assert set(by_name) == set(energy)
+    for name, share in by_name.items():
+        assert share.value == pytest.approx(energy[name] / sum(energy.values()), abs=0.1)
+        assert share.ci95[0] < share.value < share.ci95[1]
+    assert sum(values(found)) == pytest.approx(1.0) and abs(found.rest.value) < 0.02
