@@ -128,3 +128,16 @@ def test_the_documentation_builds_without_a_warning(tmp_path):
         capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+def test_the_thresholds_that_the_method_names_are_in_the_settings():
+    text = (DOCS / "method" / "diagnosis.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([A-Z][A-Z_]+)\.(\w+)`", text))
+    assert len(named) > 20
+    assert not {f"{record}.{name}" for record, name in named if not hasattr(getattr(settings, record, None), name)}
+
+
+def test_the_modules_that_the_method_names_exist():
+    text = (DOCS / "method" / "diagnosis.md").read_text(encoding="utf-8")
+    named = {path.split("/")[-1] for path in re.findall(r"`([\w/]+\.py)`", text)}
+    assert len(named) > 20 and named <= {path.name for path in (ROOT / "ctrlgen").rglob("*.py")}

@@ -55,10 +55,10 @@ def diagnose(
     device.next.toml (the device file with the findings added), and
     next_experiment/ where another recording would decide between causes.
 
-    The verdict is one of: consistent, explained, partly (a little remains
-    unexplained, or held-out data do not confirm it), ambiguous (two causes
-    explain the data equally well), unexplained. The exit status is 0 for every
-    verdict, and 2 for input that cannot be used. The same command continues an
+    The verdict is one of: consistent, explained, partly (confirmed causes take
+    away most of the mismatch), ambiguous (another cause explains the data as
+    well as a main one), unexplained. The exit status is 0 for every verdict,
+    and 2 for input that cannot be used. The same command continues an
     interrupted diagnosis from the fits already made.
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
