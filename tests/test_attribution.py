@@ -66,7 +66,7 @@ def test_shares_and_the_rest_are_one(monkeypatch, causes):
     weights = rng.uniform(1, 3, causes)
 
     def energy(S):
-        return 1e5 * (0.05 + 0.95 * (1 - sum(weights[k] for k in S) / weights.sum()) ** 2)
+        return 1e5 * (0.05 + 0.95 * (1 - sum(weights[k] for k in S) / weights.sum()) ** 3)
 
     found = shared(monkeypatch, energy, causes)
     assert sum(values(found)) == pytest.approx(1.0) and values(found)[-1] == pytest.approx(0.05)

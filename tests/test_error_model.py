@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from axis_records import record
 from misfits import noise_of
+from scipy.integrate import quad
 from scipy.signal import lfilter
+from scipy.stats import norm
 
 from ctrlgen.diagnosis.estimation.error_model import (
     ErrorModel,
@@ -155,6 +157,9 @@ def test_the_loss_of_normal_noise_has_mean_one_and_a_spike_pulls_no_further():
     given = record(np.zeros(n), np.zeros(n), "fit")
     clean = misfit(noise_of(), [given], [e])
     assert clean.white_mean[0] == pytest.approx(1.0, abs=0.01)
+    mean = quad(lambda r: (r * r if abs(r) <= 3 else 6 * abs(r) - 9) * norm.pdf(r), -12, 12, points=[-3, 3])[0]
+    even = misfit(noise_of(), [given], [np.ones((n, 1))])
+    assert even.white_mean[0] == pytest.approx(1 / mean, rel=1e-9) and abs(mean - 1) > 1e-4
     e[77] = 1e6
     struck = misfit(noise_of(), [given], [e])
     assert struck.white_mean[0] == pytest.approx(clean.white_mean[0] + 6e6 / n, rel=1e-2)
