@@ -56,12 +56,20 @@ def test_placeholders_are_taken_out_of_a_unit_with_their_powers():
 
 
 def test_bounds_of_a_pair_count_in_typical_sizes_of_both_channels():
-    """The bounds of an arm are ten, in typical micrometres per typical microradians: here 10 (2 um)/(1 urad)."""
-    channel = Channel("delta_x", "um", 2e-6, "um", 1e-6, "theta_y", "urad", 1e-6)
+    """The bounds of a tilt are three, in typical microradians per typical micrometres: here 3 (2 urad)/(1 um)."""
+    channel = Channel("theta_y", "urad", 2e-6, "urad", 1e-6, "delta_x", "um", 1e-6)
+    table = {"kind": "link_compliance", "at": "theta_y", "of": "delta_x"}
+    assert faults_at(read_effect({**table, "tilt": "5.99 urad/um"}), channel) == []
+    ((name, fault),) = faults_at(read_effect({**table, "tilt": "6.01 urad/um"}), channel)
+    assert name == "tilt" and "outside -6 urad/um ... 6 urad/um" in fault
+
+
+def test_bounds_in_units_of_their_own_are_the_same_at_every_channel():
+    """An arm of a metre, 1 um/urad, whatever the typical sizes."""
     table = {"kind": "abbe_arm", "at": "delta_x", "of": "theta_y"}
-    assert faults_at(read_effect({**table, "arm": "19.99 um/urad"}), channel) == []
-    ((name, fault),) = faults_at(read_effect({**table, "arm": "20.01 um/urad"}), channel)
-    assert name == "arm" and "outside -20 um/urad ... 20 um/urad" in fault
+    assert read_effect({**table, "arm": "0.999 um/urad"}).values["arm"].si == pytest.approx(0.999)
+    with pytest.raises(ValueError, match=r"arm = 1\.001 um/urad is outside -1 um/urad \.\.\. 1 um/urad"):
+        read_effect({**table, "arm": "1.001 um/urad"})
 
 
 @pytest.mark.parametrize(
