@@ -180,6 +180,7 @@ LAWS = {
         {"tau": 0.3, "second": 0.2}, lambda s, p: p.share * (s.x - s.value),
         lambda s, p: {"v": (s.value - s.v) / 0.3, "w": (s.v - s.w) / 0.06, "x": (s.w - s.x) / 0.0216},
     ),
+    "zero_per_record": ({}, lambda s, p: p.share * s.zero),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
 }  # fmt: skip
 AMPLITUDES = {"heater_resistance": 0.01, "expansion": 0.01}  # of a share, an angle, a gain: 0.3

@@ -427,7 +427,42 @@ def test_of_two_clocks(samples):
     assert found.fit.values(0)["offset"] == pytest.approx(samples * H, abs=1e-5)
 
 
+STATED = {"zero_per_record"}
+
+
+def test_a_zero_that_is_stated_to_be_free_is_fitted_in_every_record():
+    """The stiffness is found from records whose means differ by more than its effect."""
+    table = {
+        "kind": "tested_axis", "name": "pull", "title": "a spring", "source": "round numbers",
+        "mechanics": {
+            "mass": "0 kg", "damping": "0 N*s/m", "stiffness": {"value": "1 N/um", "sd": "0.5 N/um"},
+            "stroke": "50 um", "speed": "1 mm/s", "force": "50 N",
+        },
+        "effect": [{"kind": "zero_per_record", "at": "force", "share": 1.0}],
+    }  # fmt: skip
+    device, parts, rng = validate(Device.library["tested_axis"], table, "device"), [], np.random.default_rng(10)
+    for zero, role in ((12.0, "fit"), (-7.0, "fit"), (3.0, "hold_out")):
+        d = rng.uniform(0, 5e-5, 300)
+        moved = np.column_stack([d, 0 * d, 0 * d])
+        parts.append(record(moved, 1.2e6 * d + zero + 0.01 * rng.standard_normal(300), role))
+    fitter = fitter_of(device, ("reading.force",), ("N",), (0.01,), "series", parts)
+    fitter, fit = fitter.described(device)
+    assert fit.theta == pytest.approx([1.2e6], rel=1e-4)
+    assert [float(states[0]) for states in fit.initial_states] == pytest.approx([12.0, -7.0], abs=0.01)
+    held = parts[-1]
+    assert np.std(held.observed - fitter.predict(fit, held)) < 0.012
+    assert np.mean(held.observed - fitter.predict(fit, held)) == pytest.approx(0.0, abs=0.01)
+
+
 def test_no_law_is_left_out():
     battery = {ALSO.get(name, name) for name in (*laws.DRAW, *FAULTS)}
-    here = {*(law.__name__ for law in ON_AXIS), *ON_HEXAPOD, *SHARED, "clock_offset", "payload", "second_pole"}
-    assert not set(Effect.library) - battery - here - IN_THE_LOOP
+    here = {
+        *(law.__name__ for law in ON_AXIS),
+        *ON_HEXAPOD,
+        *SHARED,
+        *IN_ORDER,
+        "clock_offset",
+        "payload",
+        "second_pole",
+    }
+    assert not set(Effect.library) - battery - here - STATED - IN_THE_LOOP

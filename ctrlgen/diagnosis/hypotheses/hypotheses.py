@@ -157,7 +157,9 @@ def _of_law(
 ) -> Iterator[Hypothesis]:
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
     prior = prior_of(law)
-    if not law.requires <= there or prior.unless & there or (law.place is Place.HEAT and "heat" not in there):
+    if not prior.suspected or prior.unless & there:
+        return
+    if not law.requires <= there or (law.place is Place.HEAT and "heat" not in there):
         return
     domain = prior.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")

@@ -59,6 +59,7 @@ class LawPrior:
     family: name shared by laws that are forms of one physics; a place has at most one of a family.
     nested_case: the simpler law inside this one; where the fit does not exclude it, it is named as an alternative.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
+    suspected: False for what a device file may state, and no recording shows beside what else it shows.
     repeatable: the law may act more than once at one place, as harmonics do.
     acts_on_all: the law is suspected at all channels at once only.
     domain: where a finding is reported to be; by default what the law's place says.
@@ -71,6 +72,7 @@ class LawPrior:
     family: str | None = None
     nested_case: NestedCase | None = None
     unless: frozenset[str] = frozenset()
+    suspected: bool = True
     repeatable: bool = False
     acts_on_all: bool = False
     domain: str | None = None
@@ -186,6 +188,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
             "frequency": _starts((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
             "phase": _starts((0.0, 90.0)),
         },
+    ),
+    "zero_per_record": LawPrior(
+        "Within one record it is a home offset, and over several it fits the mean of whatever is missing: it is stated.",
+        suspected=False,
+        parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
     ),
     # Drive and heat -------------------------------------------------------------------------------------------------------
     "asymmetric_gain": LawPrior("Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN),

@@ -107,7 +107,8 @@ FAMILY_OF = {
     **dict.fromkeys(("stiffening", "one_sided_stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
     **dict.fromkeys(("asymmetric_gain", "dead_zone", "saturation", "heater_resistance"), Family.DRIVE),
     **dict.fromkeys(
-        ("drive_gain", "lever_ratio", "sensor_gain", "stiffness", "drive_offset", "home_offset"), Family.GAIN
+        ("drive_gain", "lever_ratio", "sensor_gain", "stiffness", "drive_offset", "home_offset", "zero_per_record"),
+        Family.GAIN,
     ),
     **dict.fromkeys(("reversed", "stuck", "payload"), Family.GAIN),
     **dict.fromkeys(("coupling", "heat_crosstalk", "link_compliance", "swapped"), Family.CROSS_TALK),
