@@ -85,7 +85,7 @@ def _diagnose(
     search = Searcher(fitter, Screen(fitter, suspected, seed), step).run(device)
     step("residual tests")
     tests = run_residual_tests(search.fitter, search.chosen.fit)
-    attribution = attribute(search, seed)
+    attribution = attribute(search.fitter, search.nominal, search.chosen, seed)
     detected = (*live.findings, *directly_detected_findings(search, effects))
     answer = verdict(search, tests, attribution, bool(detected))
     step("supporting analyses")

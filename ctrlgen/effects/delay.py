@@ -20,6 +20,7 @@ class Delay(Effect):
     requires = frozenset({"sample_time"})
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"
     params = (Param("delay", "ms", (0.0, 500.0), "age of the reading", off=0.0),)
+    moves_in_time = True
     states = (
         *(State(f"y{k}", "channel", 1.0, stepped=True) for k in EVERY),
         *(State(f"r{k}", "channel/s", 10.0, stepped=True) for k in EVERY),

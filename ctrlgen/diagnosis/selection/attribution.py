@@ -20,7 +20,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
@@ -36,7 +36,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Attribution:
-    """The `shares` of the causes of the chosen model, in its order, and that of the `rest`; None where nothing is to share.
+    """The `shares` of the causes of a model, in its order, and that of the `rest`; None where nothing is to share.
 
     `held_out`: whether they are of the held-out records; of the records to fit where the held-out ones show no mismatch.
     """
@@ -51,17 +51,17 @@ class Attribution:
         return 0.0 if self.rest is None else 1.0 - self.rest.value
 
 
-def attribute(search: SearchResult, seed: int = 0) -> Attribution:
-    """The shares of the causes of the chosen model."""
-    fitter, fit = search.fitter, search.chosen.fit
+def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, seed: int = 0) -> Attribution:
+    """The shares of the causes of a `model` of what the device as `described` leaves."""
+    fit = model.fit
     n = len(fit.structure.causes)
-    held = search.nominal.held_out.excess > ATTRIBUTION.least_excess * np.sum(search.nominal.held_out.n_plain)
-    nominal = search.nominal.held_out if held else search.nominal.fitted
-    chosen = search.chosen.held_out if held else search.chosen.fitted
+    held = described.held_out.excess > ATTRIBUTION.least_excess * np.sum(described.held_out.n_plain)
+    nominal = described.held_out if held else described.fitted
+    chosen = model.held_out if held else model.fitted
     if not n or nominal.excess <= 0:
         return Attribution((None,) * n, None, held)
     records = fitter.held_out_records if held else fitter.fit_records
-    rough = fitter.with_errors_of(search.nominal.fit)  # incomplete models leave much
+    rough = fitter.with_errors_of(described.fit)  # incomplete models leave much
     everyone = frozenset(range(n))
     left = {frozenset[int](): _by_block(nominal), everyone: _by_block(chosen)}
     for present in _subsets(n):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit
+from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, restart, restart_with
 from ctrlgen.diagnosis.selection.model_selection import scored
@@ -82,27 +83,29 @@ def restart_elsewhere(
 def fit_other_clocks(
     trials: Trials, current: CandidateModel, singles: Sequence[CandidateModel]
 ) -> tuple[CandidateModel, ...]:
-    """What an offset of the recorders' clocks explains, alone and beside the best of the `singles`, begun at the best of a few.
-    The screen cannot see it: it shifts the drive itself."""
+    """What a signal that is early or late explains, alone and beside the best of the `singles`, begun at the best of a few
+    shifts. The screen hardly sees it: a shift of several samples is no multiple of a slope."""
     h = min(r.sample_time for r in trials.fitter.recording.records)
     open_ = (o for o in (h.beside(current.causes) for h in trials.screen.hypotheses) if o is not None)
-    clocks = [o for o in open_ if o.effect != PARAMETER and o.law.shifts_drive]
-    if current.errors.is_noise or not np.isfinite(h):
+    shifts = [o for o in open_ if o.effect != PARAMETER and o.law.moves_in_time]
+    if current.errors.is_noise or not np.isfinite(h) or not shifts:
         return ()
     found: list[CandidateModel] = []
-    for cause in clocks:
-        p = cause.law.amplitude()
-        low, high = cause.bounds(p, current.fit.structure.channel_of(cause))
-        starts = [s * 2**k * h for k in range(SEARCH.clock_doublings) for s in (1, -1)]
-        trials.step(f"trying {cause.effect} at {cause.location}")
-        for beside in (current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]):
-            begun = [restart_with(beside.fit, cause, {p.name: s}) for s in starts if low <= s <= high]
+    for beside in (current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]):
+        begun: list[tuple[float, Hypothesis, Structure]] = []
+        for cause in shifts:
+            p = cause.law.amplitude()
+            low, high = cause.bounds(p, current.fit.structure.channel_of(cause))
             try:
-                best = min(begun, key=trials.fitter.initial_objective)
+                for start in (2**k * h for k in range(SEARCH.clock_doublings) if low <= 2**k * h <= high):
+                    structure = restart_with(beside.fit, cause, {p.name: start})
+                    begun.append((trials.fitter.initial_objective(structure), cause, structure))
             except FAILURES as error:
                 trials.note_failure(cause, error)
-                continue
-            found += trials.tried(best, cause, beside.fit)
+        if begun:
+            _, cause, structure = min(begun, key=lambda b: b[0])
+            trials.step(f"trying {cause.effect} at {cause.location}")
+            found += trials.tried(structure, cause, beside.fit)
     return tuple(found)
 
 

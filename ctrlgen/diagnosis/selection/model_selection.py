@@ -45,10 +45,15 @@ def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> Candida
 
 
 class ModelSelection:
-    """The tests by which candidate models are compared; `candidate` fits a structure for them."""
+    """The tests by which candidate models are compared; `candidate` fits a structure for them.
 
-    def __init__(self, fitter: Fitter, candidate: Callable[..., CandidateModel]) -> None:
-        self.fitter, self.fit_candidate = fitter, candidate
+    `mismatch` (n_y,) [SI^2] is the mean square that the device as described leaves on the held-out records, where it is known.
+    """
+
+    def __init__(
+        self, fitter: Fitter, candidate: Callable[..., CandidateModel], mismatch: np.ndarray | None = None
+    ) -> None:
+        self.fitter, self.fit_candidate, self.mismatch = fitter, candidate, mismatch
 
     def _loss(self, left: Misfit, errors: ErrorModel) -> float:
         """Sum over the channels of (m/tau) l(q), under `errors`."""
@@ -161,7 +166,14 @@ class ModelSelection:
         worthwhile = MODEL_SELECTION.worthwhile_share * n_held * float(np.max(1 - 1 / q, initial=0.0))
         if confirmed <= max(MODEL_SELECTION.least_confirmed, worthwhile):
             return False
-        return errors.is_noise or wins_by_block(before.held_out, after.held_out)
+        return errors.is_noise or (self._matters(before, after) and wins_by_block(before.held_out, after.held_out))
+
+    def _matters(self, before: CandidateModel, after: CandidateModel) -> bool:
+        """Whether `after` takes away a share of the whole mismatch of any channel on the held-out records that is worth a name."""
+        if self.mismatch is None:
+            return True
+        gain = (before.held_out.plain_mean - after.held_out.plain_mean) * self.fitter.noise.floor**2
+        return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch))
 
     def unseen_in_held_out(self, candidate: CandidateModel) -> bool:
         """Whether the residual exceeds the noise on the records to fit, but not on the held-out records."""

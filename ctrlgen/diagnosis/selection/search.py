@@ -39,6 +39,7 @@ class Searcher:
         trials.use(fitter)
         rounds: list[Round] = []
         current = trials.with_noise_update(trials.fit(restart(described), steps=FIT.max_steps))
+        trials.mismatch = current.held_out.plain_mean * trials.fitter.noise.floor**2
         for _ in range(SEARCH.most_noise_updates):
             current = self._forward_rounds(current, rounds)
             before = trials.fitter.noise

@@ -27,13 +27,15 @@ FAILURES = (ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 class Trials:
     """Fits structures for a search, and keeps what was fitted, screened, `refused` and `failed`.
 
-    It replaces its own fitter as it learns the errors. `step` is called with a sentence before each trial.
+    It replaces its own fitter as it learns the errors. `mismatch` is that of `ModelSelection`. `step` is called with a sentence
+    before each trial.
     """
 
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
         self.fitter, self.screen, self.step = fitter, screen, step
         self.fitted: dict[frozenset, tuple[CandidateModel, int]] = {}
         self.screens: dict[frozenset, tuple[Fit, Screened]] = {}
+        self.mismatch: np.ndarray | None = None
         self.refused: list[Refusal] = []
         self.failed: list[str] = []
         self.per_round = SEARCH.candidates_per_round * (SEARCH.cheap_factor if fitter.recording.kind == "poses" else 1)
@@ -41,7 +43,7 @@ class Trials:
     @property
     def selection(self) -> ModelSelection:
         """The comparison of candidates under the present noise."""
-        return ModelSelection(self.fitter, self.fit)
+        return ModelSelection(self.fitter, self.fit, self.mismatch)
 
     def use(self, fitter: Fitter) -> None:
         """Goes on with another fitter: fits and screens under other errors are forgotten."""

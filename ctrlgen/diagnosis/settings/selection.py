@@ -117,7 +117,7 @@ class SearchSettings:
     nearly_best: float = 0.9
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
     clock_doublings: int = 6
-    """Offsets of the recorders' clocks from which a fit may begin: one sample, doubled so many times less one, early and late."""
+    """Shifts in time from which a fit may begin: one sample, doubled so many times less one, early and late."""
     restarts: int = 4
     """Other shapes of a law from which it is fitted again, those that begin best: the valleys of one law. Judgement."""
     beside_clocks: int = 4
@@ -150,6 +150,9 @@ class ModelSelectionSettings:
     worthwhile_share: float = 0.05
     """Share of the held-out excess over the noise that a further cause must explain: less is within what the discrepancy of
     the other laws may feign. Judgement."""
+    least_share: float = 0.01
+    """Share of the whole mismatch of a channel, of energy on the held-out records, that a further cause must explain where more
+    than noise is left: a tenth of the error. Judgement."""
     block_draws: int = 1000
     """Bootstrap samples of the blocks: they know a p of 5 % to 0.7 %."""
     block_p: float = 0.1
