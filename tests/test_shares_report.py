@@ -104,6 +104,19 @@ def test_a_consistent_verdict_says_nothing_and_short_records_have_no_shares(foun
     assert diagnosis_record(replace(found, shares=None), MADE_FROM)["shares"] is None
 
 
+def test_a_record_along_which_a_model_diverges_has_no_part_in_the_shares(found, monkeypatch):
+    fitter, search = found.fitter, found.search
+    held = fitter.held_out_records[0]
+    predict = type(fitter).predict
+    monkeypatch.setattr(
+        type(fitter), "predict", lambda self, fit, r: predict(self, fit, r) * (np.nan if r is held else 1.0)
+    )
+    shares = residual_shares(fitter, search.nominal.fit, search.chosen.fit)
+    assert len(shares.before.blocks.rows) == len(shares.after.blocks.rows) == 1
+    monkeypatch.setattr(type(fitter), "predict", lambda self, fit, r: predict(self, fit, r) * np.nan)
+    assert residual_shares(fitter, search.nominal.fit, search.chosen.fit) is None
+
+
 def channel(
     parts: dict[Kind, float], total: float, constant: float = 0.0, past: float = 0.0, numbers: float = 0.0
 ) -> ChannelShares:

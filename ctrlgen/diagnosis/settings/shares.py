@@ -28,7 +28,7 @@ class SharesSettings:
     """The same where a kind has more than two signals, to bound the number of columns."""
     spline_columns_poses: int = 3
     """The same for settled poses: a cubic, which 20 poses can bear."""
-    ridges: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+    ridges: tuple[float, ...] = (1e-6, 1e-4, 1e-2, 1e-1, 1.0)
     """Ridge weights tried, over the columns' unit variance; the one with the smallest error out of block is taken."""
     free_ridge: float = 1e-6
     """Largest ridge on the device's own free numbers, which the fit has left at their optimum: small enough to let them

@@ -51,6 +51,7 @@ class ChannelSmoothers:
         self.energy = self.blocks.sums(np.where(common.usable, self.y**2, 0.0))
         self.every_fold = np.tile(self.y, (common.count, 1))
         self.kinds = design.kinds(own)
+        self.fitted: dict[tuple[frozenset[Kind], int], OutOfBlock] = {}
         numbers = standardised(numbers)[:, np.ptp(numbers, axis=0) > 0]
         extra, self.periods = self._found_in_residual()
         self.folds = common.with_columns([np.column_stack([numbers, *one.values()]) for one in extra])
@@ -72,10 +73,25 @@ class ChannelSmoothers:
         return bare
 
     def fit(self, kinds: Iterable[Kind], targets: np.ndarray | None = None) -> OutOfBlock:
-        """The residual, or `targets` (folds, N), from the columns of some kinds, the mean and the device's numbers."""
-        columns = [self.kinds[kind] for kind in kinds]
+        """The residual, or `targets` (folds, N), from the columns of some kinds and the mean; with the device's numbers beside
+        them where that predicts better."""
+        chosen = frozenset(kinds)
+        alone = self._fit(chosen, targets, self.free[:0])
+        if not len(self.free):
+            return alone
+        return min(alone, self._fit(chosen, targets, self.free), key=lambda f: f.squares.sum())
+
+    def _fit(self, kinds: frozenset[Kind], targets: np.ndarray | None, free: np.ndarray) -> OutOfBlock:
+        """The fit of a set of kinds beside the columns `free`; those of the residual itself are kept."""
+        key = kinds, len(free)
+        if targets is None and key in self.fitted:
+            return self.fitted[key]
+        columns = [self.kinds[kind] for kind in self.kinds if kind in kinds]
         chosen = np.concatenate(columns) if columns else np.zeros(0, int)
-        return self.folds.fit(chosen, self.every_fold if targets is None else targets, self.free)
+        found = self.folds.fit(chosen, self.every_fold if targets is None else targets, free)
+        if targets is None:
+            self.fitted[key] = found
+        return found
 
     def says_more(self, before: OutOfBlock, after: OutOfBlock) -> bool:
         """Whether a prediction says more than another one, and more than the mean and the numbers, which stand beside every
@@ -200,7 +216,7 @@ def _selected(
     """
     while len(chosen) < SHARES.most_steps and (left := [kind for kind in kinds if kind not in chosen]):
         remains = channel.folds.left(now, channel.every_fold)
-        alone = {kind: channel.fit([kind], remains).squares.sum() for kind in left}
+        alone = {kind: channel.without_numbers().fit([kind], remains).squares.sum() for kind in left}  # to rank them
         ranked = sorted(left, key=lambda kind: alone[kind])
         many = sum(map(len, channel.kinds.values())) > SHARES.many_columns
         few = SHARES.joint_candidates if many and chosen else None

@@ -69,14 +69,11 @@ class FoldsOfChannel:
         return self.fit(np.zeros(0, int), np.tile(y, (self.common.count, 1)))
 
     def fit(self, columns: np.ndarray, targets: np.ndarray, free: np.ndarray | None = None) -> OutOfBlock:
-        """`targets` (folds, N), one a fold, predicted from some columns and a mean.
-
-        Columns `free` are added where that predicts better; their coefficients are held by `SHARES.free_ridge` at the most.
-        """
-        alone = self._fit(columns, targets, 0)
+        """`targets` (folds, N), one a fold, predicted from some columns and a mean, and from columns `free`, whose coefficients
+        are held by `SHARES.free_ridge` at the most."""
         if free is None or not len(free):
-            return alone
-        return min(alone, self._fit(np.concatenate([free, columns]), targets, len(free)), key=lambda f: f.squares.sum())
+            return self._fit(columns, targets, 0)
+        return self._fit(np.concatenate([free, columns]), targets, len(free))
 
     def left(self, fit: OutOfBlock, targets: np.ndarray) -> np.ndarray:
         """What the model of each fold leaves of its target, (folds, N)."""

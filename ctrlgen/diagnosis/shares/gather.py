@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.settings import FIT
 from ctrlgen.diagnosis.shares.channel import share_of
 from ctrlgen.diagnosis.shares.regressors import Signals
 from ctrlgen.diagnosis.shares.result import Share, SharesTable
@@ -33,21 +34,31 @@ class ResidualShares:
 
 
 def residual_shares(fitter: Fitter, described: Fit, accepted: Fit, seed: int = 0) -> ResidualShares | None:
-    """The shares before and after, over the records to fit and those held out; None where these are too short."""
+    """The shares before and after, over the records to fit and those held out that both models can be simulated along; None
+    where these are too short."""
+    changed = bool(accepted.structure.causes)
+    fits = (described, accepted) if changed else (described,)
+    records = [
+        r for r in (*fitter.fit_records, *fitter.held_out_records) if all(_stays_finite(fitter, f, r) for f in fits)
+    ]
     try:
-        before = fit_shares(fitter, described, seed=seed)
-        changed = bool(accepted.structure.causes)
-        return ResidualShares(before, fit_shares(fitter, accepted, seed=seed) if changed else before)
+        tables = [fit_shares(fitter, fit, records, seed) for fit in fits]
     except TooFewSamples:
         return None
+    return ResidualShares(tables[0], tables[-1])
 
 
-def fit_shares(fitter: Fitter, fit: Fit, records: Sequence[Record] | None = None, seed: int = 0) -> SharesTable:
-    """The model-free shares of what a fit leaves of `records`, by default of those to fit and those held out.
+def _stays_finite(fitter: Fitter, fit: Fit, record: Record) -> bool:
+    """Whether a model can be simulated along a record: one with another structure may diverge where it was not fitted."""
+    states, y = fitter.simulator(fit.structure, record).simulate_states(record, fit.theta)
+    return all(bool(np.all(np.abs(v) < FIT.reading_limit)) for v in (states, y, fitter.predict(fit, record)))
 
-    Raises TooFewSamples."""
-    chosen = [*fitter.fit_records, *fitter.held_out_records] if records is None else records
-    gathered = [gather(fitter, fit, record) for record in chosen]
+
+def fit_shares(fitter: Fitter, fit: Fit, records: Sequence[Record], seed: int = 0) -> SharesTable:
+    """The model-free shares of what a fit leaves of `records`. Raises TooFewSamples."""
+    if not records:
+        raise TooFewSamples("no record")
+    gathered = [gather(fitter, fit, record) for record in records]
     residuals, signals, sensitivities = (list(part) for part in zip(*gathered, strict=True))
     return model_free_shares(residuals, signals, fitter.recording.channels, sensitivities, seed)
 
