@@ -124,6 +124,10 @@ LAWS = {
     "drift": ({}, lambda s, p: p.rate * s.t),
     "drive_gain": ({}, lambda s, p: p.gain * s.value),
     "drive_hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.share * weighted(s, p, s.value)),
+    "directional_friction": (
+        {"skew": -0.4, "reach": 0.02}, lambda s, p: -p.force * (s.z - 0.4 * s.w),
+        lambda s, p: {"z": (s.velocity - abs(s.velocity) * s.z) / 0.02, "w": abs(s.velocity) * (1 - s.w) / 0.02},
+    ),
     "displacement_bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.share * s.z),
     "displacement_hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.share * weighted(s, p, s.value)),
     "drive_offset": ({}, lambda s, p: p.offset),
@@ -326,6 +330,8 @@ def test_dry_friction_that_slides_is_its_force_whatever_the_way_it_yields(v):
     p = SimpleNamespace(force=0.4, reach=0.02, smoothing=0.1)
     way = 40 * 0.02 / abs(v)
     assert force("coulomb", p, way, velocity=v) == pytest.approx(-0.4 * tanh(v / 0.1), rel=1e-6)
+    p = SimpleNamespace(force=0.4, reach=0.02, skew=0.3)
+    assert force("directional_friction", p, way, velocity=v) == pytest.approx(-0.4 * (sign(v) + 0.3), rel=1e-6)
     p = SimpleNamespace(force=0.4, reach=0.02, speed=0.2, breakaway=1.8)
     wanted = -0.4 * sign(v) * (1 + 0.8 * exp(-((v / 0.2) ** 2)))
     assert force("stribeck", p, way, velocity=v) == pytest.approx(wanted, rel=1e-6)

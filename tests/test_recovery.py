@@ -124,6 +124,18 @@ def one_sided_stiffening(u, t):
     return move(u, lambda time, q, v, memory: (-2e8 * (q + v * H / 20) ** 2, memory))  # in the middle of a step
 
 
+def directional_friction(u, t):
+    """0.9 N forward and 0.5 N backward, built up over 3 um, in steps of a tenth of a sample."""
+
+    def force(time, q, v, memory):
+        z, way = memory or (0.0, 0.0)
+        step = v * H / 10
+        z, way = z + (step - abs(step) * z) / 3e-6, way + abs(step)
+        return -0.7 * z - 0.2 * (1 - np.exp(-way / 3e-6)), (z, way)
+
+    return move(u, force)
+
+
 def bouc_wen(u, t):
     """F = -k z, dz = dd (1 - (beta sgn(dd z) + gamma)|z|), beta = 8e4/m, gamma = 2e4/m, in steps of a tenth of a sample."""
 
@@ -143,6 +155,9 @@ ON_AXIS = {
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
+    directional_friction: Planted(
+        "stage:axis", {"force": 0.7, "skew": 2 / 7, "reach": 3e-6}, within={"force": 0.02, "skew": 0.05, "reach": 0.05}
+    ),
     one_sided_stiffening: Planted("stage:axis", {"k2": 2e8}, within={"k2": 0.02}),
     drive_hysteresis: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
     bouc_wen: Planted(

@@ -1,6 +1,6 @@
 """Weighted play operators of several widths: the elements of rate-independent hysteresis (Prandtl-Ishlinskii).
 
-`hysteresis` of a stage, `drive_hysteresis` of a piezo stack and `displacement_hysteresis` of a stage in balance
+`hysteresis` of a stage, `drive_hysteresis` of a piezo stack and `displacement_hysteresis` of a joint behind the stage
 share these expressions and stay three laws: the first is a restoring force that slips with the displacement and places
 reversals between samples, the others are lags of a signal itself, so that their terms, units and parameters differ.
 `asymmetric_hysteresis` and `bouc_wen` are differential laws without plays.

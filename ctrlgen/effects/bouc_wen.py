@@ -47,12 +47,12 @@ class BoucWen(Yielding):
 
 
 class DisplacementBoucWen(Yielding):
-    """Delta d = -g z, z of `Yielding`: a lag. Holds for a stage in balance; in a set of poses the memory goes from pose to pose."""
+    """Delta d = -g z, z of `Yielding`: a lag behind the stage; in a set of poses the memory goes from pose to pose. Holds as above."""
 
     title = "A joint behind the stage that yields smoothly"
     place = Place.DISPLACEMENT
     order = 1
-    requires = frozenset({"balanced"})
+    requires = frozenset({"actuator"})
     params = (Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0), *_SHAPE)
 
     def term(self, s, p):

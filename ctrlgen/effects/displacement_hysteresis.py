@@ -8,13 +8,13 @@ class DisplacementHysteresis(Effect):
     """Delta d = g (sum_j w_j P_j - d), j = 1..8: P_j is the play of d with radius r j/8, w_j ~ j^-q, sum w_j = 1.
 
     Prandtl-Ishlinskii with play operators, rate-independent; in a set of poses the memory goes from pose to pose in their
-    order. g < 0 leads, as behind a controller that overcompensates. Holds for congruent loops, on stages in balance; with
-    inertia hysteresis is a force.
+    order. g < 0 leads, as behind a controller that overcompensates. Holds for congruent loops, behind the stage: what
+    lags in its guide is the force `hysteresis`.
     """
 
     place = Place.DISPLACEMENT
     order = 1
-    requires = frozenset({"balanced"})
+    requires = frozenset({"actuator"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
     params = (
         Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0),

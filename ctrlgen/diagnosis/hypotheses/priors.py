@@ -263,6 +263,14 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         family="dry friction",
         parameters={"reach": _peaks(3e-4, 3e-3, 0.03), "smoothing": _peaks(1e-4, 0.1)},
     ),
+    "directional_friction": LawPrior(
+        "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
+        log_prior_odds=-1.0,
+        model_form_error=0.02,
+        family="dry friction",
+        nested_case=NestedCase("coulomb", "skew", 0.0),
+        parameters={"skew": _starts((-0.3, 0.3)), "reach": _peaks(3e-4, 3e-3, 0.03)},
+    ),
     "end_stop": LawPrior(
         "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A stop beyond the peak is never touched.",
         model_form_error=0.05,

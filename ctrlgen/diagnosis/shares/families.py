@@ -91,7 +91,7 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
 }
 
 FAMILY_OF = {
-    **dict.fromkeys(("coulomb", "stribeck"), Family.FRICTION),
+    **dict.fromkeys(("coulomb", "directional_friction", "stribeck"), Family.FRICTION),
     **dict.fromkeys(
         (
             "hysteresis",
