@@ -21,12 +21,16 @@ bench: $(VENV)/installed-test
 	$(BIN)/python -m benchmarks --repeat $(REPEAT)
 
 # make battery SIZE=ci|small|full SEED=1: concealed cases (hours for full), diagnosed and scored; goes on where it was stopped
+# CLASSES=messy,memory,null draws these classes alone
 SIZE ?= small
 SEED ?= 1
 OPPONENTS ?= 4
+CLASSES ?=
+comma := ,
+CONCEALED = out/battery_$(SIZE)_$(SEED)$(if $(CLASSES),_$(subst $(comma),_,$(CLASSES)))
 battery: $(VENV)/installed-test
-	test -e out/battery_$(SIZE)_$(SEED)/battery.json || $(BIN)/python -m battery make --out out/battery_$(SIZE)_$(SEED) --seed $(SEED) --size $(SIZE)
-	$(BIN)/python -m battery score out/battery_$(SIZE)_$(SEED) --run "$(BIN)/ctrlgen diagnose" --opponents $(OPPONENTS)
+	test -e $(CONCEALED)/battery.json || $(BIN)/python -m battery make --out $(CONCEALED) --seed $(SEED) --size $(SIZE) --classes "$(CLASSES)"
+	$(BIN)/python -m battery score $(CONCEALED) --run "$(BIN)/ctrlgen diagnose" --opponents $(OPPONENTS)
 
 # make loop    drives the independent plant with generated C, diagnoses it, corrects the device, drives it again (minutes)
 loop: $(VENV)/installed

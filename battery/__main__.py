@@ -25,6 +25,15 @@ def _progress(console: Console) -> Progress:
     )
 
 
+def _classes(text: str) -> tuple[str, ...]:
+    """The classes named, between commas; all for an empty text."""
+    names = tuple(filter(None, text.split(",")))
+    for name in names:
+        if name not in cases.CLASSES:
+            raise argparse.ArgumentTypeError(f"{name!r} is no class; known are {', '.join(cases.CLASSES)}")
+    return names or cases.CLASSES
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Exit 0 when the table was made, whatever it says; --strict: 1 where a goal is missed."""
     parser = argparse.ArgumentParser(
@@ -38,6 +47,13 @@ def main(arguments: list[str] | None = None) -> int:
     make.add_argument("--out", type=Path, required=True, help="gets cases/ and answers/")
     make.add_argument("--seed", type=int, default=1, help="of everything drawn; a seed not seen before proves most")
     make.add_argument("--size", choices=sorted(cases.COUNTS), default="small", help=SIZES)
+    make.add_argument(
+        "--classes",
+        type=_classes,
+        default=cases.CLASSES,
+        metavar="A,B",
+        help=f"only these of {', '.join(cases.CLASSES)}",
+    )
     run = commands.add_parser("score", help="run the diagnosis over a folder and print the table")
     run.add_argument("folder", type=Path, help="what make left")
     run.add_argument("--run", default="ctrlgen diagnose", help="the command under test")
@@ -56,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
             bar.update(task, completed=done, total=total)
 
         if a.command == "make":
-            cases.make(a.out, a.seed, a.size, a.jobs, shown)
+            cases.make(a.out, a.seed, a.size, a.jobs, shown, a.classes)
             return 0
         result = score.run(a.folder, shlex.split(a.run), a.jobs, a.timeout, a.again, a.opponents, shown)
     console.print(result.markdown, markup=False, highlight=False)

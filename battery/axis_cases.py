@@ -222,13 +222,16 @@ def device_text(stated: Axis) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_bench(folder: Path, bench: Bench, planted: list[Planted]) -> None:
-    """device.toml, recording.toml and one CSV per take."""
+def write_bench(folder: Path, bench: Bench, planted: list[Planted], device: str | None = None, length: bool = False,
+                stated: float = 1.0) -> None:  # fmt: skip
+    """device.toml (as text, else of the axis), recording.toml and one CSV per take.
+
+    `length`: the command is one; `stated`: the stated noise over the true one.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "device.toml").write_text(device_text(bench.stated))
-    loop = bench.axis.loop is not None
-    drive_unit, factor = ("um", 1e6) if loop else ("V", 1.0)
-    noise = f', noise = "{bench.scene.noise * 1e9:.3g} nm"' if bench.noise_stated else ""
+    (folder / "device.toml").write_text(device or device_text(bench.stated))
+    drive_unit, factor = ("um", 1e6) if length or bench.axis.loop is not None else ("V", 1.0)
+    noise = f', noise = "{bench.scene.noise * stated * 1e9:.3g} nm"' if bench.noise_stated else ""
     lines = ['title = "Recording of a stage"', 'device = "stage"', 'source = "bench"', 'kind = "series"', "", "[columns]",
              f'"drive.axis" = {{ column = "u", unit = "{drive_unit}" }}',
              f'"reading.axis" = {{ column = "y", unit = "um"{noise} }}']  # fmt: skip

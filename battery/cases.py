@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from battery import axis_cases, hexapod_cases, laws
+from battery import axis_cases, hexapod_cases, laws, rough_cases
 from battery.plant_axis import Planted
 from battery.seal import seal
 from battery.size import OWN, Ruler, left_over
@@ -37,19 +37,13 @@ GROUPS = (  # a mixture takes one from each of two or three
     ("resonance",),
 )
 LOOP = ("coulomb", "stribeck", "viscous", "quadratic_damping", "cyclic", "lost_beams", "step", "backlash")
-PLACE = {
-    **dict.fromkeys(("drive_gain", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag"), "actuator"),
-    **dict.fromkeys(("vibration", "step"), "disturbance"),
-    **dict.fromkeys(
-        ("cyclic", "bow", "drift", "temperature_sensitivity", "low_pass", "delay", "quantisation", "stuck", "sensor_gain",
-         "home_offset"), "sensor"),
-}  # fmt: skip
-COUNTS = {  # clean, single, weak, multiple, outside, confusable, hexapod clean, hexapod single
-    "ci": (2, 4, 1, 1, 1, 1, 1, 1),
-    "small": (10, 30, 8, 8, 7, 4, 2, 11),
-    "full": (110, 90, 40, 48, 42, 16, 10, 33),
+COUNTS = {  # by class, in the order of CLASSES
+    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 2, 2, 2),
+    "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12),
+    "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204),
 }
-CLASSES = ("clean", "single", "weak", "multiple", "outside", "confusable", "hexapod_clean", "hexapod_single")
+ROUGH = ("messy", "memory", "null")
+CLASSES = ("clean", "single", "weak", "multiple", "outside", "confusable", "hexapod_clean", "hexapod_single", *ROUGH)
 Rng = np.random.Generator
 
 
@@ -64,14 +58,16 @@ class Order:
     seconds: float
 
 
-def plan(seed: int, size: str) -> list[Order]:
-    """All cases of a battery, shuffled so that a number tells nothing."""
+def plan(seed: int, size: str, classes: Sequence[str] = CLASSES) -> list[Order]:
+    """All cases of these `classes` of a battery, shuffled so that a number tells nothing; a case is the same beside others."""
     rng = np.random.default_rng([seed, 0])
     rows: list[tuple[str, tuple[str, ...]]] = []
     for kind, count in zip(CLASSES, COUNTS[size], strict=True):
         pool = {"single": SINGLE, "weak": WEAK, "outside": laws.STRANGE, "hexapod_single": tuple(hexapod_cases.FAULTS),
                 "confusable": ("slow", "gain", "quasi-static", "commuting")}.get(kind)  # fmt: skip
-        if kind == "multiple":
+        if kind in ROUGH:
+            names = rough_cases.plan(kind, rng, count)
+        elif kind == "multiple":
             names = [_mixture(rng, 2 + k % 2) for k in range(count)]
         elif pool:
             cycle = itertools.cycle(rng.permutation(pool).tolist())
@@ -79,10 +75,8 @@ def plan(seed: int, size: str) -> list[Order]:
         else:
             names = [()] * count
         rows += [(kind, name) for name in names]
-    order = rng.permutation(len(rows))
-    return [
-        Order(i + 1, *rows[k], (seed, int(k) + 1), 4.0 if size == "ci" else 6.0) for i, k in enumerate(order.tolist())
-    ]
+    order = [k for k in rng.permutation(len(rows)).tolist() if rows[k][0] in classes]
+    return [Order(i + 1, *rows[k], (seed, k + 1), 4.0 if size == "ci" else 6.0) for i, k in enumerate(order)]
 
 
 def _mixture(rng: Rng, n: int) -> tuple[str, ...]:
@@ -129,7 +123,7 @@ def _with_laws(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str
         except ValueError:
             continue
         planted = [p for p, _ in found]
-        truth = [_truth(p, s, f"{PLACE.get(p.name, 'stage')}:axis") for p, s in found]
+        truth = [_truth(p, s, f"{laws.PLACE.get(p.name, 'stage')}:axis") for p, s in found]
         return (lambda d, b=bench, p=planted: axis_cases.write_bench(d, b, p)), axis_cases.describe(bench) | {
             "planted": truth
         }
@@ -175,7 +169,7 @@ def _confusable(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[st
         columns = np.column_stack([ruler.columns, *(ruler.change([r]) for r in rivals)])
         apart = left_over(ruler.change([law]), columns) / bench.scene.noise
         if apart < 0.3:
-            truth = [_truth(law, size, f"{PLACE.get(law.name, 'stage')}:axis")]
+            truth = [_truth(law, size, f"{laws.PLACE.get(law.name, 'stage')}:axis")]
             return (lambda d, b=bench, p=law: axis_cases.write_bench(d, b, [p])), axis_cases.describe(bench) | {
                 "planted": truth, "rivals": [n for n in pair if n != law.name], "apart": apart,
             }  # fmt: skip
@@ -215,7 +209,12 @@ def _hexapod(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str, 
     return (lambda d: hexapod_cases.write_bench(d, bench, fault)), hexapod_cases.describe(bench) | {"planted": truth}
 
 
+def _rough(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str, Any]]:
+    return rough_cases.make(order.kind, order.wanted, order.seconds, rng)
+
+
 MAKERS = {"clean": _clean, "confusable": _confusable, "hexapod_clean": _hexapod, "hexapod_single": _hexapod}
+MAKERS |= dict.fromkeys(ROUGH, _rough)
 
 
 def make_case(order: Order, folder: Path) -> str:
@@ -227,15 +226,18 @@ def make_case(order: Order, folder: Path) -> str:
     return name
 
 
-def make(folder: Path, seed: int, size: str, jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> None:
-    """All cases of a battery into an empty or new `folder`."""
+def make(folder: Path, seed: int, size: str, jobs: int = 2, progress: Callable[[int, int], None] | None = None,
+         classes: Sequence[str] = CLASSES) -> None:  # fmt: skip
+    """All cases of these `classes` of a battery into an empty or new `folder`."""
     if (folder / "answers").exists():
         raise FileExistsError(f"{folder} already holds a battery; give another folder or remove it")
-    orders = plan(seed, size)
+    orders = plan(seed, size, classes)
     with ProcessPoolExecutor(jobs) as pool:
         waiting = [pool.submit(make_case, order, folder) for order in orders]
         for done, future in enumerate(as_completed(waiting), 1):
             future.result()
             if progress:
                 progress(done, len(orders))
-    (folder / "battery.json").write_text(json.dumps({"seed": seed, "size": size, "cases": len(orders)}) + "\n")
+    (folder / "battery.json").write_text(
+        json.dumps({"seed": seed, "size": size, "classes": list(classes), "cases": len(orders)}) + "\n"
+    )

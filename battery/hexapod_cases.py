@@ -129,10 +129,10 @@ def size(bench: PoseBench, fault: Fault) -> float:
     return float(np.sqrt(np.mean(change**2, axis=0)).max())
 
 
-def device_text() -> str:
-    """The printed device, with standard deviations where the battery moves a number, without its name for a source."""
-    text = MEMS_HEXAPOD.read_text()
-    for path, sd in SD.items():
+def device_text(file: Path = MEMS_HEXAPOD, deviations: dict[str, float] = SD) -> str:
+    """The device of `file`, with standard deviations (shares) where the battery moves a number."""
+    text = file.read_text()
+    for path, sd in deviations.items():
         name = path.split(".")[1]
         text, count = re.subn(
             rf'^({name}\s*=\s*{{ value = "([\d.]+) ([^"]+)")',
@@ -141,34 +141,40 @@ def device_text() -> str:
             flags=re.MULTILINE,
         )
         if count != 1:
-            raise ValueError(f"{MEMS_HEXAPOD}: {name} is not written the way the battery expects")
+            raise ValueError(f"{file}: {name} is not written the way the battery expects")
     return text
 
 
 def write_bench(folder: Path, bench: PoseBench, fault: Fault | None) -> None:
     """device.toml, recording.toml and a CSV per role."""
+    columns = {f"P_{axis}": axis for axis in AXES}
+    write_poses(folder, device_text(), "mems_hexapod", columns, "W", bench, readings(bench, fault))
+
+
+def write_poses(folder: Path, text: str, device: str, columns: dict[str, str], unit: str, bench: PoseBench,
+                read: dict[str, Array], dwell: float | None = None, period: float | None = None) -> None:  # fmt: skip
+    """The device's `text`, recording.toml and a CSV per role with drives in `columns` (name: axis) and the poses `read`.
+
+    `dwell` [s] of a settled pose; `period` [s] of a series whose drive is linear between samples.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "device.toml").write_text(device_text())
+    (folder / "device.toml").write_text(text)
     noise = [f'"{bench.sd[0] * 1e6:.3g} urad"'] * 3 + [f'"{bench.sd[1] * 1e3:.3g} nm"'] * 3
-    lines = [
-        'title = "Settled poses"',
-        'device = "mems_hexapod"',
-        'source = "bench"',
-        'kind = "poses"',
-        "",
-        "[columns]",
-    ]
-    lines += [f'"drive.{axis}" = {{ column = "P_{axis}", unit = "W" }}' for axis in AXES]
+    kind, title = ("series", "Series of poses") if period else ("poses", "Settled poses")
+    lines = [f'title = "{title}"', f'device = "{device}"', 'source = "bench"', f'kind = "{kind}"', "", "[columns]"]
+    lines += [f'"drive.{axis}" = {{ column = "{name}", unit = "{unit}" }}' for name, axis in columns.items()]
     for name, sd in zip(COMPONENTS, noise, strict=True):
-        unit = "urad" if name.startswith("theta") else "um"
+        angle = "urad" if name.startswith("theta") else "um"
         stated = f", noise = {sd}" if bench.noise_stated else ""
-        lines.append(f'"reading.{name}" = {{ column = "{name}", unit = "{unit}"{stated} }}')
-    header = ",".join([f"P_{axis}" for axis in AXES] + list(COMPONENTS))
-    for k, (role, y) in enumerate(readings(bench, fault).items()):
+        lines.append(f'"reading.{name}" = {{ column = "{name}", unit = "{angle}"{stated} }}')
+    header = ",".join([*columns, *COMPONENTS])
+    for k, (role, y) in enumerate(read.items()):
         table = np.column_stack([bench.drives[role], y * np.repeat([1e6, 1.0], 3)])
         formats = ["%.6f"] * 6 + ["%.5f"] * 3 + ["%.6f"] * 3
         np.savetxt(folder / f"record_{k + 1}.csv", table, fmt=formats, delimiter=",", header=header, comments="")
         lines += ["", "[[record]]", f'file = "record_{k + 1}.csv"', f'role = "{role}"']
+        lines += [f'dwell = "{dwell:g} s"'] if dwell else []
+        lines += [f'sample_rate = "{1 / period:g} Hz"', 'between_samples = "linear"'] if period else []
     (folder / "recording.toml").write_text("\n".join(lines) + "\n")
 
 

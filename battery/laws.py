@@ -7,15 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from battery import laws_drive, laws_sensor, laws_stage, laws_strange
+from battery import laws_drive, laws_memory, laws_sensor, laws_stage, laws_strange
 from battery.plant_axis import Axis, Hooks, Planted, Scene, digitise, move, read
 
-MODULES = (laws_drive, laws_stage, laws_sensor, laws_strange)
+MODULES = (laws_drive, laws_stage, laws_sensor, laws_strange, laws_memory)
 DRAW = {name: draw for module in MODULES for name, draw in module.DRAW.items()}
 GUESS = {name: guess for module in MODULES for name, guess in module.GUESS.items()}
 STRANGE = tuple(laws_strange.DRAW)
 MAKE = {name: getattr(module, f"make_{name}", None) for module in MODULES for name in module.DRAW}
 MAKE |= {"temperature_sensitivity": laws_sensor.make_temperature, "softening": laws_stage.make_stiffening}
+MAKE |= laws_memory.MAKE
+PLACE = {  # where a law acts, if not at the stage
+    **dict.fromkeys(("drive_gain", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag"), "actuator"),
+    **dict.fromkeys(("vibration", "step"), "disturbance"),
+    **dict.fromkeys(
+        ("cyclic", "bow", "drift", "temperature_sensitivity", "low_pass", "delay", "quantisation", "stuck", "sensor_gain",
+         "home_offset"), "sensor"),
+}  # fmt: skip
 
 
 def build(planted: Sequence[Planted], scene: Scene) -> list[Hooks]:

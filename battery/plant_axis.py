@@ -28,7 +28,10 @@ class Loop:
 
 @dataclass(frozen=True)
 class Axis:
-    """`mass` [kg], `damping` [N s/m], `stiffness` [N/m], `force_constant` [N/V], `stroke` [m], `drive_limit` [V]."""
+    """`mass` [kg], `damping` [N s/m], `stiffness` [N/m], `force_constant` [N/V], `stroke` [m], `drive_limit` [V].
+
+    Without mass it follows its drive at once, as a piezo ceramic does: q = force_constant u/stiffness.
+    """
 
     mass: float
     damping: float
@@ -128,6 +131,8 @@ class Motion:
 def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0.0, scene: Scene | None = None,
          linear: bool = False) -> Motion:  # fmt: skip
     """Motion from rest under `drive` [V], or under a reference [m] where the axis has a loop."""
+    if axis.mass == 0:
+        return _follow(axis, np.asarray(drive, dtype=float), hooks, start, scene or Scene(axis), linear)
     h = (scene or Scene(axis)).step
     a11, a12, a21, a22, b1, b2, r1, r2 = exact_step(axis, h)
     m, c, k, k_f, limit, loop = (
@@ -166,6 +171,18 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
         q, v = a11 * q + a12 * v + b1 * F + r1 * dF, a21 * q + a22 * v + b2 * F + r2 * dF
         t += h
     return Motion(start + h * np.arange(len(qs)), np.array(qs), np.array(vs), np.array(us))
+
+
+def _follow(axis: Axis, drive: Array, hooks: Sequence[Hooks], start: float, scene: Scene, linear: bool) -> Motion:
+    """The motion of an axis without mass: at the beginning of every step, where the samples are."""
+    h, n = scene.step, len(drive)
+    t = start + h * np.arange(n * SUBSTEPS)
+    u = np.interp(np.arange(n * SUBSTEPS) / SUBSTEPS, np.arange(n), drive) if linear else np.repeat(drive, SUBSTEPS)
+    for hook in hooks:
+        if hook.drive:
+            u = np.array([hook.drive(time, value) for time, value in zip(t.tolist(), u.tolist(), strict=True)])
+    q = axis.force_constant * u / axis.stiffness
+    return Motion(t, q, np.gradient(q, h), u)
 
 
 def read(motion: Motion, hooks: Sequence[Hooks] = (), ambient: Array | None = None) -> Array:

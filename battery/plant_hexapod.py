@@ -240,15 +240,19 @@ class Hexapod:
             P = (np.sqrt(1 + 4 * g * P) - 1) / 2 / g
         return P + f.crosstalk * (P.sum(axis=1, keepdims=True) - P)
 
-    def temperature(self, drive: Array, dt: float | None = None) -> Array:
-        """Settled temperatures [degC], or those under drives held for `dt` [s], from ambient: exact first order."""
+    def temperature(self, drive: Array, dt: float | None = None, linear: bool = False) -> Array:
+        """Settled temperatures [degC], or those under drives held for `dt` [s], from ambient: exact first order.
+
+        `linear`: the power that arrives goes straight from sample to sample instead.
+        """
         a = self.n.actuator
         steady = a.ambient + a.thermal_resistance * self.power(drive)
         if dt is None:
             return steady
         T, decay = np.full(steady.shape, float(a.ambient)), np.exp(-dt / a.time_constant)
+        late = 1 - (1 - decay) * a.time_constant / dt if linear else 0.0  # share of a rise that has arrived at its end
         for k in range(len(T) - 1):
-            T[k + 1] = steady[k] + (T[k] - steady[k]) * decay
+            T[k + 1] = steady[k] + (T[k] - steady[k]) * decay + late * (steady[k + 1] - steady[k])
         return T
 
     def displacement(self, T: Array) -> Array:
@@ -282,6 +286,6 @@ class Hexapod:
         """Readings (n, 6) of settled poses."""
         return self.pose(self.displacement(self.temperature(drive)))
 
-    def series(self, drive: Array, dt: float) -> Array:
-        """Readings (n, 6) at k dt under drives held from k to k + 1, from ambient."""
-        return self.pose(self.displacement(self.temperature(drive, dt)))
+    def series(self, drive: Array, dt: float, linear: bool = False) -> Array:
+        """Readings (n, 6) at k dt under drives held from k to k + 1, or linear between them, from ambient."""
+        return self.pose(self.displacement(self.temperature(drive, dt, linear)))

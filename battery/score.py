@@ -10,45 +10,16 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from battery.judge import Judgement, judge
+from battery.rows import Row, number, share
+from battery.score_rough import rough_rows
 from battery.seal import unseal
-
-
-def wilson(hits: int, n: int, z: float = 1.959964) -> tuple[float, float]:
-    """95 % interval of a proportion. E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209."""
-    if n == 0:
-        return 0.0, 1.0
-    p, w = hits / n, z * z / n
-    half = z * np.sqrt(p * (1 - p) / n + w / n / 4)
-    return max(0.0, float((p + w / 2 - half) / (1 + w))), min(1.0, float((p + w / 2 + half) / (1 + w)))
-
-
-@dataclass(frozen=True)
-class Row:
-    """One goal: what, its share `hits`/`n` or its `value`, the goal in words, whether it is met (None: nothing to judge)."""
-
-    what: str
-    hits: int | None
-    n: int
-    value: float | None
-    goal: str
-    met: bool | None
-
-    @property
-    def shown(self) -> str:
-        """The measured value as text, with its interval where it is a share."""
-        if self.n == 0:
-            return "no case"
-        if self.hits is None:
-            return f"{self.value:.3g} (n = {self.n})"
-        low, high = wilson(self.hits, self.n)
-        return f"{100 * self.hits / self.n:.1f} % [{100 * low:.1f}, {100 * high:.1f}] ({self.hits}/{self.n})"
 
 
 @dataclass(frozen=True)
@@ -96,17 +67,6 @@ def load(folder: Path, name: str, state: dict[str, Any]) -> Judgement:
     return judge(answer, diagnosis, state["seconds"])
 
 
-def _share(what: str, flags: Sequence[bool], goal: str, least: float | None = None, most: float | None = None) -> Row:
-    n, hits = len(flags), int(sum(flags))
-    met = None if n == 0 else (least is None or hits / n >= least) and (most is None or hits / n <= most)
-    return Row(what, hits, n, None, goal, met)
-
-
-def _number(what: str, values: Sequence[float], at: float, goal: str, most: float) -> Row:
-    value = float(np.quantile(values, at)) if len(values) else None
-    return Row(what, None, len(values), value, goal, None if value is None else value <= most)
-
-
 def table(judged: Sequence[Judgement]) -> list[Row]:
     """The rows of the goals table of DIAGNOSIS.md."""
 
@@ -114,39 +74,41 @@ def table(judged: Sequence[Judgement]) -> list[Row]:
         return [j for j in judged if j.kind in kinds]
 
     single = of("single", "hexapod_single")
-    places = [p for j in judged for p in j.places]
-    covered = [c for j in judged for c in j.covered]
-    colour = [c for j in judged if j.autocorrelated for c in j.covered]
+    smooth = [j for j in judged if j.rough is None]
+    places = [p for j in smooth for p in j.places]
+    covered = [c for j in smooth for c in j.covered]
+    colour = [c for j in smooth if j.autocorrelated for c in j.covered]
     known = of("single", "multiple", "hexapod_single")
     ratios = [j.ratio for j in known if j.verdict != "failed" and j.ratio is not None]  # some noise nobody can know
     return [
-        _share("false alarms on clean records", [j.alarmed for j in of("clean", "hexapod_clean")], "<= 2 %", most=0.02),
-        _share("single >= 1 x noise, named exactly or in a set of two", [j.in_set for j in single], ">= 95 %", 0.95),
-        _share("single >= 1 x noise, exactly", [j.exact for j in single], ">= 85 %", 0.85),
-        _share("single 0.3-1 x noise, named", [j.in_set for j in of("weak")], ">= 70 %", 0.70),
-        _share("single 0.3-1 x noise, wrong name", [j.wrong for j in of("weak")], "<= 3 %", most=0.03),
-        _share("two or three, all exact", [j.exact for j in of("multiple")], ">= 80 %", 0.80),
-        _share("two or three, wrong name", [j.wrong for j in of("multiple")], "<= 5 %", most=0.05),
-        _share("outside the library, 'unexplained'", [j.abstained for j in of("outside")], ">= 95 %", 0.95),
-        _share("location, output or actuator", [c for c, _ in places], ">= 95 %", 0.95),
-        _share("location, place", [p for _, p in places], ">= 85 %", 0.85),
-        _share("location, band of a line", [b for j in judged for b in j.bands], ">= 85 %", 0.85),
-        _share("coverage of 95 % intervals", [c[2] for c in covered], "90-98 %", 0.90, 0.98),
-        _share("coverage, autocorrelated noise", [c[2] for c in colour], "90-98 %", 0.90, 0.98),
-        _number("held-out error / floor, median", ratios, 0.5, "<= 1.05", 1.05),
-        _number("held-out error / floor, 95th percentile", ratios, 0.95, "<= 1.3", 1.3),
-        _number("time of a case with one effect, longest [s]", [j.seconds for j in single if j.seconds], 1.0, "<= 60", 60),
-        _number("time of a case with two or three, longest [s]", [j.seconds for j in of("multiple") if j.seconds], 1.0, "<= 180", 180),
-        _share("confusable, said to be so with the truth in the set", [j.admitted for j in of("confusable")], "none set"),
-        _share("confusable, wrong name", [j.wrong for j in of("confusable")], "none set"),
-        _share("crashed, refused or out of time", [j.verdict == "failed" for j in judged], "0 %", most=0.0),
+        share("false alarms on clean records", [j.alarmed for j in of("clean", "hexapod_clean")], "<= 2 %", most=0.02),
+        share("single >= 1 x noise, named exactly or in a set of two", [j.in_set for j in single], ">= 95 %", 0.95),
+        share("single >= 1 x noise, exactly", [j.exact for j in single], ">= 85 %", 0.85),
+        share("single 0.3-1 x noise, named", [j.in_set for j in of("weak")], ">= 70 %", 0.70),
+        share("single 0.3-1 x noise, wrong name", [j.wrong for j in of("weak")], "<= 3 %", most=0.03),
+        share("two or three, all exact", [j.exact for j in of("multiple")], ">= 80 %", 0.80),
+        share("two or three, wrong name", [j.wrong for j in of("multiple")], "<= 5 %", most=0.05),
+        share("outside the library, 'unexplained'", [j.abstained for j in of("outside")], ">= 95 %", 0.95),
+        share("location, output or actuator", [c for c, _ in places], ">= 95 %", 0.95),
+        share("location, place", [p for _, p in places], ">= 85 %", 0.85),
+        share("location, band of a line", [b for j in smooth for b in j.bands], ">= 85 %", 0.85),
+        share("coverage of 95 % intervals", [c[2] for c in covered], "90-98 %", 0.90, 0.98),
+        share("coverage, autocorrelated noise", [c[2] for c in colour], "90-98 %", 0.90, 0.98),
+        number("held-out error / floor, median", ratios, 0.5, "<= 1.05", 1.05),
+        number("held-out error / floor, 95th percentile", ratios, 0.95, "<= 1.3", 1.3),
+        number("time of a case with one effect, longest [s]", [j.seconds for j in single if j.seconds], 1.0, "<= 60", 60),
+        number("time of a case with two or three, longest [s]", [j.seconds for j in of("multiple") if j.seconds], 1.0, "<= 180", 180),
+        share("confusable, said to be so with the truth in the set", [j.admitted for j in of("confusable")], "none set"),
+        share("confusable, wrong name", [j.wrong for j in of("confusable")], "none set"),
+        *rough_rows(judged),
+        share("crashed, refused or out of time", [j.verdict == "failed" for j in judged], "0 %", most=0.0),
     ]  # fmt: skip
 
 
 def confusion(judged: Sequence[Judgement]) -> Counter[tuple[str, str]]:
     """How often each planted law got each name; ('nothing', x) are names given for nothing planted."""
     pairs = Counter(pair for j in judged for pair in j.named)
-    quiet = sum(1 for j in judged if j.kind in {"clean", "hexapod_clean"} and not j.named)
+    quiet = sum(1 for j in judged if j.kind in {"clean", "hexapod_clean", "null"} and not j.named)
     return pairs + Counter({("nothing", "none"): quiet})
 
 
@@ -227,7 +189,7 @@ def write(folder: Path, judged: Sequence[Judgement], opponents: list[dict[str, A
     text = markdown(rows, judged, opponents)
     data = {
         "goals": [{**vars(r), "shown": r.shown} for r in rows],
-        "cases": [vars(j) for j in judged],
+        "cases": [asdict(j) for j in judged],
         "opponents": opponents,
     }
     (folder / "table.md").write_text(text)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +21,15 @@ OWN = (
 REFITTED = ("mass", "damping", "stiffness", "force_constant")
 
 
+def refitted(axis: Axis) -> tuple[str, ...]:
+    """The numbers of the axis that a maker states with a tolerance."""
+    return REFITTED if axis.mass else ("force_constant",)
+
+
 def sensitivities(axis: Axis, run: Callable[[Axis], Array]) -> Array:
-    """Columns d y/d ln p by central differences, and one of ones: (n, 5)."""
+    """Columns d y/d ln p by central differences, and one of ones: (n, 5); (n, 2) without mass."""
     columns = []
-    for name in REFITTED:
+    for name in refitted(axis):
         value = getattr(axis, name)
         step = 1e-4 * (value or 1.0)
         up, down = (run(replace(axis, **{name: value + s})) for s in (step, -step))
@@ -39,27 +46,14 @@ def left_over(change: Array, columns: Array) -> float:
     return float(np.sqrt(np.mean((change - unit @ fit) ** 2)))
 
 
-class Ruler:
-    """Measures laws on one record: `drive`, `start`, `ambient`, `noise` as in `simulate`."""
+class Gauge(ABC):
+    """Measures what a law changes, and scales laws to a size."""
 
-    def __init__(self, axis: Axis, scene: Scene, drive: Array, start: float, ambient: Array | None, noise: Array,
-                 linear: bool) -> None:  # fmt: skip
-        self.axis, self.scene = axis, scene
-        self._run = lambda axis, planted=(): simulate(axis, drive, planted, scene, start, ambient, noise, linear)
-        self.plain = self._run(axis)
-        self.columns = sensitivities(axis, self._run)
+    @abstractmethod
+    def size(self, planted: Any) -> float:
+        """rms of what `planted`, anything with a name and an amplitude, changes, per noise standard deviation."""
 
-    def change(self, planted: list[Planted]) -> Array:
-        """What the laws change in the reading, (n,) [m]."""
-        return self._run(self.axis, planted) - self.plain
-
-    def size(self, planted: Planted) -> float:
-        """rms left over, per noise standard deviation; without a refit for the laws in OWN."""
-        change = self.change([planted])
-        rest = float(np.sqrt(np.mean(change**2))) if planted.name in OWN else left_over(change, self.columns)
-        return rest / self.scene.noise
-
-    def scaled(self, planted: Planted, target: float, low: float, high: float) -> tuple[Planted, float]:
+    def scaled(self, planted: Any, target: float, low: float, high: float) -> tuple[Any, float]:
         """`planted` with the amplitude that has size `target`; the nearest that stays within [low, high] of it counts.
 
         Raises ValueError where no such amplitude is found: the caller draws again.
@@ -79,3 +73,24 @@ class Ruler:
         if low <= size <= high:
             return planted, size
         raise ValueError(f"{planted.name}: no amplitude of size {target:.2g} found ({size:.2g})")
+
+
+class Ruler(Gauge):
+    """Measures laws on one record: `drive`, `start`, `ambient`, `noise` as in `simulate`."""
+
+    def __init__(self, axis: Axis, scene: Scene, drive: Array, start: float, ambient: Array | None, noise: Array,
+                 linear: bool) -> None:  # fmt: skip
+        self.axis, self.scene = axis, scene
+        self._run = lambda axis, planted=(): simulate(axis, drive, planted, scene, start, ambient, noise, linear)
+        self.plain = self._run(axis)
+        self.columns = sensitivities(axis, self._run)
+
+    def change(self, planted: list[Planted]) -> Array:
+        """What the laws change in the reading, (n,) [m]."""
+        return self._run(self.axis, planted) - self.plain
+
+    def size(self, planted: Planted) -> float:
+        """rms left over, per noise standard deviation; without a refit for the laws in OWN."""
+        change = self.change([planted])
+        rest = float(np.sqrt(np.mean(change**2))) if planted.name in OWN else left_over(change, self.columns)
+        return rest / self.scene.noise

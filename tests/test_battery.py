@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from battery import cases, judge, laws, opponents, plant_hexapod, score
+from battery import cases, judge, laws, opponents, plant_hexapod, rows, score
 from battery.plant_axis import SUBSTEPS, Axis, Loop, Planted, Scene, move
 from battery.seal import seal, unseal
 from battery.size import left_over
@@ -303,7 +303,7 @@ def test_a_crash_counts_against(tmp_path):
 
 
 def test_wilson_is_the_printed_interval():
-    low, high = score.wilson(8, 10)
+    low, high = rows.wilson(8, 10)
     assert (low, high) == pytest.approx((0.4902, 0.9433), abs=1e-4)  # R. G. Newcombe, Stat. Med. 17 (1998), method 3
 
 

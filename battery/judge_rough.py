@@ -1,0 +1,82 @@
+"""Judges cases where the world is rough: is the dominant cause first, at its place, with its share, and nothing false above it?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from battery.accepted import in_si, is_right, place_is_right
+
+# Events, lines and slow or periodic curves: each fits something of whatever is left.
+ARTEFACTS = ("force_step", "sensor_step", "lost_beams", "stuck", "vibration", "drift", "degradation", "cyclic", "raised_point",
+             "stitching_error")  # fmt: skip
+NEAR = 0.05  # a share is right within five points
+EQUAL = 0.1  # dominant causes whose shares differ by less may come in either order
+
+
+@dataclass(frozen=True)
+class Rough:
+    """One case. `first`: the finding with the largest share is a dominant cause; `in_set`: it or an alternative of it is; `place`:
+    it stands where a dominant cause is; `share`: the largest cause is named, its share within five points; `artefact`: one that
+    nobody planted stands above a dominant cause; `answered`: the verdict is partly or explained; `over_best`: held-out error over
+    the least possible."""
+
+    first: bool = False
+    in_set: bool = False
+    place: bool = False
+    share: bool = False
+    artefact: bool = False
+    answered: bool = False
+    over_best: float | None = None
+
+
+def judge_rough(answer: dict[str, Any], diagnosis: dict[str, Any]) -> Rough:
+    """The judgement of a messy case, or of one with memory."""
+    truths, small = answer["planted"], answer["background"]
+    findings = sorted(diagnosis.get("findings", []), key=_share, reverse=True)
+    leading = [t for t in truths if any(t[key] > max(u[key] for u in truths) - EQUAL for key in SHARES)]
+    first = findings[0] if findings else None
+    named = first is not None and any(_right(first, t) for t in leading)
+    rivals = [] if first is None else [first, *first.get("alternatives", [])]
+    largest = next((f for f in findings if _right(f, truths[0])), None)
+    return Rough(
+        first=named,
+        in_set=any(_right(r, t) for r in rivals for t in leading),
+        place=first is not None and any(all(place_is_right(first.get("location", ""), t)) for t in leading),
+        share=largest is not None and any(abs(_share(largest) - truths[0][key]) <= NEAR for key in SHARES),
+        artefact=_artefact_above(findings, truths, small),
+        answered=diagnosis["verdict"] in {"partly", "explained"},
+        over_best=_over_best(answer, diagnosis),
+    )
+
+
+SHARES = ("share", "share_varying")  # with each record's zero point counted as mismatch, and without: both are right
+
+
+def _share(finding: dict[str, Any]) -> float:
+    share = finding.get("share")
+    return -np.inf if share is None or share["value"] is None else float(share["value"])
+
+
+def _right(finding: dict[str, Any], truth: dict[str, Any]) -> bool:
+    return is_right(finding["effect"], finding.get("location", ""), truth)
+
+
+def _artefact_above(findings: list[dict[str, Any]], truths: list[dict[str, Any]], small: list[dict[str, Any]]) -> bool:
+    """Whether an artefact that is not among the laws planted has a larger share than a dominant cause, or one is not named."""
+    false = [f for f in findings if f["effect"] in ARTEFACTS and not any(_right(f, t) for t in [*truths, *small])]
+    real = [max((_share(f) for f in findings if _right(f, t)), default=-np.inf) for t in truths]
+    return any(_share(f) > min(real) for f in false)
+
+
+def _over_best(answer: dict[str, Any], diagnosis: dict[str, Any]) -> float | None:
+    """Held-out error with the findings over that of a model with the dominant causes exact; all channels, over the noise."""
+    sd = np.atleast_1d(answer["noise"]["sd"])
+    squares = []
+    for channel, error in diagnosis.get("held_out", {}).items():
+        noise = sd[0] if len(sd) == 1 or ".theta" in channel else 1e-6 * sd[1]  # [m], or [rad, um]
+        if error["rms_after"] is not None:
+            squares.append((in_si(error["rms_after"], error["unit"]) / noise) ** 2)
+    return float(np.sqrt(np.mean(squares) / (answer["least_error"] ** 2 + 1))) if squares else None
