@@ -106,6 +106,10 @@ LAWS = {
     "bow": ({}, lambda s, p: p.curvature * s.value**2),
     "clock_offset": None,  # below: it shifts the recorded drive
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
+    "butterfly": (
+        {"reach": 0.3, "taper": 0.5},
+        lambda s, p: p.share * ((s.value - weighted(s, p, s.value)) ** 2 / s.scale - s.value),
+    ),
     "coupling": ({}, lambda s, p: p.gain * s.all[s.partner]),
     "damping_coupling": ({}, lambda s, p: -p.damping * s.velocities[s.partner]),
     "inertia_coupling": ({}, lambda s, p: -p.inertia * s.accelerations[s.partner]),

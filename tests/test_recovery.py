@@ -124,6 +124,16 @@ def one_sided_stiffening(u, t):
     return move(u, lambda time, q, v, memory: (-2e8 * (q + v * H / 20) ** 2, memory))  # in the middle of a step
 
 
+def butterfly(u, t):
+    """A tenth of the way by the square of the polarisation of two hundred plays, in units of the drive's limit."""
+    radii, limit = 0.4 * (np.arange(200) + 0.5) / 200, AXIS.actuator.drive_limit.si
+    play, out = np.zeros(200), []
+    for volts in u:
+        play = np.clip(play, volts - radii, volts + radii)
+        out.append(0.9 * volts + 0.1 * play.mean() ** 2 / limit)
+    return move(np.array(out))
+
+
 def directional_friction(u, t):
     """0.9 N forward and 0.5 N backward, built up over 3 um, in steps of a tenth of a sample."""
 
@@ -155,6 +165,7 @@ ON_AXIS = {
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
+    butterfly: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
     directional_friction: Planted(
         "stage:axis", {"force": 0.7, "skew": 2 / 7, "reach": 3e-6}, within={"force": 0.02, "skew": 0.05, "reach": 0.05}
     ),

@@ -196,6 +196,14 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     ),
     # Drive and heat -------------------------------------------------------------------------------------------------------
     "asymmetric_gain": LawPrior("Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN),
+    "butterfly": LawPrior(
+        "Actuators without bias are rare: judgement. " + _HYSTERESIS,
+        log_prior_odds=ONE_IN_TEN,
+        unless=frozenset({"heat"}),
+        model_form_error=0.02,
+        family="hysteresis",
+        parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0)), "taper": _starts((0.0,))},
+    ),
     "dead_zone": LawPrior(
         "Between contacts that open (0.03) and an electronic crossover (1).", parameters={"rounding": _starts((0.3,))}
     ),

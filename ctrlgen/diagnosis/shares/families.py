@@ -97,6 +97,7 @@ FAMILY_OF = {
             "hysteresis",
             "asymmetric_hysteresis",
             "bouc_wen",
+            "butterfly",
             "displacement_bouc_wen",
             "displacement_hysteresis",
             "drive_hysteresis",

@@ -1,0 +1,36 @@
+"""Strain of a ferroelectric: it grows with the square of a polarisation that remembers."""
+
+from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects._play_operators import play_states, updated_plays, weighted_lag
+
+
+class Butterfly(Effect):
+    """Delta u = g (P^2/u_0 - u), P = sum_j w_j P_j, j = 1..8: P_j is the play of u with radius r j/8, w_j ~ j^-q, sum w_j = 1.
+
+    u_0 is the typical drive. Electrostriction of a polarisation that is a Prandtl-Ishlinskii operator of the field: under a
+    drive of both signs the loop has the two wings of a butterfly, under one sign it is that of hysteresis. g = 1 is a ferroelectric
+    without bias. Holds below the saturation of the polarisation.
+    """
+
+    place = Place.DRIVE
+    order = 1
+    requires = frozenset({"actuator", "bipolar"})
+    source = "R. C. Smith, Smart Material Systems: Model Development (2005), chapter 2: strain as the square of the polarisation"
+    params = (
+        Param("share", "1", (-2.0, 2.0), "share of the drive that acts by its square", off=0.0),
+        Param(
+            "reach",
+            "channel",
+            (1e-3, 2.0),
+            "r: change of drive after which all domains follow, twice the coercive drive",
+        ),
+        Param("taper", "1", (-1.0, 2.0), "q: weight of the domains that switch early over the late ones"),
+    )
+    states = play_states("channel")
+
+    def term(self, s, p):
+        polarisation = s.value - weighted_lag(s, s.value, p.reach, p.taper)
+        return p.share * (polarisation**2 / s.scale - s.value)
+
+    def update(self, s, p):
+        return updated_plays(s, [s.value], p.reach)
