@@ -26,6 +26,7 @@ from ctrlgen.diagnosis.pipeline import diagnose_into, unfinished
 from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
+from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.plots import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.selection.result import Estimate, Finding
@@ -116,6 +117,16 @@ def test_numbers_that_are_none_are_null():
     assert plain(given) == {
         "a": None, "b": [None, 3], "c": [1.5, None], "1": True, "e": {"value": 1.0, "ci95": [None, 2.0], "unit": "s"},
     }  # fmt: skip
+
+
+def test_the_figure_of_rivals_names_every_candidate_by_what_it_adds(found):
+    """One that was pruned was fitted for no single cause."""
+    rounds = tuple(
+        replace(r, candidates=tuple(replace(t, cause=None) for t in r.candidates)) for r in found.search.rounds
+    )
+    figure = draw_rivals(replace(found, search=replace(found.search, rounds=rounds)))
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert len(labels) == len(rounds[0].candidates) and labels[0].startswith("creep at stage:axis")
 
 
 # --- device.next.toml

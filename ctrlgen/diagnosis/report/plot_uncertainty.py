@@ -19,7 +19,7 @@ from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6
 SUSPECTS = 8  # hypotheses in the confusability matrix
-LABEL = 26  # characters of a label before it is broken
+LABEL, WIDE_LABEL = 26, 60  # characters of a label before it is broken
 PROFILES = 9
 WIDEST = 300.0  # per cent: intervals are shown up to here
 FOUND, ALIKE, WORSE = COLOURS[0], COLOURS[2], "#b0b0b0"
@@ -46,15 +46,17 @@ def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
 def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
     best = round_.criteria[0]
     far = max(10 * SEARCH.rival_difference, *(T - best for T in round_.criteria))
+    labels = []
     for row, (candidate, criterion) in enumerate(zip(round_.candidates, round_.criteria, strict=True)):
         worse = criterion - best
-        colour = FOUND if candidate.cause in kept else ALIKE if worse < SEARCH.rival_difference else WORSE
+        added = [c for c in candidate.causes if c not in round_.before.causes]  # several where a set is tried
+        names = " + ".join(map(hypothesis_name, added)) or "fewer causes"
+        labels.append(textwrap.fill(names, WIDE_LABEL, break_long_words=False))
+        colour = FOUND if added and kept.issuperset(added) else ALIKE if worse < SEARCH.rival_difference else WORSE
         panel.barh(row, worse, color=colour, height=0.6)
         panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)
         _beside(panel, worse, row, number(worse, 3) if row else "best")
-    panel.set_yticks(
-        range(len(round_.candidates)), [hypothesis_name(t.cause) for t in round_.candidates if t.cause], fontsize=8
-    )
+    panel.set_yticks(range(len(labels)), labels, fontsize=8)
     panel.invert_yaxis()
     panel.set_xscale("symlog", linthresh=SEARCH.rival_difference)
     panel.set_xlim(0, 30 * far)
