@@ -163,7 +163,8 @@ class ModelSelection:
         ):
             return False
         q = np.maximum(before.held_out.plain_mean, 1.0)
-        worthwhile = MODEL_SELECTION.worthwhile_share * n_held * float(np.max(1 - 1 / q, initial=0.0))
+        share = MODEL_SELECTION.worthwhile_share if errors.is_noise else MODEL_SELECTION.above_discrepancy
+        worthwhile = share * n_held * float(np.max(1 - 1 / q, initial=0.0))
         if confirmed <= max(MODEL_SELECTION.least_confirmed, worthwhile):
             return False
         return errors.is_noise or (self._matters(before, after) and wins_by_block(before.held_out, after.held_out))

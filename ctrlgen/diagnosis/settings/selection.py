@@ -147,9 +147,10 @@ class ModelSelectionSettings:
     hidden_penalty: float = 16.0
     """Penalty of the device's stated numbers, beyond twice their count, that makes them suspect of hiding a cause: one
     number four standard deviations off."""
-    worthwhile_share: float = 0.05
-    """Share of the held-out excess over the noise that a further cause must explain: less is within what the discrepancy of
-    the other laws may feign. Judgement."""
+    worthwhile_share: float = 0.01
+    """Share of the held-out excess over the noise that a further cause must explain: less is of no use to anyone. Judgement."""
+    above_discrepancy: float = 0.05
+    """The same where more than noise is left: less is within what the discrepancy of the other laws may feign. Judgement."""
     least_share: float = 0.01
     """Share of the whole mismatch of a channel, of energy on the held-out records, that a further cause must explain where more
     than noise is left: a tenth of the error. Judgement."""
