@@ -141,7 +141,7 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
     on_drive = [(x.drive, x.direct) for x in hooks if x.drive]
     on_force = [x.force for x in hooks if x.force]
     q = v = summed = asked = 0.0
-    t, half, F = start, h / 2, 0.0
+    t, half, F, felt = start, h / 2, 0.0, 0.0
     qs, vs, us = [], [], []
     given = np.asarray(drive, dtype=float)
     rises = fine_rise(given, linear).tolist() if loop is None else [0.0] * (len(given) * SUBSTEPS)
@@ -163,10 +163,11 @@ def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0
         qs.append(q), vs.append(v), us.append(u)
         F = k_f * u
         if on_force:
-            v_mid = v + half * (F - c * v - k * q) / m
+            # with the laws' force of the step before: a stage that friction holds has no speed
+            v_mid = v + half * (F + felt - c * v - k * q) / m
             q_mid = q + half * v
-            for law in on_force:
-                F += law(t + half, q_mid, v_mid)
+            felt = sum(law(t + half, q_mid, v_mid) for law in on_force)
+            F += felt
         dF = k_f * rise
         q, v = a11 * q + a12 * v + b1 * F + r1 * dF, a21 * q + a22 * v + b2 * F + r2 * dF
         t += h

@@ -54,6 +54,16 @@ def test_energy_never_rises_without_a_drive_whatever_friction_does():
         assert np.diff(energy).max() < 1e-4 * energy[0], name  # the bristles give back what they stored
 
 
+@pytest.mark.parametrize("name", ["coulomb", "stribeck"])
+def test_a_stage_that_friction_holds_stays_where_it_is(name):
+    u = np.concatenate([np.sin(2 * np.pi * 20e-3 * np.arange(300)), np.full(300, 0.2), np.zeros(400)])
+    planted = replace(laws.draw(name, np.random.default_rng(3), SCENE), amplitude=0.3)
+    y = laws.simulate(AXIS, u, [planted], SCENE)
+    held = 0.3 / AXIS.stiffness  # m, the most that friction holds against the spring
+    assert abs(y[630]) > 0.1 * held
+    assert np.ptp(y[630:]) < 0.01 * held
+
+
 def test_the_second_mass_takes_the_motion_away_at_its_own_frequency():
     """The stage stands nearly still where the second mass resonates: the absorber of J. P. Den Hartog."""
     planted = Planted("resonance", 0.02, {"frequency": 140.0, "ratio": 1e-3})
