@@ -15,7 +15,7 @@ from ctrlgen.recordings.reader import load_recordings
 
 
 def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:
-    if ending == ".csv":
+    if ending in (".csv", ".dat", ".txt"):
         path.write_text(csv_text(columns))
     elif ending == ".json":
         path.write_text(json.dumps({k: [None if math.isnan(x) else x for x in v] for k, v in columns.items()}))
