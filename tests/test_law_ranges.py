@@ -44,7 +44,18 @@ def test_what_is_expected_or_usual_lies_inside_the_bounds_around_its_middle(kind
 @every_parameter
 def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_leans_may_be(kind, p, prior):
     if p.off is None:
-        either = p.name in ("moment", "position", "reference", "phase", "lean", "gap", "level", "taper", "skew")
+        either = p.name in (
+            "moment",
+            "position",
+            "reference",
+            "phase",
+            "lean",
+            "gap",
+            "level",
+            "linear",
+            "taper",
+            "skew",
+        )
         assert either or p.bounds[0] >= 0.0
 
 

@@ -107,8 +107,8 @@ LAWS = {
     "clock_offset": None,  # below: it shifts the recorded drive
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
     "butterfly": (
-        {"reach": 0.3, "taper": 0.5},
-        lambda s, p: p.share * ((s.value - weighted(s, p, s.value)) ** 2 / s.scale - s.value),
+        {"linear": 0.6, "reach": 0.3, "taper": 0.5},
+        lambda s, p: p.share * ((s.value - weighted(s, p, s.value)) ** 2 / s.scale - 0.6 * s.value),
     ),
     "coupling": ({}, lambda s, p: p.gain * s.all[s.partner]),
     "damping_coupling": ({}, lambda s, p: -p.damping * s.velocities[s.partner]),

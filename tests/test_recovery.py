@@ -125,12 +125,12 @@ def one_sided_stiffening(u, t):
 
 
 def butterfly(u, t):
-    """A tenth of the way by the square of the polarisation of two hundred plays, in units of the drive's limit."""
+    """All of it, beside a tenth less of the drive, by the square of the polarisation of two hundred plays."""
     radii, limit = 0.4 * (np.arange(200) + 0.5) / 200, AXIS.actuator.drive_limit.si
     play, out = np.zeros(200), []
     for volts in u:
         play = np.clip(play, volts - radii, volts + radii)
-        out.append(0.9 * volts + 0.1 * play.mean() ** 2 / limit)
+        out.append(0.9 * volts + play.mean() ** 2 / limit)
     return move(np.array(out))
 
 
@@ -165,7 +165,9 @@ ON_AXIS = {
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
-    butterfly: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
+    butterfly: Planted(
+        "actuator:axis", {"share": 1.0, "linear": 0.1, "reach": 0.4}, within={"share": 0.1, "linear": 0.2, "reach": 0.1}
+    ),
     directional_friction: Planted(
         "stage:axis", {"force": 0.7, "skew": 2 / 7, "reach": 3e-6}, within={"force": 0.02, "skew": 0.05, "reach": 0.05}
     ),

@@ -5,11 +5,11 @@ from ctrlgen.effects._play_operators import play_states, updated_plays, weighted
 
 
 class Butterfly(Effect):
-    """Delta u = g (P^2/u_0 - u), P = sum_j w_j P_j, j = 1..8: P_j is the play of u with radius r j/8, w_j ~ j^-q, sum w_j = 1.
+    """Delta u = g (P^2/u_0 - l u), P = sum_j w_j P_j, j = 1..8: P_j is the play of u with radius r j/8, w_j ~ j^-q, sum w_j = 1.
 
     u_0 is the typical drive. Electrostriction of a polarisation that is a Prandtl-Ishlinskii operator of the field: under a
-    drive of both signs the loop has the two wings of a butterfly, under one sign it is that of hysteresis. g = 1 is a ferroelectric
-    without bias. Holds below the saturation of the polarisation.
+    drive of both signs the loop has the two wings of a butterfly, under one sign it is that of hysteresis. l takes out
+    the part that is not linear after all; g l = 1 is a ferroelectric without bias. Holds below the saturation of the polarisation.
     """
 
     place = Place.DRIVE
@@ -17,7 +17,8 @@ class Butterfly(Effect):
     requires = frozenset({"actuator", "bipolar"})
     source = "R. C. Smith, Smart Material Systems: Model Development (2005), chapter 2: strain as the square of the polarisation"
     params = (
-        Param("share", "1", (-2.0, 2.0), "share of the drive that acts by its square", off=0.0),
+        Param("linear", "1", (-10.0, 10.0), "l: linear drive that is missing, per square"),
+        Param("share", "1", (-20.0, 20.0), "square of the drive's typical size, over that size", off=0.0),
         Param(
             "reach",
             "channel",
@@ -30,7 +31,7 @@ class Butterfly(Effect):
 
     def term(self, s, p):
         polarisation = s.value - weighted_lag(s, s.value, p.reach, p.taper)
-        return p.share * (polarisation**2 / s.scale - s.value)
+        return p.share * (polarisation**2 / s.scale - p.linear * s.value)
 
     def update(self, s, p):
         return updated_plays(s, [s.value], p.reach)

@@ -202,7 +202,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         unless=frozenset({"heat"}),
         model_form_error=0.02,
         family="hysteresis",
-        parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0)), "taper": _starts((0.0,))},
+        parameters={
+            "linear": _starts((0.0, 1.0)),
+            "reach": _starts((0.03, 0.1, 0.3, 1.0)),
+            "taper": _starts((0.0,)),
+        },
     ),
     "dead_zone": LawPrior(
         "Between contacts that open (0.03) and an electronic crossover (1).", parameters={"rounding": _starts((0.3,))}
