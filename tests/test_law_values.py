@@ -400,7 +400,7 @@ def shifted(drive, tau: float, linear: bool) -> np.ndarray:
     return found[:, 0]
 
 
-@pytest.mark.parametrize("tau", [-0.023, 0.0047, 0.02])
+@pytest.mark.parametrize("tau", [0.0047, 0.02, 0.033])
 def test_clocks_that_do_not_agree_shift_the_drive(tau, rng):
     """Exact for a cubic of a drive that is linear between samples, and for the mean over a sample of one that is held."""
     cubic, line = (np.polynomial.Polynomial(rng.uniform(-1, 1, k)) for k in (4, 2))
@@ -408,9 +408,8 @@ def test_clocks_that_do_not_agree_shift_the_drive(tau, rng):
     inside = (at >= 0.3) & (at <= 0.3 + 49 * H)
     assert shifted(cubic, tau, True)[inside] == pytest.approx(cubic(at)[inside], rel=1e-9)
     assert shifted(line, tau, False)[inside] == pytest.approx(line(at)[inside], rel=1e-12)
-    ends = line(np.array([0.3, 0.3 + 49 * H]))
     beyond = shifted(line, tau, False)[~inside]
-    assert beyond == pytest.approx(np.full(len(beyond), ends[0 if tau < 0 else 1]))
+    assert beyond == pytest.approx(np.full(len(beyond), line(0.3 + 49 * H)))
 
 
 def test_a_delay_of_more_than_five_samples_counts_as_five(rng):

@@ -441,9 +441,9 @@ def test_of_what_two_axes_share(effect):
     recover(fitter, device, effect, Planted("stage:a", truth, "b"))
 
 
-@pytest.mark.parametrize("samples", [-3, 2])
+@pytest.mark.parametrize("samples", [2, 7])
 def test_of_two_clocks(samples):
-    """Readings that come late by three samples, or early by two, which no stage can; the screen cannot see it."""
+    """Readings that come early, which no stage can; the screen cannot see it."""
     rng, parts = np.random.default_rng(3), []
     for u, role in zip(given(N), ("fit", "hold_out"), strict=True):
         late = u[np.clip(np.arange(N) + samples, 0, N - 1)]

@@ -133,10 +133,11 @@ def test_the_held_out_records_must_show_two_squares_of_a_cause():
     assert w.improves_enough(*pair(100.0, 2 + JUST)) and not w.improves_enough(*pair(100.0, 2 - JUST))
 
 
-def test_the_held_out_records_must_lose_a_hundredth_of_what_they_have_beyond_the_noise():
-    """Where half of their squares are beyond it, ln of 1 - 0.005."""
-    w, before, after = weighing(), trial(N, N), trial(0.0, N, numbers=2)
-    most = 2 * N * (1 - np.exp(-0.005))
+@pytest.mark.parametrize("gone, share", [(0.0, 0.01), (N, 0.05)])
+def test_the_held_out_records_must_lose_a_share_of_what_they_have_beyond_the_noise(gone, share):
+    """Where half of their squares are beyond it, ln of 1 - 0.005; of a model that leaves more than noise, five times as much."""
+    w, before, after = weighing(), trial(gone + N, N), trial(gone, N, numbers=2)
+    most = 2 * N * (1 - np.exp(-share / 2))
     for side in (1, -1):
         held = replace(after, held_out=left(N - most * (1 + side * 1e-6)))
         assert w.improves_enough(before, held) == (side > 0)
@@ -205,6 +206,14 @@ def test_among_equals_the_plainer_is_named():
     assert w.advantage(best, worse) == pytest.approx(5.3 - 3.2) and w.most_parsimonious([best, worse]) is best
     costly = trial(-95.1 - np.log(N), rarity=-1.6, numbers=2)
     assert w.advantage(best, costly) == pytest.approx(4.9 - 3.2) and w.most_parsimonious([best, costly]) is best
+
+
+@pytest.mark.parametrize("gain, matters", [(1.01e4, True), (0.99e4, False)])
+def test_beyond_the_noise_a_cause_takes_away_a_hundredth_of_the_whole_mismatch(gain, matters):
+    """Of the device as described, 1000 times the noise's squares; not of what is left now."""
+    whole = ModelSelection(weighed_by(), lambda *_, **__: None, mismatch=np.array([1000.0]))
+    before, after = trial(3e4, 3e4), trial(3e4 - gain, 3e4 - gain, numbers=2)
+    assert whole.improves_enough(before, after) == matters and weighing().improves_enough(before, after)
 
 
 LUCKY = [0.5, *[0.5 / (BLOCKS - 1)] * (BLOCKS - 1)]  # half of the squares in one block

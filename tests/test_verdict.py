@@ -181,9 +181,19 @@ def test_a_channel_at_its_noise_is_within_any_tolerance():
 @pytest.mark.parametrize("small, ambiguous", [(0.16 + JUST, True), (0.16 - JUST, False)])
 def test_a_rival_of_a_small_cause_does_not_make_the_answer_ambiguous(small, ambiguous):
     """A quarter of the largest share, 0.64."""
-    found = search(None, None, rivals=((), (trial(),)))
+    found = search(None, trial(causes=(GAIN, CREEP)), rivals=((), (trial(cause=DRIFT),)))
     assert main_rivals(found, shares_of(0.64, small)) == ambiguous
     assert main_rivals(found, shares_of(None, None, rest=None))  # where nothing tells which is the main one
+
+
+@pytest.mark.parametrize("gone, ambiguous", [(0.0, True), (1e5, False)])
+def test_laws_of_one_family_at_one_place_are_one_answer_where_more_than_noise_is_left(gone, ambiguous):
+    one, other, elsewhere = (
+        Hypothesis(effect, f"stage:{at}", at) for effect, at in (("coulomb", "a"), ("stribeck", "a"), ("stribeck", "b"))
+    )
+    chosen = trial(gone, causes=(one,))
+    assert main_rivals(search(None, chosen, rivals=((trial(cause=other),),)), shares_of(0.9)) == ambiguous
+    assert main_rivals(search(None, chosen, rivals=((trial(cause=elsewhere),),)), shares_of(0.9))
 
 
 def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_cause_first(monkeypatch):
@@ -264,7 +274,7 @@ HUM = Hypothesis("vibration", "disturbance:axis", "axis")
 def timed(time: np.ndarray, drive=None) -> SimpleNamespace:
     """A recording of one record to fit, of the given times."""
     given = np.zeros((len(time), 1)) if drive is None else drive
-    record = SimpleNamespace(role="fit", time=time, drive=given, sample_time=time[1] - time[0])
+    record = SimpleNamespace(role="fit", time=time, drive=given, sample_time=time[1] - time[0], period=None)
     return SimpleNamespace(records=[record], channels=(), kind="series")
 
 
@@ -284,9 +294,9 @@ def test_a_line_lasts_ten_periods(frequency, told):
     assert objections(recording, fit, exact=True) == {} == objections(recording, fit, accepted=[HUM])
 
 
-def stepped(moment: float) -> SimpleNamespace:
+def stepped(moment: float, rise: float = 1e-3) -> SimpleNamespace:
     cause = Hypothesis("force_step", "stage:axis", "axis")
-    values = {p.name: 0.1 for p in cause.law.params} | {"moment": moment}
+    values = {p.name: 0.1 for p in cause.law.params} | {"moment": moment, "rise": rise}
     return SimpleNamespace(
         structure=SimpleNamespace(causes=(cause,), free_parameters=()), theta=(), values=lambda k: values
     )
@@ -302,6 +312,24 @@ def test_an_event_at_the_onset_of_motion_is_friction(moment, own):
     found = objections(timed(time, drive), stepped(moment))
     assert found == ({} if own else {0: "it happens where the motion begins or ends, as friction, slack and delays do"})
     assert objections(timed(time, drive), stepped(moment), exact=True) == {}
+
+
+@pytest.mark.parametrize("rise, sharp", [(0.0079, True), (0.0081, False)])
+def test_an_event_is_sharp(rise, sharp):
+    """Over in a fiftieth of the record, of 0.4 s."""
+    time = np.linspace(0.0, 0.4, 401)
+    found = objections(timed(time), stepped(0.2, rise))
+    assert found == ({} if sharp else {0: "its rise of 0.0081 s is slow beside the record; an event is sharp"})
+
+
+@pytest.mark.parametrize("apart, own", [(0.24, False), (0.26, True)])
+def test_a_line_at_a_harmonic_of_the_drive_is_the_drives(apart, own):
+    """A quarter of a cycle within ten seconds, of a drive that is stated to repeat each half second."""
+    recording = timed(np.linspace(0.0, 10.0, 1001))
+    recording.records[0].period = 0.5
+    reason = "it is harmonic 3 of the drive's period, as whatever the drive causes is"
+    assert objections(recording, line([HUM], 6.0 + apart / 10)) == ({} if own else {0: reason})
+    assert objections(recording, line([HUM], 6.0), exact=True) == {}
 
 
 def test_an_event_where_the_motion_ends_is_none_either_and_a_reversal_is_no_end():

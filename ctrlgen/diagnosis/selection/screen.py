@@ -58,9 +58,11 @@ class Screen:
         self.peaks: Peaks | None = None
 
     def run(self, fit: Fit, dropped: dict[Hypothesis, str] | None = None) -> Screened:
-        """All hypotheses that the fit does not contain yet, without those `dropped` and any whose law cannot be evaluated."""
+        """All hypotheses that the fit does not contain yet, without those `dropped`, any whose law cannot be evaluated, and offsets
+        of the recorders' clocks, which no term of the model shows."""
         beside, dropped = (h.beside(fit.structure.causes) for h in self.hypotheses), dropped or {}
-        open_ = [h for h in beside if h is not None and h not in dropped]
+        shown = (h for h in beside if h is not None and (h.effect == PARAMETER or not h.law.shifts_drive))
+        open_ = [h for h in shown if h not in dropped]
         sums: Sums | None = None
         columns: list[CandidateTerm] = []
         U, back = _directions(fit.J)
