@@ -8,7 +8,7 @@ class OneSidedStiffening(Effect):
 
     place = Place.FORCE
     requires = frozenset({"force", "bipolar"})
-    source = "L. L. Howell, Compliant Mechanisms (2001): pre-bent and preloaded beams, second order of the deflection"
+    source = "definition: second term of the power series of a restoring force"
     params = (Param("k2", "channel/travel^2", (-10.0, 10.0), "quadratic stiffness", off=0.0),)
 
     def term(self, s, p):
