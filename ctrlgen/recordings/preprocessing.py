@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 import scipy  # its parts take a while to import, and come when they are used
 
+from ctrlgen.recordings.schema import RecordingFile
+
 ORDER = 4  # of the Butterworth filter, run forward and backward
 ENOUGH = 4.0  # rate of the kept rows over the cut-off: at twice that the filter has 1/250 of an amplitude
 HIGHEST = 0.9  # of half the rate of the kept rows: room for the filter's edge
@@ -47,3 +49,19 @@ def enough_rows(sample_time: float, cutoff: float) -> int:
 def highest_cutoff(sample_time: float, keep_every: int) -> float:
     """The highest cut-off [Hz] that half the rate of the kept rows can hold."""
     return HIGHEST / (2 * sample_time * keep_every)
+
+
+def notes(written: RecordingFile) -> list[str]:
+    """One note that says what was done to the columns before validation; none where nothing was."""
+    columns = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.later}
+    steps = [f"{name} taken as {c.later.text} later than its rows" for name, c in columns.items() if c.later]
+    used = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.sample_rate}
+    steps += [f"{name} of another recorder read linearly between its samples" for name in used]
+    steps += [f"derivative {d.order} of {d.of} taken as {name}" for name, d in written.derivatives.items()]
+    if written.low_pass is not None:
+        steps.insert(0, f"every column low-passed alike at {written.low_pass.text}, forward and backward")
+    if (written.keep_every or 1) > 1:
+        steps.append(f"one row in {written.keep_every} kept")
+    elif written.keep_every is None and written.low_pass is not None:
+        steps.append("as many rows kept as make four times that, where there are more")
+    return ["Before anything else: " + "; ".join(steps) + "."] if steps else []

@@ -150,7 +150,7 @@ class _File:
             return _Content()
         records: list[Record] = []
         places: list[str] = []
-        notes = _preprocessing_notes(self.written)
+        notes = preprocessing.notes(self.written)
         faults: list[Fault] = []
         spans: list[tuple[int, RecordTable, float, float]] = []
         for k, table in enumerate(self.written.record):
@@ -381,22 +381,6 @@ def _inner_rows(moved: Sequence[np.ndarray], first: int, last: int) -> tuple[int
         rows = first + np.flatnonzero(known[first:last])
         first, last = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (first, last)
     return first, last
-
-
-def _preprocessing_notes(written: RecordingFile) -> list[str]:
-    """One note that says what was done to the columns before validation; none where nothing was."""
-    columns = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.later}
-    steps = [f"{name} taken as {c.later.text} later than its rows" for name, c in columns.items() if c.later]
-    used = {k: c for r in written.record for k, c in written.columns_of(r).items() if c.sample_rate}
-    steps += [f"{name} of another recorder read linearly between its samples" for name in used]
-    steps += [f"derivative {d.order} of {d.of} taken as {name}" for name, d in written.derivatives.items()]
-    if written.low_pass is not None:
-        steps.insert(0, f"every column low-passed alike at {written.low_pass.text}, forward and backward")
-    if (written.keep_every or 1) > 1:
-        steps.append(f"one row in {written.keep_every} kept")
-    elif written.keep_every is None and written.low_pass is not None:
-        steps.append("as many rows kept as make four times that, where there are more")
-    return ["Before anything else: " + "; ".join(steps) + "."] if steps else []
 
 
 def _contradicts(stated: str | None, scale: tuple[float, float], unit: str) -> bool:
