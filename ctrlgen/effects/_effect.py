@@ -50,7 +50,7 @@ class Effect:
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
     # What the device must have, of: acceleration, actuator, ambient, balanced, bipolar, force, heat,
-    # sample_time, second_order_kinematics, spatial, state, tangent_compliance, unheated, velocity.
+    # sample_time, second_order_kinematics, spatial, state, tangent_compliance, unheated, velocity, voltage.
     requires: ClassVar[frozenset[str]] = frozenset()
     # Couples a channel to another one, `of`, whose index is `partner`; a symmetric one acts on both.
     pairs: ClassVar[bool] = False

@@ -14,7 +14,7 @@ class Butterfly(Effect):
 
     place = Place.DRIVE
     order = 1
-    requires = frozenset({"actuator", "bipolar"})
+    requires = frozenset({"actuator", "bipolar", "voltage"})
     source = "R. C. Smith, Smart Material Systems: Model Development (2005): electrostriction, strain as the square of polarisation"
     params = (
         Param("linear", "1", (-10.0, 10.0), "l: linear drive that is missing, per square"),

@@ -33,6 +33,7 @@ REQUIREMENTS = {  # the words of `Effect.requires`, in messages
     "tangent_compliance": "the tangent compliance of the stages",
     "unheated": "actuators without heaters",
     "velocity": "axes with inertia or an imposed motion",
+    "voltage": "a drive in volt",
 }
 
 
@@ -211,6 +212,7 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
         "ambient": True, "sample_time": sample_time is not None,
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,
+        "voltage": any(same_dimension(unit, "V") for unit in physics.drive.units),
         "second_order_kinematics": isinstance(physics, BalancedPhysics) and physics.second_order_kinematics is not None,
         "tangent_compliance": isinstance(physics, BalancedPhysics) and physics.tangent_compliance is not None,
     }  # fmt: skip
