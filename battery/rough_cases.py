@@ -22,7 +22,8 @@ NULLS = ("spikes", "coloured", "understated", "overstated", "linear", "linear_he
 STATED = {"understated": 0.7, "overstated": 1.5}  # noise over the true one
 MEMORY = (10.0, 300.0)  # size of a memory alone, as battery.messy.DOMINANT
 ZERO = 0.05  # largest zero point of a record over the rms of the largest cause
-LEAST_SHARE = 0.1  # of the mismatch, of a dominant cause
+LEAST_SHARE = 0.1  # of the mismatch on the held-out record, of a dominant cause
+LEAST_TOGETHER = 0.8  # of all dominant causes
 TRIES = 60
 SERIES_PERIOD = 2e-3  # s, of the hexapod's series
 
@@ -134,7 +135,8 @@ def told(
 
     Raises ValueError where a cause hardly shows on the held-out record: it is not dominant there, and the caller draws again.
     """
-    if not all(max(both) >= LEAST_SHARE for both in zip(known["shares"], known["shares_varying"], strict=True)):
+    both = known["shares"], known["shares_varying"]
+    if not all(max(pair) >= LEAST_SHARE for pair in zip(*both, strict=True)) or min(map(sum, both)) < LEAST_TOGETHER:
         raise ValueError("a cause that is not dominant on the held-out record")
     for truth, share, varying in zip(truths, known["shares"], known["shares_varying"], strict=True):
         truth |= {"share": share, "share_varying": varying, "family": memory.FAMILY.get(truth["name"])}
