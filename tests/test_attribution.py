@@ -39,7 +39,7 @@ def shared(monkeypatch, energy, causes: int, held: float = 1.0, blocks=None) -> 
         )
         for name, present in (("nominal", ()), ("chosen", range(causes)))
     }
-    return attribute(SimpleNamespace(fitter=fitter, **trial))
+    return attribute(fitter, trial["nominal"], trial["chosen"])
 
 
 def values(found: Attribution) -> list[float]:
@@ -118,7 +118,7 @@ def test_two_causes_have_the_shares_that_were_planted():
 
     fitter = fitter_of(lambda u: played(u) + hum)
     search = Searcher(fitter, Screen(fitter, [BACKLASH, HUM]), lambda _: None).run(AXIS)
-    found = attribute(search)
+    found = attribute(search.fitter, search.nominal, search.chosen)
     (held,) = fitter.held_out_records
     lost = played(held.drive[:, 0]) - move(held.drive[:, 0])
     energy = {"backlash": np.sum(lost**2), "vibration": np.sum(hum**2)}
