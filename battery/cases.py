@@ -38,7 +38,7 @@ GROUPS = (  # a mixture takes one from each of two or three
 )
 LOOP = ("coulomb", "stribeck", "viscous", "quadratic_damping", "cyclic", "lost_beams", "step", "backlash")
 COUNTS = {  # by class, in the order of CLASSES
-    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 2, 2, 2),
+    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 2),
     "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12),
     "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204),
 }
