@@ -25,7 +25,7 @@ def _progress(console: Console) -> Progress:
     )
 
 
-def _classes(text: str) -> tuple[str, ...]:
+def classes_of(text: str) -> tuple[str, ...]:
     """The classes named, between commas; all for an empty text."""
     names = tuple(filter(None, text.split(",")))
     for name in names:
@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     make.add_argument("--size", choices=sorted(cases.COUNTS), default="small", help=SIZES)
     make.add_argument(
         "--classes",
-        type=_classes,
+        type=classes_of,
         default=cases.CLASSES,
         metavar="A,B",
         help=f"only these of {', '.join(cases.CLASSES)}",

@@ -27,7 +27,7 @@ def shared(monkeypatch, energy, causes: int, held: float = 1.0, blocks=None) -> 
 
     monkeypatch.setattr(
         attribution,
-        "_left_by",
+        "left_by",
         lambda fitter, fit, present, records: misfit_of(present, held if records == ["held"] else 1.0),
     )
     fitter = SimpleNamespace(with_errors_of=lambda fit: None, held_out_records=["held"], fit_records=["fit"])

@@ -184,9 +184,9 @@ def test_chosen_classes_hold_the_same_cases_as_beside_others():
         range(1, len(chosen) + 1)
     )
     assert all(all_of[o.seed] == (o.kind, o.wanted) for o in chosen)
-    assert program._classes("") == cases.CLASSES and program._classes("messy,null") == ("messy", "null")
+    assert program.classes_of("") == cases.CLASSES and program.classes_of("messy,null") == ("messy", "null")
     with pytest.raises(argparse.ArgumentTypeError, match="memory"):
-        program._classes("messi")
+        program.classes_of("messi")
 
 
 def test_a_rough_case_tells_nothing_and_its_seed_reproduces_it(tmp_path):

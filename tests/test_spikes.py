@@ -9,14 +9,14 @@ import pytest
 from axis_records import AXIS, NOISE, H, drive, move, record
 
 import ctrlgen
-from ctrlgen.diagnosis.diagnose import _noise
+from ctrlgen.diagnosis.diagnose import noise_before_fits
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.isolated_outliers import mark_outliers
 from ctrlgen.diagnosis.estimation.spikes import Spikes, find_spikes
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT
 from ctrlgen.recordings.recording import Recording
-from ctrlgen.recordings.validation import ChannelNames, _mark, _rows
+from ctrlgen.recordings.validation import ChannelNames, mark, rows_between
 
 N = 6000
 AT = {"fit": [700, 2100, 2900, 5003], "hold_out": [401, 1777, 4000, 5900]}
@@ -33,7 +33,7 @@ def spiked(size: float, seed: int = 5) -> Recording:
 
 
 def described(recording: Recording):
-    fitter, fit = Fitter(recording, _noise(AXIS, recording)).described(AXIS)
+    fitter, fit = Fitter(recording, noise_before_fits(AXIS, recording)).described(AXIS)
     return fitter, fit
 
 
@@ -77,11 +77,11 @@ def test_validation_keeps_the_deviation_of_an_outlier_from_its_neighbours():
     y[at] += 40 * NOISE * np.array([1, -1, 1, -1])
     given = record(u, y, "fit")
     names = ChannelNames(("drive.axis",), ("V",), ("reading.axis",), ("nm",))
-    marked, notes = _mark(given, "series", names, np.array([True]))
+    marked, notes = mark(given, "series", names, np.array([True]))
     assert [(row, channel) for row, channel, _ in marked.spikes] == [(row, 0) for row in at] and len(notes) == 1
     sizes = np.array([size for *_, size in marked.spikes])
     assert sizes / NOISE == pytest.approx([40, -40, 40, -40], abs=4)  # two standard deviations and what the axis moves
-    assert [row for row, *_ in _rows(marked, 2000, 3000).spikes] == [100, 900]
+    assert [row for row, *_ in rows_between(marked, 2000, 3000).spikes] == [100, 900]
 
 
 def test_a_dead_channel_takes_neither_tolerance_nor_spikes_of_another():

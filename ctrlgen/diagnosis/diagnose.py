@@ -77,7 +77,7 @@ def _diagnose(
     recording = _relative_ambient(_with_both_roles(recording))
     step("noise")
     live = without_dead_channels(device, recording, effects)
-    fitter = _without_outliers(device, Fitter(live.recording, _noise(device, live.recording), checkpoint))
+    fitter = _without_outliers(device, Fitter(live.recording, noise_before_fits(device, live.recording), checkpoint))
     fitter = _with_noise(device, fitter)
     known = fitter.noise.known
     suspected = _hypotheses(device, live.recording, effects)
@@ -119,7 +119,7 @@ def _with_both_roles(recording: Recording) -> Recording:
     return recording
 
 
-def _noise(device: Device, recording: Recording) -> Noise:
+def noise_before_fits(device: Device, recording: Recording) -> Noise:
     """The noise of every channel, before any fit."""
     return estimate_noise(recording, settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time)))
 

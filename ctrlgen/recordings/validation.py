@@ -82,7 +82,7 @@ def validate_record(record: Record, kind: str, model: Model, names: ChannelNames
         )
     marked = []
     for stretch in stretches:
-        stretch, mark_notes = _mark(stretch, kind, names, recorded)
+        stretch, mark_notes = mark(stretch, kind, names, recorded)
         marked.append(stretch)
         notes += mark_notes
     return Validated(tuple(marked), tuple(notes))
@@ -195,7 +195,7 @@ def _stretches(record: Record) -> tuple[list[Record], list[str]]:
     notes: list[str] = []
     stretches: list[Record] = []
     for a, b in cuts:
-        stretch = _rows(record, a, b)
+        stretch = rows_between(record, a, b)
         joined = _joined(stretches[-1], stretch) if stretches else None
         if joined:
             missing = len(joined.time) - len(stretches[-1].time) - len(stretch.time)
@@ -230,7 +230,7 @@ def _split(a: int, b: int, breaks: list[int]) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _rows(record: Record, a: int, b: int) -> Record:
+def rows_between(record: Record, a: int, b: int) -> Record:
     """Rows a to b, half open, of a record."""
     ambient = None if record.ambient is None else record.ambient[a:b]
     return replace(
@@ -265,7 +265,7 @@ def _joined(before: Record, after: Record) -> Record | None:
     )
 
 
-def _mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -> tuple[Record, list[str]]:
+def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -> tuple[Record, list[str]]:
     """The record with outliers and stuck stretches NaN and not valid; a note for each kind of mark and for dead channels."""
     observed, valid = record.observed.copy(), record.valid.copy()
     notes: list[str] = []
@@ -349,7 +349,7 @@ def with_hold_out(records: Sequence[Record], kind: str) -> Validated:
         return Validated(faults=(Fault("record", f"{what}; record a second run"),))
     if kind == "series":
         cut = round((1 - HELD_OUT) * n)
-        parts = [_rows(longest, 0, cut), replace(_rows(longest, cut, n), role="hold_out")]
+        parts = [rows_between(longest, 0, cut), replace(rows_between(longest, cut, n), role="hold_out")]
         labels = (f"first {cut} of {n}", f"last {n - cut} of {n}")
         how = f"its last {n - cut} of {n} samples"
     else:

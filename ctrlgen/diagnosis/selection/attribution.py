@@ -65,7 +65,7 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
     everyone = frozenset(range(n))
     left = {frozenset[int](): _by_block(nominal), everyone: _by_block(chosen)}
     for present in _subsets(n):
-        left.setdefault(present, _by_block(_left_by(rough, fit, present, records)))
+        left.setdefault(present, _by_block(left_by(rough, fit, present, records)))
     worst = left[frozenset()]
     left = {S: np.minimum(E, ATTRIBUTION.diverged * np.maximum(worst, 1.0)) for S, E in left.items()}
     parts = np.array([_shapley(left, k, n) for k in range(n)] + [left[everyone]])
@@ -107,7 +107,7 @@ def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarr
     return both(k) * (all_ / total if total > 0 else 1.0)
 
 
-def _left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record]) -> Misfit:
+def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record]) -> Misfit:
     """What the model leaves with the `present` causes alone, its other numbers adapted."""
     reduced = _without(fitter, fit, present)
     residuals = [r.observed - fitter.predict(reduced, r) for r in records]
