@@ -18,7 +18,7 @@ class Butterfly(Effect):
     source = "R. C. Smith, Smart Material Systems: Model Development (2005): electrostriction, strain as the square of polarisation"
     params = (
         Param("linear", "1", (-10.0, 10.0), "l: linear drive that is missing, per square"),
-        Param("share", "1", (-20.0, 20.0), "square of the drive's typical size, over that size", off=0.0),
+        Param("share", "1", (-100.0, 100.0), "square of the drive's typical size, over that size", off=0.0),
         Param(
             "reach",
             "channel",
