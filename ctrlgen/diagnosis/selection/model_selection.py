@@ -220,7 +220,9 @@ class ModelSelection:
 
 def _lost(bare: CandidateModel, full: CandidateModel) -> float:
     """Product of the squares that `bare` leaves beyond `full` on the records to fit and on the held-out records."""
-    return max(bare.fitted.excess - full.fitted.excess, 0.0) * max(bare.held_out.excess - full.held_out.excess, 0.0)
+    pairs = ((bare.fitted, full.fitted), (bare.held_out, full.held_out))
+    # not only what is beyond noise: where the residual alone tells the noise, nothing is
+    return float(np.prod([max(a.plain.sum() - b.plain.sum(), 0.0) for a, b in pairs]))
 
 
 def wins_by_block(before: Misfit, after: Misfit) -> bool:
