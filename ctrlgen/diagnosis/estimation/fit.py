@@ -195,9 +195,11 @@ class Fitter:
         """The optimum from `start` [SI], taken from the checkpoint where it was found before."""
         if self.checkpoint is None:
             return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps))
-        s, noise = problem.structure, self.error.weighted
+        s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [int(r.valid.sum()) for r in self.recording.records]
-        key = key_of(s.causes, s.starts, sorted(s.nominal_starts.items()), start, steps, noise.sd, *noise.ar, valid)
+        key = key_of(
+            s.causes, s.starts, sorted(s.nominal_starts.items()), start, steps, noise.sd, corner, *noise.ar, valid
+        )
         optimum = self.checkpoint.recall(key)
         if optimum is None:
             optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps)

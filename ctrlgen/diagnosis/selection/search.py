@@ -16,9 +16,9 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise_update import update_noise
-from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult, restart
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
+from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
 from ctrlgen.diagnosis.selection.rivals import rivals, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
@@ -51,7 +51,9 @@ class Searcher:
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
         current = self._settled(current)
-        nominal = trials.converged(trials.fit(Structure(device), steps=FIT.max_steps))
+        nominal = scored(
+            trials.fitter, trials.fitter.described(device)[1]
+        )  # its numbers not bent by errors of a better model
         each = range(len(current.causes))
         bare = tuple(self._without(current, k, nominal) for k in each)
         alike = tuple(rivals(trials, current, k, rounds) for k in each)
