@@ -69,6 +69,12 @@ def weighted(s, p, here):
     return float(w @ (here - began - [getattr(s, f"play{k}") for k in j])) / w.sum()
 
 
+def risen(drive):
+    """What plays of reach 0.3 and taper 0.5 come to together once a drive has risen to `drive`."""
+    j = np.arange(1, 9)
+    return drive - float(j**-0.5 @ np.minimum(0.3 * j / 8, drive)) / (j**-0.5).sum()
+
+
 def dahl_rate(s, p):
     v = s.velocity / p.smoothing
     return s.velocity * (1 - s.z / tanh(v)) / p.reach
@@ -108,7 +114,7 @@ LAWS = {
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
     "butterfly": (
         {"linear": 0.6, "reach": 0.3, "taper": 0.5},
-        lambda s, p: p.share * ((s.value - weighted(s, p, s.value)) ** 2 / s.scale - 0.6 * s.value),
+        lambda s, p: p.share * (((s.value - weighted(s, p, s.value)) / risen(s.scale)) ** 2 * s.scale - 0.6 * s.value),
     ),
     "coupling": ({}, lambda s, p: p.gain * s.all[s.partner]),
     "damping_coupling": ({}, lambda s, p: -p.damping * s.velocities[s.partner]),

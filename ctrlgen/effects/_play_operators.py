@@ -33,9 +33,20 @@ def beginning(s: SimpleNamespace, radius: ca.SX) -> ca.SX:
 
 def weighted_lag(s: SimpleNamespace, value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
     """sum_j w_j (value - P_j), w_j ~ j^-taper, sum w_j = 1."""
-    weights = [float(j) ** -taper for j in range(1, ELEMENTS + 1)]
+    weights = _weights(taper)
     plays = (getattr(s, name) + beginning(s, r) for name, r in zip(_play_names(), _radii(reach), strict=True))
     return sum(w * (value - play) for w, play in zip(weights, plays, strict=True)) / sum(weights)
+
+
+def following(value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
+    """sum_j w_j P_j of plays that began in the middle, once their input has risen to `value`."""
+    weights = _weights(taper)
+    behind = sum(w * ca.fmin(r, value) for w, r in zip(weights, _radii(reach), strict=True)) / sum(weights)
+    return value - behind
+
+
+def _weights(taper: ca.SX) -> list[ca.SX]:
+    return [float(j) ** -taper for j in range(1, ELEMENTS + 1)]
 
 
 def updated_plays(s: SimpleNamespace, path: list[ca.SX], reach: ca.SX) -> dict[str, ca.SX]:
