@@ -38,7 +38,7 @@ from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findi
 from ctrlgen.diagnosis.selection.result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
-from ctrlgen.diagnosis.selection.verdict import verdict
+from ctrlgen.diagnosis.selection.verdict import in_another_unit, verdict
 from ctrlgen.diagnosis.settings import NOISE, NOISE_UPDATE, SIMULATION
 from ctrlgen.diagnosis.shares.gather import residual_shares
 from ctrlgen.effects import Effect
@@ -87,7 +87,7 @@ def _diagnose(
     tests = run_residual_tests(search.fitter, search.chosen.fit)
     attribution = attribute(search.fitter, search.nominal, search.chosen, seed)
     detected = (*live.findings, *directly_detected_findings(search, effects))
-    answer = verdict(search, tests, attribution, bool(detected))
+    answer = verdict(search, tests, attribution, bool(detected), in_another_unit(search))
     step("supporting analyses")
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)

@@ -7,6 +7,7 @@ from scipy import stats
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
+from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.attribution import Attribution
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
@@ -16,14 +17,20 @@ from ctrlgen.diagnosis.settings import MODEL_SELECTION, STATISTICS, VERDICT
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 
 
-def verdict(search: SearchResult, tests: ResidualTests, shares: Attribution, detected: bool = False) -> str:
-    """The verdict: one of the five words above; `detected` says whether an effect was detected directly in the readings.
+def verdict(
+    search: SearchResult, tests: ResidualTests, shares: Attribution, detected: bool = False, another_unit: bool = False
+) -> str:
+    """The verdict: one of the five words above. `detected` says whether an effect was detected directly in the readings,
+    `another_unit` whether a reading is `in_another_unit`.
 
     consistent: no cause is found, and what is left is noise or within the tolerance. explained: confirmed causes, and what is
     left is noise or within the tolerance. ambiguous: another cause explains the recording as well as one of the main ones.
     partly: confirmed causes take away most of the mismatch, or all of it with parameters too uncertain to predict, or the noise
-    is not known. unexplained: no cause takes away most, or the fit agrees only with numbers that contradict the device file.
+    is not known. unexplained: no cause takes away most, the fit agrees only with numbers that contradict the device file, or a
+    column's unit is wrong.
     """
+    if another_unit:
+        return UNEXPLAINED
     fitter, found = search.fitter, detected or search.chosen.causes
     known = bool(fitter.noise.known.all())
     enough = (known and tests.passed) or within_tolerance(search)
@@ -36,6 +43,27 @@ def verdict(search: SearchResult, tests: ResidualTests, shares: Attribution, det
         return EXPLAINED
     sound = enough or not known or shares.explained >= VERDICT.most
     return PARTLY if sound and not (contradicted and shares.explained < VERDICT.most) else UNEXPLAINED
+
+
+def in_another_unit(search: SearchResult) -> bool:
+    """Whether a reading is that of the device with its stated numbers but for a thousand, or a power of it: a column's unit is
+    wrong."""
+    fitter = search.fitter
+    stated = fitter.fit(Structure(search.nominal.fit.structure.device), steps=0)
+    pairs = [(r, fitter.predict(stated, r)) for r in fitter.fit_records]
+    for i in range(len(fitter.recording.channels)):
+        y, x = (
+            np.concatenate(v)
+            for v in zip(*[(r.observed[r.valid[:, i], i], p[r.valid[:, i], i]) for r, p in pairs], strict=True)
+        )
+        y, x = y - np.mean(y), x - np.mean(x)
+        if not (np.isfinite(x).all() and np.any(x) and np.any(y)):
+            continue
+        slope, alike = (x @ y) / (x @ x), (x @ y) ** 2 / ((x @ x) * (y @ y))
+        thousands = np.log10(max(abs(slope), 1e-300)) / 3
+        if alike > VERDICT.same_shape and round(thousands) and abs(thousands - round(thousands)) < VERDICT.same_unit:
+            return True
+    return False
 
 
 def within_tolerance(search: SearchResult) -> bool:

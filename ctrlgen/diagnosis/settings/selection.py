@@ -230,6 +230,10 @@ class VerdictSettings:
     main_share: float = 0.25
     """Share of a cause, over the largest one, from which rivals of it make the whole answer ambiguous: which of two small
     causes it is does not change the main one. Judgement."""
+    same_shape: float = 0.95
+    """Squared correlation of a reading with the device as described from which on they differ by a factor alone. Judgement."""
+    same_unit: float = 0.03
+    """Distance of that factor from a power of a thousand, in such powers: a fifth of the factor. Judgement."""
     impossible_p: float = 1e-6
     """p of the device's stated numbers so far off by chance, below which they contradict the data sheet."""
     named_deviation: float = 2.0
