@@ -83,12 +83,25 @@ def test_a_step_of_coupled_states_equals_the_matrix_exponential(model):
     A = np.diag(np.full(6, -200.0)) + np.diag(np.full(5, 80.0), 1)
     coupled = replace(model, rates_of_heat=ca.mtimes(ca.DM(A), model.x) + 1000 * model.u)
     x, u = np.linspace(1, 2, 6), np.linspace(0, 1, 6)
-    for h in (2e-3, 0.02, 0.1):  # |hA| 0.6, 6, 30
+    for h in (2e-3, 0.02, 0.1, 17.0):  # |hA| 0.6, 6, 30, 5000: the dwell of a pose
         exact = expm(h * A) @ x + np.linalg.solve(A, (expm(h * A) - np.eye(6)) @ (1000 * u))
         value = ca.Function("step", [coupled.x, coupled.u], [held_step(coupled, h)])(x, u).full().ravel()
         assert value == pytest.approx(exact, rel=1e-9)  # truncation of the series at order 12
     with pytest.raises(InputError, match="too long"):
-        held_step(coupled, 10.0)
+        held_step(coupled, 1e6)
+
+
+def test_states_that_are_not_linear_settle_within_a_dwell(model):
+    """dx/dt = 1000 (u - x - x^3/5) + 80 x_k+1, from rest at zero, after more than a thousand time constants."""
+    from dataclasses import replace
+
+    y = model.x - model.rest
+    rates = 1000 * (model.u - y - y**3 / 5) + 80 * ca.vertcat(y[1:], 0)
+    bent = replace(model, rates_of_heat=rates)
+    u = np.linspace(0.2, 1, 6)
+    value = ca.Function("step", [bent.x, bent.u], [held_step(bent, 17.0)])(bent.rest, u)
+    left = ca.Function("rates", [bent.x, bent.u], [rates])(value, u).full().ravel() / 1000
+    assert np.abs(left).max() < 1e-4  # one exponential step alone leaves more than a hundredth
 
 
 def test_the_state_space_has_the_closed_form_gain_and_pole(device, model):

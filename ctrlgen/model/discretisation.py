@@ -24,9 +24,12 @@ from ctrlgen.numerics.phi_functions import held_gain, increment, lag_increment
 NEWTON_STEPS = 4  # from the displacement one sample before, each step doubles the digits
 SETTLING_SWEEPS = 3  # memories that follow memories that follow heaters whose power depends on their temperature
 SETTLING_TIME_CONSTANTS = 14.0  # e^-14 is a millionth
-# Sample time times the fastest rate of coupled states, beyond which the sample time is refused:
-LONGEST_HELD_STEP = 1024.0  # held drive; ten doublings of the phi functions
-LONGEST_RAMP_STEP = 2.0**20  # linear drive: 20 doublings leave 1e-10 of rounding
+# Sample time times the fastest rate of coupled states:
+LONGEST_STEP = (
+    2.0**20
+)  # beyond it the sample time is refused; 20 doublings of the phi functions leave 1e-10 of rounding
+LONGEST_HELD_STEP = 1024.0  # beyond it a sample under a held drive, such as the dwell of a pose, is divided
+DWELL_STEPS = 4  # parts of such a sample: for states that settle in each, as many steps of Newton's method
 SLOWEST_RATE = 1e-6  # [1/s] a slower state is taken to stand: an integrator, not a lag
 
 
@@ -58,15 +61,21 @@ def one_step_map(model: Model, sample_time: float, linear: bool = False, newton_
 def held_step(model: Model, sample_time: float, rates: ca.SX | None = None) -> ca.SX:
     """x (n_x,) after one `sample_time` h [s] with u and z held: x + h phi_1(h A) f(x), A = df/dx.
 
-    `rates` f are those of the model unless given. Exact where f is linear in x. Raises InputError where h is more than
-    `LONGEST_HELD_STEP` times the fastest rate of states that act on one another.
+    `rates` f are those of the model unless given. Exact where f is linear in x. A sample of more than `LONGEST_HELD_STEP` time
+    constants is divided, so that states which are not linear settle too. Raises InputError where h is more than `LONGEST_STEP`
+    times the fastest rate of states that act on one another.
     """
     rates, h = model.rates if rates is None else rates, sample_time
     A = ca.jacobian(rates, model.x)
     if _uncoupled(A):
         gain = ca.vertcat(*(held_gain(rate, h) for rate in ca.vertsplit(ca.diag(A))))
         return _with_sampled_states(model, model.x + gain * rates)
-    return _with_sampled_states(model, model.x + increment(A, [rates], h, _doublings(model, A, h, LONGEST_HELD_STEP)))
+    parts = 1 if _fastest(model, A) * h <= LONGEST_HELD_STEP else DWELL_STEPS
+    doublings, x = _doublings(model, A, h / parts), model.x
+    for _ in range(parts):
+        slope, rate = ca.substitute([A, rates], [model.x], [x])
+        x = x + increment(slope, [rate], h / parts, doublings)
+    return _with_sampled_states(model, x)
 
 
 def _ramp_step(model: Model, sample_time: float, u_next: ca.SX, newton_steps: int) -> ca.SX:
@@ -94,11 +103,9 @@ def _ramp_step(model: Model, sample_time: float, u_next: ca.SX, newton_steps: in
         values = [first, 4 * middle - 3 * first - last, 4 * (first - 2 * middle + last)]
     else:
         values = [first, rates_at(1.0) - first]
-    if _uncoupled(A):
-        after = model.x + lag_increment(ca.diag(A), values, h)
-    else:
-        after = model.x + increment(A, values, h, _doublings(model, A, h, LONGEST_RAMP_STEP))
-    return _with_sampled_states(model, after)
+    lags = _uncoupled(A)
+    step = lag_increment(ca.diag(A), values, h) if lags else increment(A, values, h, _doublings(model, A, h))
+    return _with_sampled_states(model, model.x + step)
 
 
 def _with_sampled_states(model: Model, x: ca.SX) -> ca.SX:
@@ -113,12 +120,17 @@ def _uncoupled(A: ca.SX) -> bool:
     return (A.sparsity() + ca.Sparsity.diag(A.size1())).is_diag()
 
 
-def _doublings(model: Model, A: ca.SX, h: float, longest: float) -> int:
-    """How often the sample time `h` [s] must be halved until |h A| is at most 1, at rest; refuses |h A| above `longest`."""
+def _fastest(model: Model, A: ca.SX) -> float:
+    """|A| [1/s] at rest, in the states' typical sizes."""
     at_rest = ca.Function("A", [model.x, model.z, model.u, model.p], [A])(model.rest, 0, 0, model.p_nominal)
-    norm = float(ca.norm_inf(at_rest * (model.x_scale[None, :] / model.x_scale[:, None])))
-    if h * norm > longest:
-        what = f"{h:g} s is too long for the fastest coupled state; use {longest / norm:.2g} s or less"
+    return float(ca.norm_inf(at_rest * (model.x_scale[None, :] / model.x_scale[:, None])))
+
+
+def _doublings(model: Model, A: ca.SX, h: float) -> int:
+    """How often the sample time `h` [s] must be halved until |h A| is at most 1, at rest; refuses |h A| above `LONGEST_STEP`."""
+    norm = _fastest(model, A)
+    if h * norm > LONGEST_STEP:
+        what = f"{h:g} s is too long for the fastest coupled state; use {LONGEST_STEP / norm:.2g} s or less"
         raise InputError(model.name, [Fault("sample time", what)])
     return max(0, ceil(log2(h * norm))) if norm else 0
 
