@@ -140,7 +140,7 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
         long = [s for s in stretches if len(s) >= NOISE.shortest_stretch and np.ptp(s) > 0]
         quiet = _without_events([without_lines(_detrended(s, degree)) for s in long])
         if quiet:
-            return _from_stretches(quiet, source, rounding)
+            return _from_stretches(quiet, source, rounding, degree + 1)
     if stated := recording.noise[i]:
         sd, _ = _with_rounding(stated, np.zeros(0), rounding)
         return _ChannelNoise(sd, "as stated, taken as white", NOISE.stated_samples)
@@ -153,9 +153,16 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     return _ChannelNoise(sd, note, sum(map(len, thirds)) / NOISE.robust_cost, guessed=True)
 
 
-def _from_stretches(stretches: list[np.ndarray], source: str, rounding: float) -> _ChannelNoise:
-    """The autoregressive noise of stretches of pure noise."""
-    sd, a = _with_rounding(*autoregression(stretches), rounding)
+def _from_stretches(stretches: list[np.ndarray], source: str, rounding: float, removed: int) -> _ChannelNoise:
+    """The autoregressive noise of stretches of pure noise.
+
+    A polynomial with as many coefficients as were `removed` takes the power of so many of the L/tau independent samples of a
+    stretch with it, tau the correlation time; the variance is raised by what it took.
+    """
+    innovation, a = autoregression(stretches)
+    tau = (innovation / max(1 - float(np.sum(a)), 1e-3) / max(stationary_deviation(innovation, a), 1e-300)) ** 2
+    kept = sum(max(len(s) - removed * max(tau, 1.0), len(s) / 2) for s in stretches) / sum(map(len, stretches))
+    sd, a = _with_rounding(innovation / np.sqrt(kept), a, rounding)
     n, ratio = sum(map(len, stretches)), stationary_deviation(sd, a) / sd
     note = f"from {source}, {n} samples, autoregressive of order {len(a)}"
     if ratio > NOISE.slow_ratio:

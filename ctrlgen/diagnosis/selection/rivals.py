@@ -1,4 +1,4 @@
-"""Rivals: what would be suspected in place of a cause, with all the others as they are."""
+"""Rivals: what would be suspected in place of a cause, with all the others as they are, and special cases of its law."""
 
 from __future__ import annotations
 
@@ -25,6 +25,19 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
             if better and not trials.objections(rival, current.causes):
                 current = trials.converged(rival)
                 break
+    return current
+
+
+def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
+    """The model with the special case of each law in its place that the fit does not exclude, where more than noise is left: how
+    the friction falls with speed, say, is then within what the discrepancy feigns."""
+    for k in range(len(current.causes)):
+        special = None if current.errors.is_noise else current.fit.nested_case(k)
+        found = replacements(trials, current, k) if special else []
+        for t in (t for t in found if t.cause and t.cause.effect == special):
+            alike = trials.selection.advantage(current, t) < SEARCH.rival_difference
+            if alike and not trials.objections(t, current.causes):
+                return simplified(trials, trials.converged(t))
     return current
 
 

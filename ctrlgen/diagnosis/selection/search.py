@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, S
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
-from ctrlgen.diagnosis.selection.rivals import rivals, swapped
+from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import FIT, SEARCH
@@ -50,7 +50,7 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
-        current = self._settled(current)
+        current = simplified(trials, self._settled(current))
         nominal = scored(
             trials.fitter, trials.fitter.described(device)[1]
         )  # its numbers not bent by errors of a better model
