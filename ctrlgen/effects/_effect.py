@@ -49,7 +49,7 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
-    # What the device must have, of: acceleration, actuator, ambient, balanced, bipolar, force, heat,
+    # What the device must have, of: acceleration, actuator, ambient, balanced, bipolar, displacement_command, force, heat,
     # sample_time, second_order_kinematics, spatial, state, tangent_compliance, unheated, velocity, voltage.
     requires: ClassVar[frozenset[str]] = frozenset()
     # Couples a channel to another one, `of`, whose index is `partner`; a symmetric one acts on both.

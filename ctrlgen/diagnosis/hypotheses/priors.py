@@ -339,7 +339,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
     ),
     "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
     "lever_ratio": LawPrior(
-        "Explains nearly the same as a gain of the drive, which is named first: judgement.", log_prior_odds=ONE_IN_TEN
+        "Explains nearly the same as a gain of the drive, which is named first: judgement; where the drive is a displacement, just "
+        "the same.",
+        log_prior_odds=ONE_IN_TEN,
+        unless=frozenset({"displacement_command"}),
     ),
     "link_load": LawPrior("One mechanism loads all stages.", acts_on_all=True),
     "log_creep": LawPrior(

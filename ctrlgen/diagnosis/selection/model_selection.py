@@ -167,9 +167,9 @@ class ModelSelection:
         worthwhile = share * n_held * float(np.max(1 - 1 / q, initial=0.0))
         if confirmed <= max(MODEL_SELECTION.least_confirmed, worthwhile):
             return False
-        return errors.is_noise or (self._matters(before, after) and wins_by_block(before.held_out, after.held_out))
+        return errors.is_noise or (self.matters(before, after) and wins_by_block(before.held_out, after.held_out))
 
-    def _matters(self, before: CandidateModel, after: CandidateModel) -> bool:
+    def matters(self, before: CandidateModel, after: CandidateModel) -> bool:
         """Whether `after` takes away a share of the whole mismatch of any channel on the held-out records that is worth a name."""
         if self.mismatch is None:
             return True

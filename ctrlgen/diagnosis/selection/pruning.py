@@ -53,7 +53,8 @@ def without_needless(trials: Trials, current: CandidateModel) -> CandidateModel:
 
 def _needed(trials: Trials, bare: CandidateModel, current: CandidateModel) -> bool:
     """Whether `current` is worth its further cause. Where more than noise is left, what was chosen among many before need only
-    keep its advantage."""
+    keep its advantage, and matter beside the others that came later."""
+    compare = trials.selection
     if current.errors.is_noise:
-        return trials.selection.improves_enough(bare, current)
-    return trials.selection.advantage(current, bare) > 0
+        return compare.improves_enough(bare, current)
+    return compare.advantage(current, bare) > 0 and compare.matters(bare, current)
