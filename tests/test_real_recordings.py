@@ -116,7 +116,7 @@ def test_a_hash_of_no_file_of_the_recording_is_a_fault(tmp_path):
 
 @pytest.mark.long
 def test_the_meso_hexapod_is_wired_and_built_otherwise_than_printed():
-    """Held out: better in rotation than 36 free numbers fitted alike (0.00103 deg), in translation worse (1.63 um)."""
+    """Held out: better than 36 free numbers fitted alike (1.63 um, 0.00103 deg)."""
     found = diagnosed("nist_hexapod", device="../devices/meso_hexapod.toml")
     causes = {(f.effect, f.location): f for f in found.findings}
     assert {location for effect, location in causes if effect == "reversed"} == {
@@ -126,23 +126,71 @@ def test_the_meso_hexapod_is_wired_and_built_otherwise_than_printed():
     assert radius.value == pytest.approx(64.29, rel=0.01) and radius.unit == "mm"  # as Table 1's other lengths want it
     fit, fitter = found.search.chosen.fit, found.fitter
     errors = PoseErrors(np.vstack([r.observed - fitter.predict(fit, r) for r in fitter.held_out_records]))
-    assert sum(u.cause is not None for u in fit.structure.free_parameters) <= 18  # half of the peer's
+    assert sum(u.cause is not None for u in fit.structure.free_parameters) <= 24  # two thirds of the peer's
     assert np.rad2deg(errors.rotation.mean()) < 0.00095
-    assert errors.translation.mean() < 2.2e-6
+    assert errors.translation.mean() < 1.4e-6
+
+
+FRICTION = {"coulomb", "directional_friction", "stribeck"}
 
 
 @pytest.mark.long
-def test_emps_has_dry_friction_that_differs_by_direction():
+def test_emps_has_dry_friction_and_a_drive_that_counts_later():
+    """Nobody says that the force acts after its row."""
     found = diagnosed("emps")
-    assert {"coulomb", "asymmetric_viscous"} <= {f.effect for f in found.findings}
-    force = next(f for f in found.findings if f.effect == "coulomb").parameters["force"]
+    assert found.findings[0].effect in FRICTION and found.verdict == "partly"
+    force = found.findings[0].parameters["force"]
     assert 19.0 < force.value < 23.0 and force.unit == "N"  # the owner identifies 20.4 N
+    offset = next(f for f in found.findings if f.effect == "clock_offset").parameters["offset"]
+    assert 0.0 < offset.value < 2.0 and offset.unit == "ms"  # one cycle of the controller is 1 ms
+    assert not {"vibration", "force_step", "sensor_step", "drift"} & {f.effect for f in found.findings}
     assert left(found, "reading.force") < 0.3
     assert relative(found) < 0.060  # the owner's figure on the same held-out run
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("run, limit, period", [("a", 0.15, 90.0), ("b", 0.15, None), ("c", 0.05, 180.0)])
+@pytest.mark.parametrize("name", ["recording", "recording_split2", "recording_half_rate"])
+def test_the_rack_has_friction_or_a_zero_that_is_off_and_two_clocks(name):
+    """The motion never reverses, so that friction and a zero of the load cell are nearly one: the answer says so."""
+    found = diagnosed("rack_pinion", f"{name}.toml")
+    first, second = found.findings[:2]
+    named = {first.effect, *(a.effect for a in first.alternatives)}
+    assert named & FRICTION and "home_offset" in named and found.verdict == "ambiguous"
+    assert second.effect == "clock_offset"
+    assert 6.0 < second.parameters["offset"].value < 9.0  # 8 ms is the best by plain least squares
+    assert left(found, "reading.force") < 0.35
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["recording", "recording_half_rate"])
+def test_the_axes_of_the_manipulator_share_a_spring(name):
+    found = diagnosed("flexure_2dof", f"{name}.toml")
+    first = found.findings[0]
+    assert (first.effect, first.location) == ("stiffness_coupling", "stage:q1") and first.share.value > 0.6
+    assert first.parameters["stiffness"].value == pytest.approx(104.0, rel=0.05)  # by plain least squares, 102 to 106
+    assert max(left(found, f"reading.{axis}") for axis in ("q1", "q2")) < 0.25
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["recording", "recording_split2"])
+def test_the_servo_motor_has_dry_friction(name):
+    found = diagnosed("servo_motor", f"{name}.toml")
+    force = found.findings[0].parameters["force"]
+    assert found.findings[0].effect in FRICTION
+    assert force.unit == "N*m" and force.value == pytest.approx(0.035, rel=0.1)  # by plain least squares
+    assert left(found, "reading.force") < 0.4
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["recording", "recording_split2"])
+def test_the_piezo_ceramic_draws_a_butterfly(name):
+    found = diagnosed("piezo_pnzt", f"{name}.toml")
+    assert found.findings[0].effect == "butterfly" and found.findings[0].share.value > 0.4
+    assert not {"vibration", "drift", "sensor_step"} & {f.effect for f in found.findings}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("run, limit, period", [("a", 0.15, 90.0), ("b", 0.15, None), ("c", 0.1, 180.0)])
 def test_the_rotary_axis_comes_late_and_its_resolver_has_harmonics(run, limit, period):
     found = diagnosed("rotary_axis", f"run_{run}.toml")
     effects = {f.effect for f in found.findings}
@@ -161,7 +209,8 @@ def test_the_friction_damper_is_hysteretic():
     found = diagnosed("friction_damper")
     assert {f.effect for f in found.findings} & {"bouc_wen", "hysteresis", "asymmetric_hysteresis"}
     assert left(found, "reading.force") < 0.45
-    assert found.verdict == "unexplained"  # slack before the band grips and its chatter are in no law of the library
+    assert found.verdict == "partly"  # slack before the band grips and its chatter are in no law of the library
+    assert "vibration" not in {f.effect for f in found.findings}  # 2 Hz is twice the frequency of the test
 
 
 @pytest.mark.long

@@ -16,7 +16,7 @@ from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.noise import period_of
 from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.settings import OBJECTIONS
+from ctrlgen.diagnosis.settings import OBJECTIONS, STATISTICS
 from ctrlgen.effects import Param
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record, Recording
@@ -90,11 +90,35 @@ def _no_line(recording: Recording, fit: Fit, k: int) -> str:
         fewest = f"{OBJECTIONS.fewest_periods:.0f} are needed to tell a line"
         return f"the records hold {line * covered:.1f} periods of it, and {fewest}"
     for record in (r for r in recording.records if r.role == "fit"):
-        period = period_of(record)
+        period = period_of(record) or _nearly_period(record)
         order = line * period if period else 0.5
-        if period and order > 0.5 and abs(order - round(order)) / period * covered < OBJECTIONS.harmonic:
+        near = max(OBJECTIONS.harmonic / covered, _line_interval(fit, k))
+        if period and order > 0.5 and abs(order - round(order)) / period < near:
             return f"it is harmonic {round(order)} of the drive's period, as whatever the drive causes is"
     return ""
+
+
+def _line_interval(fit: Fit, k: int) -> float:
+    """Half the 95 % interval [Hz] of the frequency of cause k."""
+    free = fit.structure.free_parameters
+    found = (i for i, p in enumerate(free) if p.cause == k and p.unit == "Hz")
+    i = next(found, None)
+    return 0.0 if i is None else STATISTICS.z_95 * float(np.sqrt(max(fit.covariance[i, i], 0.0)))
+
+
+def _nearly_period(record: Record) -> float | None:
+    """Period [s] after which a drive that was measured repeats but for its noise: the first high peak of its autocorrelation."""
+    n = len(record.drive)
+    for drive in (record.drive - np.mean(record.drive, axis=0)).T:
+        power = np.abs(np.fft.rfft(drive, 2 * n)) ** 2
+        r = np.fft.irfft(power)[: n // 2] / (n - np.arange(n // 2))
+        fallen = np.flatnonzero(r < 0)
+        if not len(fallen):
+            continue
+        lag = int(fallen[0]) + int(np.argmax(r[fallen[0] :]))
+        if r[lag] > OBJECTIONS.repeats * r[0]:
+            return lag * record.sample_time
+    return None
 
 
 def _no_event(recording: Recording, fit: Fit, k: int) -> str:

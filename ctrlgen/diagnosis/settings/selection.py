@@ -181,6 +181,9 @@ class ObjectionsSettings:
     Judgement."""
     harmonic: float = 0.25
     """Cycles within the records to fit between a line and a harmonic of a periodic drive, below which they are one."""
+    repeats: float = 0.9
+    """Autocorrelation of a measured drive after a period, from which on it counts as periodic: a tenth of its power may be
+    noise. Judgement."""
     sharp: float = 0.02
     """Rise of an event over the length of the record, above which it is no event: a fiftieth is what a figure of the record
     shows as a step. Judgement."""
