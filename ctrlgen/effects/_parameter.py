@@ -36,7 +36,8 @@ class State:
     """A memory of the effect, zero at rest; `scale` is a typical size in `unit`, counted as in `Param`.
 
     A `stepped` one changes once a sample, by `update`; a `clock` is the time since the record's common zero. With what a
-    `free` one begins is unknown and differs by record: a diagnosis fits it there; elsewhere it begins at zero.
+    `free` one begins is unknown and differs by record: a diagnosis fits it there; elsewhere it begins at zero. One
+    `per_record` is free and keeps its value through the record: outside a diagnosis it is the number zero, and no state.
     """
 
     name: str
@@ -45,6 +46,12 @@ class State:
     stepped: bool = False
     clock: bool = False
     free: bool = False
+    per_record: bool = False
+
+    def __post_init__(self) -> None:
+        if self.per_record:  # it changes by no law of its own
+            object.__setattr__(self, "free", True)
+            object.__setattr__(self, "stepped", True)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ def play_states(unit: str) -> tuple[State, ...]:
     At rest in the middle start is 0; after a long way down it is 1, after a long way up -1.
     """
     plays = (State(name, unit, 1.0, stepped=True) for name in _play_names())
-    return (*plays, State("start", "1", 1.0, stepped=True, free=True))
+    return (*plays, State("start", "1", 1.0, per_record=True))
 
 
 def beginning(s: SimpleNamespace, radius: ca.SX) -> ca.SX:
@@ -51,7 +51,7 @@ def _weights(taper: ca.SX) -> list[ca.SX]:
 
 def updated_plays(s: SimpleNamespace, path: list[ca.SX], reach: ca.SX) -> dict[str, ca.SX]:
     """The plays after the input has taken the values of `path` in turn: P_j stays within r_j = reach j/8 of each value."""
-    new = {"start": s.start}
+    new = {}
     for name, radius in zip(_play_names(), _radii(reach), strict=True):
         first = beginning(s, radius)
         play = getattr(s, name) + first

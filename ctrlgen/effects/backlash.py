@@ -20,7 +20,7 @@ class Backlash(Effect):
     params = (Param("gap", "travel", (0.0, 1.0), "full width of the gap", off=0.0),)
     states = (
         State("w", "travel", 1.0, stepped=True),  # counted from where it begins
-        State("start", "1", 1.0, stepped=True, free=True),  # w begins at start b/2
+        State("start", "1", 1.0, per_record=True),  # w begins at start b/2
         State("d", "travel", 1.0, stepped=True),
         State("v", "travel/s", 100.0, stepped=True),
     )
@@ -33,4 +33,4 @@ class Backlash(Effect):
         w = s.w + first
         for d in (reversal_point(s, s.d, s.v), s.displacement):
             w = ca.fmax(ca.fmin(w, d + p.gap / 2), d - p.gap / 2)
-        return {"w": w - first, "start": s.start, "d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
+        return {"w": w - first, "d": s.displacement, "v": 0 if s.velocity is None else s.velocity}

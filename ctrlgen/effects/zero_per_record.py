@@ -13,10 +13,7 @@ class ZeroPerRecord(Effect):
     place = Place.SENSOR
     source = "definition"
     params = (Param("share", "1", (0.0, 2.0), "1: the zero is free", off=0.0),)
-    states = (State("zero", "channel", 1.0, stepped=True, free=True),)
+    states = (State("zero", "channel", 1.0, per_record=True),)
 
     def term(self, s, p):
         return p.share * s.zero
-
-    def update(self, s, p):
-        return {"zero": s.zero}

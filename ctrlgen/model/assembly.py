@@ -30,12 +30,17 @@ NO_RISE = ca.SX(0)  # the surroundings as they are described
 
 
 def build_model(
-    device: Device, free: Sequence[str] = (), ambient: ca.SX | None = None, sample_time: float | None = None
+    device: Device,
+    free: Sequence[str] = (),
+    ambient: ca.SX | None = None,
+    sample_time: float | None = None,
+    per_record: bool = False,
 ) -> Model:
     """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
 
     `free` are dotted paths as in `device.quantities()`; `ambient` is a symbol for the rise of the surroundings [K],
-    where that is not zero; `sample_time` [s] is needed by effects that look back by samples. Raises InputError for a
+    where that is not zero; `sample_time` [s] is needed by effects that look back by samples. With `per_record` the
+    constants of a record (where a play begins, a zero that is set anew) are states; without, they are zero. Raises InputError for a
     path that is no parameter or acts on nothing, an effect that does not fit the device, and a restoring force that
     does not rise over the stroke.
     """
@@ -46,7 +51,7 @@ def build_model(
     counts = [path for path in free if nominal[path].whole]
     if counts:
         raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
-    model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time)
+    model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record)
     outside = {f"effect[{k}].{e.amplitude().name}" for k, e in enumerate(device.effect) if e.shifts_drive}
     idle = [path for path in free if path not in model.moved_by and path not in outside]
     if idle:
@@ -59,7 +64,7 @@ def build_model(
 def movable(device: Device) -> tuple[str, ...]:
     """Paths of the parameters that act on motion or readings, not only on limits."""
     paths = [path for path, number in device.quantities() if not number.whole]
-    model = _assemble(device, paths, NO_RISE, sample_time=1.0)
+    model = _assemble(device, paths, NO_RISE, sample_time=1.0, per_record=True)
     return tuple(path for path in paths if path in model.moved_by)
 
 
@@ -82,7 +87,9 @@ class Assembly:
     own_force: ca.SX = NONE
 
 
-def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: float | None) -> Model:
+def _assemble(
+    device: Device, free: Sequence[str], ambient: ca.SX, sample_time: float | None, per_record: bool
+) -> Model:
     """The model of `device` with the parameters `free` as symbols: the one place where a Model is made."""
     nominal = dict(device.quantities())
     symbols = {path: ca.SX.sym(path) for path in free}
@@ -93,7 +100,7 @@ def _assemble(device: Device, free: Sequence[str], ambient: ca.SX, sample_time: 
     inertial = isinstance(physics, InertialPhysics)
     z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n if inertial else 0), ca.SX.sym("a", n if inertial else 0)
     velocity = physics.drive.expr[n : 2 * n] if isinstance(physics, ImposedPhysics) else v
-    terms = EffectTerms(device, physics, values, z, velocity, a, ambient, sample_time)
+    terms = EffectTerms(device, physics, values, z, velocity, a, ambient, sample_time, per_record)
     faults = mounting_faults(device.sensor, physics.components, physics.pose_units) + terms.faults
     if faults:
         raise InputError(device.name, faults)

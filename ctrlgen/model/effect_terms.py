@@ -53,7 +53,8 @@ class Member:
 
     def apply(self, s: SimpleNamespace) -> ca.SX:
         """The term for the inputs `s`; keeps the states' rates and the new values of those that change once a sample."""
-        self.stepped = {name: ca.SX(value) for name, value in self.effect.update(s, self.values).items()}
+        kept = {state.name: self.states[state.name] for state in self.effect.states if state.per_record}
+        self.stepped = kept | {name: ca.SX(value) for name, value in self.effect.update(s, self.values).items()}
         s.__dict__.update(self.stepped)
         by_default = {state.name: ca.SX(float(state.clock)) for state in self.effect.states}
         self.rates = {**by_default, **self.effect.rates(s, self.values)}
@@ -64,14 +65,15 @@ class EffectTerms:
     """Adds the effects' terms place by place, in the order of `Effect.order`, and collects their states.
 
     `displacement` (n_axes,), `velocity` (n_axes, or none where it is not known) and `acceleration` are the model's
-    symbols, `ambient` the rise of the surroundings [K]. `faults` lists the effects that do not fit the device.
+    symbols, `ambient` the rise of the surroundings [K]. `faults` lists the effects that do not fit the device. What the
+    laws keep through a record is a state with `per_record`, zero without.
     """
 
     def __init__(
         self, device: Device, physics: DevicePhysics, p: SimpleNamespace, displacement: ca.SX, velocity: ca.SX,
-        acceleration: ca.SX, ambient: ca.SX, sample_time: float | None,
+        acceleration: ca.SX, ambient: ca.SX, sample_time: float | None, per_record: bool,
     ) -> None:  # fmt: skip
-        self.physics, self.ambient, self.sample_time = physics, ambient, sample_time
+        self.physics, self.ambient, self.sample_time, self.per_record = physics, ambient, sample_time, per_record
         self.displacement, self.velocity, self.acceleration = displacement, velocity, acceleration
         reach = REACH * physics.displacement_scale
         self.within_reach = ca.fmin(ca.fmax(displacement, -reach), reach)
@@ -107,7 +109,10 @@ class EffectTerms:
                     self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} cannot act on {names[i]}: wrong unit"))
                 continue
             self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in faults_at(effect, channel)]
-            states = {s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") for s in effect.states}
+            states = {
+                s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") if self._unknown(s) else ca.SX(0)
+                for s in effect.states
+            }
             self.members.append(Member(effect, values, channel, i, partner, states))
 
     def added(self, place: Place, before: ca.SX) -> ca.SX:
@@ -179,7 +184,11 @@ class EffectTerms:
             (m, state, symbol)
             for m in self.members
             for state, symbol in zip(m.effect.states, m.states.values(), strict=True)
+            if self._unknown(state)
         ]
+
+    def _unknown(self, state: State) -> bool:
+        return self.per_record or not state.per_record
 
 
 def channels(physics: DevicePhysics, place: Place) -> list[Channel]:

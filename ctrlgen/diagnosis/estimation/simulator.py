@@ -40,7 +40,7 @@ class Simulator:
         self.free, self.channels, self.sample_time, self.linear = tuple(free), tuple(channels), sample_time, linear
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
-        self.model: Model = build_model(device, free, self.ambient, look_back)
+        self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True)
         self._with_sensitivities: dict[bool, Recursion] = {}
         self._by_pattern: dict[tuple, ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
