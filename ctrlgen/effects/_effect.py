@@ -120,3 +120,7 @@ class Effect:
     def update(self, s: SimpleNamespace, p: SimpleNamespace) -> dict[str, ca.SX]:
         """Each stepped state after the present sample, from its value before; `term` sees the new one."""
         return {}
+
+    def after_sample(self, s: SimpleNamespace, p: SimpleNamespace) -> dict[str, ca.SX]:
+        """`update`, with the states that keep their value through a record."""
+        return {state.name: getattr(s, state.name) for state in self.states if state.per_record} | self.update(s, p)

@@ -53,8 +53,7 @@ class Member:
 
     def apply(self, s: SimpleNamespace) -> ca.SX:
         """The term for the inputs `s`; keeps the states' rates and the new values of those that change once a sample."""
-        kept = {state.name: self.states[state.name] for state in self.effect.states if state.per_record}
-        self.stepped = kept | {name: ca.SX(value) for name, value in self.effect.update(s, self.values).items()}
+        self.stepped = {name: ca.SX(value) for name, value in self.effect.after_sample(s, self.values).items()}
         s.__dict__.update(self.stepped)
         by_default = {state.name: ca.SX(float(state.clock)) for state in self.effect.states}
         self.rates = {**by_default, **self.effect.rates(s, self.values)}

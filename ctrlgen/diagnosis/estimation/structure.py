@@ -5,6 +5,7 @@ The nominal device is nested in every structure: an effect at its `off`, a numbe
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -77,6 +78,16 @@ class Structure:
     def restarted(self, index: int, start: dict[str, float]) -> Structure:
         """The same with the fit of one cause begun elsewhere."""
         return replace(self, starts=(*self.starts[:index], start, *self.starts[index + 1 :]))
+
+    def halved(self, known: Collection[Hypothesis]) -> Structure:
+        """The same with the causes that are not `known` begun with half the amplitude."""
+        starts = list(self.starts)
+        for k, cause in enumerate(self.causes):
+            if cause not in known and cause.effect != PARAMETER:
+                p = cause.law.amplitude()
+                off = self.channel_of(cause).si(p.off or 0.0, p)
+                starts[k] = starts[k] | {p.name: (starts[k][p.name] + off) / 2}
+        return replace(self, starts=tuple(starts))
 
     @property
     def log_prior_odds(self) -> float:

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.errors import CtrlgenError
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
@@ -22,7 +23,7 @@ from ctrlgen.effects import Effect, Place
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.phi_functions import lag_increment, phi_matrices
 
-UNUSABLE = (ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
+UNUSABLE = (CtrlgenError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
 """What a law that cannot be written down at a place may end with."""
 
 Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
@@ -143,7 +144,7 @@ class CandidateTerms:
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
             s = self.simulator.model.law_inputs(law.place, i, partner, states, law.order)
-            new = law.update(s, p)
+            new = law.after_sample(s, p)
             s.__dict__.update(new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
             self._known[key] = len(self.terms)

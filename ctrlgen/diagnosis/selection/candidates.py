@@ -112,7 +112,11 @@ def fit_other_clocks(
 def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
     """What is suspected of the device with its own numbers as stated: a fit that bends them so far sees what they hide no
     more."""
-    stated = trials.fitter.fit(replace(restart(current.fit), nominal_starts={}), steps=0)
+    try:
+        stated = trials.fitter.fit(replace(restart(current.fit), nominal_starts={}), steps=0)
+    except FAILURES as error:
+        trials.note_failure(None, error)
+        return ()
     return fit_each(trials, stated, significant(trials, current, trials.screen.run(stated)))
 
 

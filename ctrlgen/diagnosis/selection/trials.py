@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctrlgen.core.errors import CtrlgenError, InputError
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.noise_update import update_noise_size
 from ctrlgen.diagnosis.estimation.structure import Structure
@@ -20,7 +21,7 @@ from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.settings import DISCREPANCY, FIT, SEARCH
 
-FAILURES = (ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
+FAILURES = (CtrlgenError, ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 """What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge."""
 
 
@@ -77,21 +78,37 @@ class Trials:
         self.fitted[key] = (found, steps)
         return found
 
-    def tried(self, structure: Structure, cause: Hypothesis | None, nested: Fit | None = None) -> list[CandidateModel]:
-        """The trial; none, with a note, where no such device can be built or simulated."""
-        try:
-            return [self.fit(structure, cause, nested=nested)]
-        except FAILURES as error:
-            self.note_failure(cause, error)
-            return []
+    def tried(
+        self,
+        structure: Structure,
+        cause: Hypothesis | None,
+        nested: Fit | None = None,
+        steps: int = SEARCH.candidate_steps,
+    ) -> list[CandidateModel]:
+        """The trial; none, with a note, where no such device can be built or simulated. What it adds to `nested` is begun again
+        with half the amplitude where that may be why."""
+        known = nested.structure.causes if nested else structure.causes
+        for _ in range(SEARCH.halvings + 1):
+            try:
+                return [self.fit(structure, cause, steps=steps, nested=nested)]
+            except FAILURES as error:
+                failure = error
+            if set(structure.causes) <= set(known):
+                break
+            structure = structure.halved(known)
+        self.note_failure(cause, failure)
+        return []
 
     def note_failure(self, cause: Hypothesis | None, error: Exception) -> None:
         """Keeps why a trial of a cause could not be made."""
-        self.failed.append(f"{_name(cause) if cause else 'a trial'}: {error}")
+        why = "; ".join(f.what for f in error.faults) if isinstance(error, InputError) else str(error)
+        self.failed.append(f"{_name(cause) if cause else 'a trial'}: {why}")
 
     def converged(self, candidate: CandidateModel) -> CandidateModel:
-        """The same candidate fitted until it converges; candidates are first fitted for a few steps only."""
-        return self.fit(restart(candidate.fit), candidate.cause, steps=FIT.max_steps)
+        """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
+        steps only."""
+        found = self.tried(restart(candidate.fit), candidate.cause, steps=FIT.max_steps)
+        return found[0] if found else candidate
 
     def screened(self, candidate: CandidateModel) -> Screened:
         """The screen of what a candidate leaves."""
@@ -115,8 +132,13 @@ class Trials:
             fitter = self.fitter.with_errors_of(candidate.fit)
             if np.allclose(fitter.error.weighted.sd, self.fitter.error.weighted.sd, rtol=DISCREPANCY.same):
                 break
+            before = self.fitter
             self.use(fitter)
-            candidate = self.converged(candidate)
+            found = self.tried(restart(candidate.fit), candidate.cause, steps=FIT.max_steps)
+            if not found:
+                self.use(before)
+                break
+            candidate = found[0]
         return candidate
 
     def with_noise_update(self, candidate: CandidateModel) -> CandidateModel:

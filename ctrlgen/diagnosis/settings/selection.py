@@ -118,6 +118,8 @@ class SearchSettings:
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
     clock_doublings: int = 6
     """Shifts in time from which a fit may begin: one sample, doubled so many times less one, early and late."""
+    halvings: int = 3
+    """How often an amplitude from which no fit can begin is halved: the screen that promises it is linear. Judgement."""
     restarts: int = 4
     """Other shapes of a law from which it is fitted again, those that begin best: the valleys of one law. Judgement."""
     beside_clocks: int = 4
