@@ -163,7 +163,7 @@ def test_what_the_form_of_another_law_may_leave_is_given_no_name(first, lost, fi
         fit = Fit(of, of.start, (), 1500, 1500, np.zeros(0), sure * np.eye(len(of.start)), 0.0)
         return CandidateModel(fit, errors_of(left(fitted)), left(fitted), left(held))
 
-    weigh = ModelSelection(weighed_by(), lambda *_, **__: candidate(1000.0, 1000.0))
+    weigh = ModelSelection(weighed_by(), lambda *_, **__: [candidate(1000.0, 1000.0)])
     without, chosen = candidate(fitted, lost, structure.without(1)), candidate(0.0, 0.0)
     assert weigh.within_model_form_error(without, chosen, 1) == doubtful
 

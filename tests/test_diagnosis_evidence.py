@@ -283,7 +283,7 @@ def test_a_drive_that_could_do_far_too_much_is_used_a_little():
     structure = Structure(AXIS.model_copy(update={"actuator": strong}))
     fitter = axis_fitter()
     template = fitter.fit_records[0]
-    simulator = structure.simulators(fitter.recording, {})[template.sample_time, template.linear]
+    simulator = structure.simulators(fitter.recording, {})[template.timing]
     for shape in time_series(2000, 1, 1 / H, 0):
         record, strength = admissible(shape, simulator, structure.start, template, 0.0)
         assert strength < 0.02 and 0.3 < np.abs(record.drive).max() < 4.0

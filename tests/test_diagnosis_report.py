@@ -64,8 +64,8 @@ def same_prediction(diagnosis, text: str, folder: Path) -> None:
     assert stated.items() <= {path: number.si for path, number in diagnosis.device.quantities()}.items()
     simulators = fit.structure.simulators(recording, diagnosis.fitter.cache)
     for record in recording.records:
-        simulator = simulators[record.sample_time, record.linear]
-        own = Simulator(device, (), recording.channels, record.sample_time, record.linear)
+        simulator = simulators[record.timing]
+        own = Simulator(device, (), recording.channels, *record.timing)
         wanted = simulator.simulate(record, fit.theta)
         size = np.abs(wanted).max(axis=0)
         assert np.all(np.abs(simulator.simulate(record, theta) - wanted) <= 1e-9 * size)

@@ -46,6 +46,24 @@ def walked(model, u: np.ndarray, h: float, linear: bool) -> tuple[np.ndarray, np
     return np.hstack([x.full() for x in xs]).T, np.hstack([z.full() for z in zs]).T
 
 
+def test_a_pose_is_read_at_the_end_of_its_dwell():
+    """The push settles in a small part of the dwell; a joint then creeps toward where it was held."""
+    dwell, slow, gain = 4.0, 7.0, 0.3
+    model = build_model(
+        pushed({"kind": "creep", "at": "way", "gain": gain, "tau": f"{slow} s", "slow": 0.0}, tau="1 ms")
+    )
+    one = one_step_map(model, dwell, poses=True)
+    seen = model.signals["displacement"].expr
+    step = ca.Function("step", [model.x, model.z, model.u, one.u_next, model.p], [one.x, one.z])
+    read = ca.Function("read", [model.x, model.z], [seen])
+    x, z, u, crept = ca.DM(model.rest), ca.DM.zeros(1), 0.0, 0.0
+    for held in (0.4, 0.9, 0.1, 0.1):
+        x, z = step(x, z, u, held, model.p_nominal)
+        crept += (held - crept) * (1 - np.exp(-dwell / slow))
+        assert abs(float(z) - held) < ROUNDING and abs(float(read(x, z)) - (held + gain * crept)) < ROUNDING
+        u = held
+
+
 def lti(A: np.ndarray, B: np.ndarray, u: np.ndarray, h: float, linear: bool) -> np.ndarray:
     """x' = A x + B u, (n, n_x), by one exponential of the states with the drive and its slope as further ones (Van Loan)."""
     n = len(A)

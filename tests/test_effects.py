@@ -114,7 +114,7 @@ class Everything:
         free = [f"effect[0].{p.name}" for p in effect.params]
         self.effect, self.where = effect, where
         device = device_of(table, written(effect, where, values))
-        self.model = build_model(device, free, ambient=ambient, sample_time=SAMPLE_TIME)
+        self.model = build_model(device, free, ambient=ambient, sample_time=SAMPLE_TIME, per_record=True)
         self.bare = build_model(device_of(table), ambient=ambient)
         n, memories = self.bare.n_states, self.model.x.numel() - self.bare.x.numel()
         own = [*range(n), *range(n + memories, self.model.x.numel())]

@@ -124,6 +124,39 @@ def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     assert np.linalg.norm(slope - apart) < 0.04 * np.linalg.norm(apart)
 
 
+POSED = [
+    Hypothesis("creep", "stage:1X", "1X"), Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("second_pole", "actuator:2Y", "2Y"),
+    Hypothesis("degradation", "actuator:1Y", "1Y"), Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("law", POSED, ids=lambda h: f"{h.effect}-{h.at}")
+def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulations(hexapod, law):
+    count, dwell = 30, 0.02  # the heaters of this device need three times as long
+    u = build_model(HEXAPOD).u_scale * np.random.default_rng(5).uniform(0.2, 0.8, (count, 6))
+    records = tuple(
+        Record(role, role, dwell * np.arange(count), dwell, u, np.zeros((count, 6)), False, None, np.ones((count, 6), bool), poses=True)
+        for role in ("fit", "hold_out")
+    )  # fmt: skip
+    fitter = Fitter(replace(hexapod.recording, kind="poses", records=records), hexapod.noise)
+    fit = fitter.fit(Structure(HEXAPOD), steps=0)
+    slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing)
+    column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
+    lost = np.zeros(len(slopes.laws.terms) + len(slopes.sizes), bool)
+    blocks = [list(readings) for _, _, readings in slopes._blocks(start, lost)]
+    slope = np.zeros((count, 6))
+    for i, seen in enumerate(slopes.spread.seen):
+        if len(slopes.columns) - 1 in seen:
+            slope[:, i] = np.vstack([b[i] for b in blocks])[:, list(seen).index(len(slopes.columns) - 1)]
+    name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
+    structure = Structure(HEXAPOD).with_cause(law, {**column.shape, name: off + column.size})
+    free = (f"effect[0].{name}",)
+    simulator = Simulator(structure.device_with_causes, free, hexapod.recording.channels, *records[0].timing)
+    ends = [simulator.simulate(records[0], np.array([off + share * column.size])) for share in (0.01, 0.0)]
+    apart = (ends[0] - ends[1]) / 0.01
+    assert np.linalg.norm(slope - apart) < 0.04 * np.linalg.norm(apart)
+
+
 def test_groups_carry_only_what_enters_them():
     F_S = np.array([[1, 0, 0], [1, 1, 0], [0, 0, 1]], bool)
     F_p = np.array([[1, 0, 0], [0, 0, 0], [0, 1, 0]], bool)

@@ -169,12 +169,12 @@ def test_nothing_is_sought_in_what_the_form_of_a_law_leaves():
         found = left(excess)
         return CandidateModel(replace(of, penalty=penalty), errors_of(found), found, found)
 
-    weigh = ModelSelection(weighed_by(), lambda *_, **__: trial(1e6))
+    weigh = ModelSelection(weighed_by(), lambda *_, **__: [trial(1e6)])
     within = weigh.residual_within_model_form_error
     assert within(trial(60.0)) and not within(trial(150.0))
     assert not within(trial(60.0, gain))  # its form is right
     assert not within(trial(60.0, penalty=100.0))  # a number of the device may hide a cause
-    unknown = ModelSelection(weighed_by(known=False), lambda *_, **__: trial(1e6))
+    unknown = ModelSelection(weighed_by(known=False), lambda *_, **__: [trial(1e6)])
     assert not unknown.residual_within_model_form_error(trial(60.0))
 
 

@@ -39,7 +39,7 @@ def record(role: str, n: int = N, n_y: int = 1, observed=None, drive=None) -> Re
 
 
 def weighing(known: bool = True, trial=None) -> ModelSelection:
-    return ModelSelection(weighed_by(known), trial or (lambda *_, **__: None))
+    return ModelSelection(weighed_by(known), trial or (lambda *_, **__: []))
 
 
 def number(cause: int | None = None, low=0.0, high=1.0) -> FreeParameter:
@@ -211,7 +211,7 @@ def test_among_equals_the_plainer_is_named():
 @pytest.mark.parametrize("gain, matters", [(1.01e4, True), (0.99e4, False)])
 def test_beyond_the_noise_a_cause_takes_away_a_hundredth_of_the_whole_mismatch(gain, matters):
     """Of the device as described, 1000 times the noise's squares; not of what is left now."""
-    whole = ModelSelection(weighed_by(), lambda *_, **__: None, mismatch=np.array([1000.0]))
+    whole = ModelSelection(weighed_by(), lambda *_, **__: [], mismatch=np.array([1000.0]))
     before, after = trial(3e4, 3e4), trial(3e4 - gain, 3e4 - gain, numbers=2)
     assert whole.improves_enough(before, after) == matters and weighing().improves_enough(before, after)
 
@@ -290,7 +290,7 @@ def fitted(
 def test_what_a_law_that_is_right_to_a_hundredth_may_leave_is_doubtful(sd, times):
     """A creep, right to a hundredth, takes 4e6 squares where fitted and 1e6 where held out: 400 and 100 of them, in geometric
     mean 200, may be its form; five times as much of itself, 25 times the squares, beside a gain of 0.3 that may be nothing."""
-    w = weighing(trial=lambda structure, **_: fitted(4e6, 1e6))
+    w = weighing(trial=lambda *_, **__: [fitted(4e6, 1e6)])
     current = fitted(0.0, 0.0, GAIN, CREEP, sd=sd)
     for side in (-1, 1):
         squares = 200.0 * times**2 * (1 + 1e-2 * side)

@@ -16,7 +16,7 @@ class Creep(Effect):
         "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), chain of Kelvin solids"
     )
     params = (
-        Param("gain", "1", (0.0, 1.0), "extra travel after infinite time, per travel", off=0.0),
+        Param("gain", "1", (0.0, 3.0), "extra travel after infinite time, per travel", off=0.0),
         Param("tau", "s", (1e-3, 1e5), "relaxation time"),
         Param("slow", "1", (0.0, 0.5), "s: share that relaxes four times as slowly"),
     )

@@ -17,7 +17,7 @@ class LogCreep(Effect):
     place = Place.DISPLACEMENT
     source = "H. Jung, D.-G. Gweon, Rev. Sci. Instrum. 71 (2000) 1896: creep of piezoelectric actuators"
     params = (
-        Param("gain", "1", (0.0, 0.1), "extra travel per decade of time, per travel", off=0.0),
+        Param("gain", "1", (0.0, 0.5), "extra travel per decade of time, per travel", off=0.0),
         Param("tau", "s", (1e-3, 1e2), "shortest relaxation time"),
         Param("decades", "1", (1.0, 4.5), "D: decades after which it ends"),
     )

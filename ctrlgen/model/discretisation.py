@@ -41,8 +41,13 @@ class Sample(NamedTuple):
     z: ca.SX
 
 
-def one_step_map(model: Model, sample_time: float, linear: bool = False, newton_steps: int = NEWTON_STEPS) -> Sample:
+def one_step_map(
+    model: Model, sample_time: float, linear: bool = False, newton_steps: int = NEWTON_STEPS, poses: bool = False
+) -> Sample:
     """x and z one `sample_time` [s] on, with the drive held, or `linear` between samples.
+
+    With `poses` the drive jumps to the next one first and is held for the sample time, the dwell; memories see the displacement
+    of its end, which the actuators reach in a small part of it.
 
     An infinite sample time gives the settled pose (clocks then count poses). Raises InputError where the sample
     time is too long for a model whose states act on one another.
@@ -54,6 +59,12 @@ def one_step_map(model: Model, sample_time: float, linear: bool = False, newton_
     if not np.isfinite(sample_time):
         x, z = _settle(model, u_next, newton_steps)
         return Sample(u_next, x, z)
+    if poses:
+        x, held = model.x, held_step(model, sample_time)
+        for _ in range(2):
+            z = balanced(model, x, u_next, newton_steps)
+            x = ca.substitute(held, ca.vertcat(model.z, model.u), ca.vertcat(z, u_next))
+        return Sample(u_next, x, balanced(model, x, u_next, newton_steps))
     x = _ramp_step(model, sample_time, u_next, newton_steps) if linear else held_step(model, sample_time)
     return Sample(u_next, x, balanced(model, x, u_next, newton_steps))
 

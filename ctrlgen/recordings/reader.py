@@ -312,6 +312,7 @@ class _RecordReader:
             drive=np.column_stack([values[name] for name in names.drives])[kept],
             observed=np.where(after_lead_in, observed, np.nan)[kept],
             linear=table.between_samples == "linear",
+            poses=self.written.kind == "poses",
             ambient=None if ambient is None else (np.zeros(n) + ambient)[kept],
             valid=(after_lead_in & recorded)[kept],
             period=None if table.period is None else table.period.si,

@@ -3,8 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+
+
+class Timing(NamedTuple):
+    """What of a record a simulation is built for: see `Record`. `poses`: each drive is held for a sample time and read at its end."""
+
+    sample_time: float
+    linear: bool = False
+    poses: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -12,13 +21,15 @@ class Record:
     """One uninterrupted run, SI; n samples of n_u drives and n_y observed channels.
 
     `name`: file and rows. `role`: fit, hold_out or rest. `time` (n,) [s] on the clock common to the records of one
-    recording.toml; the pose's number for settled poses. `sample_time` [s], inf for settled poses. `drive` (n, n_u) in the
-    order of `model.signals["drive"].channels`, always finite. `observed` (n, n_y) in the order of `Recording.channels`, NaN
-    where not `valid` (n, n_y): missing, in a gap, an outlier, stuck, or belonging to the other part of a divided record.
-    `linear`: the drive is linear between samples; otherwise it is held. `ambient` (n,) [K], None where not given. `period`
-    [s] after which the drive is stated to repeat, None where it is not. `band` [Hz]: cut-off of the low-pass that every
-    column passed, half of the amplitude there and less than a hundredth an octave above; None where nothing was filtered.
-    Half of `1/sample_time` is the highest frequency that the rows can hold. `spikes`: row, channel and deviation [SI] from its
+    recording.toml; the pose's number for settled poses. `sample_time` [s]; of poses the dwell, inf where they settled.
+    `drive` (n, n_u) in the order of `model.signals["drive"].channels`, always finite. `observed` (n, n_y) in the order of
+    `Recording.channels`, NaN where not `valid` (n, n_y): missing, in a gap, an outlier, stuck, or belonging to the other
+    part of a divided record. `linear`: the drive is linear between samples; otherwise it is held. `poses`: a row is the
+    drive of a pose and what was read at the end of its dwell; otherwise drive and reading of one instant. `ambient` (n,)
+    [K], None where not given. `period` [s] after which the drive is stated to repeat, None where it is not. `band` [Hz]:
+    cut-off of the low-pass that every column passed, half of the amplitude there and less than a hundredth an octave above;
+    None where nothing was filtered. Half of `1/sample_time` is the highest frequency that the rows can hold. `spikes`: row,
+    channel and deviation [SI] from its
     neighbours of each outlier that was marked.
     """
 
@@ -34,6 +45,16 @@ class Record:
     period: float | None = None
     band: float | None = None
     spikes: tuple[tuple[int, int, float], ...] = ()
+    poses: bool = False
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.sample_time):
+            object.__setattr__(self, "poses", True)
+
+    @property
+    def timing(self) -> Timing:
+        """What a simulation of this record is built for."""
+        return Timing(self.sample_time, self.linear, self.poses)
 
 
 @dataclass(frozen=True, eq=False)

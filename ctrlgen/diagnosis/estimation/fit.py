@@ -125,7 +125,7 @@ class Fitter:
 
     def simulator(self, structure: Structure, record: Record) -> Simulator:
         """The compiled simulator of a structure for a record's sample time and drive convention."""
-        return structure.simulators(self.recording, self.cache)[record.sample_time, record.linear]
+        return structure.simulators(self.recording, self.cache)[record.timing]
 
     def problem(self, structure: Structure) -> LeastSquaresProblem:
         """The least-squares problem of a structure."""

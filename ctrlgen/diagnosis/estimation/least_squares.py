@@ -53,7 +53,7 @@ class LeastSquaresProblem:
         self.structure, self.error = structure, error
         self.simulators = structure.simulators(recording, cache)
         self.records = [r for r in recording.records if r.role == "fit"]
-        self.initial_sd = [initial_state_sd(self.simulators[r.sample_time, r.linear]) for r in self.records]
+        self.initial_sd = [initial_state_sd(self.simulators[r.timing]) for r in self.records]
         self.n_initial = sum(map(len, self.initial_sd))
         parameters = structure.free_parameters
         self.k = len(parameters)
@@ -141,7 +141,7 @@ class LeastSquaresProblem:
         """Each record to fit, its simulator, and the places of its initial states among the variables."""
         first = self.k
         for record, sd in zip(self.records, self.initial_sd, strict=True):
-            yield record, self.simulators[record.sample_time, record.linear], slice(first, first + len(sd))
+            yield record, self.simulators[record.timing], slice(first, first + len(sd))
             first += len(sd)
 
     def _with_prior(self, rows: list[np.ndarray], x: np.ndarray) -> np.ndarray:

@@ -66,7 +66,7 @@ def _of_record(noise: Noise, record: Record, residual: np.ndarray) -> tuple[np.n
     loss = huber(white, corner)[0] ** 2 / _huber_mean(DISCREPANCY.huber_corner)
     seen = np.flatnonzero(record.valid.any(axis=1))  # a lead-in is not judged
     n = len(seen)
-    blocks = n if not np.isfinite(record.sample_time) else min(DISCREPANCY.blocks, n)
+    blocks = n if record.poses else min(DISCREPANCY.blocks, n)
     edges = seen[np.linspace(0, n, blocks + 1).astype(int)[:-1]] if n else np.zeros(1, int)
     values = (plain, loss, record.valid.astype(float), noise.usable(record.valid).astype(float))
     return tuple(np.add.reduceat(v, edges, axis=0) for v in values)

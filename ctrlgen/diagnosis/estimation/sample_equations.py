@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import casadi as ca
-import numpy as np
 
 from ctrlgen.diagnosis.settings import SIMULATION
 from ctrlgen.model.discretisation import Sample, one_step_map
@@ -41,13 +40,15 @@ class SampleEquations:
         return self.steps
 
 
-def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: bool) -> SampleEquations:
-    """The sample equations of `model` with readings `y` (n_y,); of settled poses where `sample_time` is infinite."""
+def build_sample_equations(
+    model: Model, y: ca.SX, sample_time: float, linear: bool, poses: bool = False
+) -> SampleEquations:
+    """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`."""
     expressions = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
-    sample = None if model.inertial else _one_step(model, sample_time, linear)
+    sample = None if model.inertial else _one_step(model, sample_time, linear, poses)
     if sample is not None:
         following = ca.vertcat(sample.x, sample.z)
-        if not np.isfinite(sample_time):  # a settled pose is read after it has settled
+        if poses:  # read at the end of the dwell
             y = ca.substitute(y, ca.vertcat(model.x, model.z, model.u), ca.vertcat(following, sample.u_next))
         expressions = [following, y]
     in_symbols, symbols, parametric = ca.extract_parametric(expressions, model.p, {"extract_trivial": True})
@@ -61,7 +62,7 @@ def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: b
         stepped = dict(zip(model.stepped, ca.vertsplit(stepped), strict=True))
         nominal = constants(model.p_nominal)[0].full().ravel()
         model = replace(model, p=c, p_nominal=nominal, sampled_rates=rates, held_value=held, stepped=stepped)
-        sample = _one_step(model, sample_time, linear)
+        sample = _one_step(model, sample_time, linear, poses)
         following = ca.vertcat(sample.x, sample.z)
     else:
         following, y = expressions
@@ -71,7 +72,6 @@ def build_sample_equations(model: Model, y: ca.SX, sample_time: float, linear: b
     return SampleEquations(constants, model, steps, linear, following, y, given)
 
 
-def _one_step(model: Model, sample_time: float, linear: bool) -> Sample:
-    settled = not np.isfinite(sample_time)
-    newton_steps = SIMULATION.pose_newton_steps if settled else SIMULATION.newton_steps
-    return one_step_map(model, sample_time, linear, newton_steps)
+def _one_step(model: Model, sample_time: float, linear: bool, poses: bool) -> Sample:
+    newton_steps = SIMULATION.pose_newton_steps if poses else SIMULATION.newton_steps
+    return one_step_map(model, sample_time, linear, newton_steps, poses)

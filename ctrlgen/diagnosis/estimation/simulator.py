@@ -28,19 +28,27 @@ from ctrlgen.recordings.recording import Record
 
 
 class Simulator:
-    """Simulates the readings `channels` (n_y) of `device`, compiled once for records of one sample time [s].
+    """Simulates the readings `channels` (n_y) of `device`, compiled once for records of one `Timing`.
 
-    `free` are the paths of the k parameters p that may change between simulations. The drive is `linear` between samples
-    or held. An infinite sample time means settled poses.
+    `free` are the paths of the k parameters p that may change between simulations. A device with inertia settles in no pose:
+    its readings are those of the instants at which the drive changes.
     """
 
     def __init__(
-        self, device: Device, free: Sequence[str], channels: Sequence[str], sample_time: float, linear: bool
+        self,
+        device: Device,
+        free: Sequence[str],
+        channels: Sequence[str],
+        sample_time: float,
+        linear: bool = False,
+        poses: bool = False,
     ) -> None:
-        self.free, self.channels, self.sample_time, self.linear = tuple(free), tuple(channels), sample_time, linear
+        self.free, self.channels = tuple(free), tuple(channels)
+        self.sample_time, self.linear = sample_time, linear
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
         self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True)
+        self.poses = not self.model.inertial and (poses or not np.isfinite(sample_time))
         self._with_sensitivities: dict[bool, Recursion] = {}
         self._by_pattern: dict[tuple, ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
@@ -65,7 +73,7 @@ class Simulator:
         """
         fixed, place = self._clock
         tau = fixed + (p[place] if place is not None else 0.0)
-        if tau == 0 or not np.isfinite(self.sample_time) or len(record.time) < SIMULATION.shortest_spline:
+        if tau == 0 or self.poses or len(record.time) < SIMULATION.shortest_spline:
             return record
         at = np.clip(record.time + tau, record.time[0], record.time[-1])
         if record.linear:
@@ -96,7 +104,7 @@ class Simulator:
     @cached_property
     def equations(self) -> SampleEquations:
         """F and H of one sample, symbolically."""
-        return build_sample_equations(self.model, self._observed, self.sample_time, self.linear)
+        return build_sample_equations(self.model, self._observed, self.sample_time, self.linear, self.poses)
 
     def linearise(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
         """F_S, F_f, H_S and H_f at `p` (k,) along any motion, f the m `chosen` parameters by their places in `free`."""
@@ -135,7 +143,7 @@ class Simulator:
         m = self.model
         x = m.rest.copy()
         x[list(m.clocks)] = record.time[0] if np.isfinite(self.sample_time) else 0.0
-        if m.inertial or not np.isfinite(self.sample_time):
+        if m.inertial or self.poses:
             return np.concatenate([x, 0.0 * m.z_scale])
         z = balanced(m, m.x, m.u, SIMULATION.start_newton_steps)
         balance = ca.Function("balance", [m.x, m.z, m.u, m.p, self.ambient], [z])
@@ -224,9 +232,9 @@ class Simulator:
         return S
 
     def inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Drive u and u+ (n, n_u), ambient (n, 1). Of settled poses u+ is the pose's own drive and u that of the pose before."""
+        """Drive u and u+ (n, n_u), ambient (n, 1). Of poses u+ is the pose's own drive and u that of the pose before."""
         u, ambient = record.drive, self.ambient_of(record)[:, None]
-        if np.isfinite(self.sample_time):
+        if not self.poses:
             return u, np.vstack([u[1:], u[-1:]]), ambient
         return np.vstack([u[:1], u[:-1]]), u, ambient
 

@@ -28,7 +28,7 @@ from ctrlgen.diagnosis.settings import FIT
 from ctrlgen.effects import Channel, Param
 from ctrlgen.model.assembly import movable
 from ctrlgen.model.effect_terms import channels
-from ctrlgen.recordings.recording import Recording
+from ctrlgen.recordings.recording import Recording, Timing
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,9 @@ class Structure:
         """The same with the causes that are not `known` begun with half the amplitude."""
         starts = list(self.starts)
         for k, cause in enumerate(self.causes):
-            if cause not in known and cause.effect != PARAMETER:
-                p = cause.law.amplitude()
+            if cause in known or cause.effect == PARAMETER:
+                continue
+            if (p := cause.law.amplitude()).name in starts[k]:
                 off = self.channel_of(cause).si(p.off or 0.0, p)
                 starts[k] = starts[k] | {p.name: (starts[k][p.name] + off) / 2}
         return replace(self, starts=tuple(starts))
@@ -207,16 +208,16 @@ class Structure:
                 values.append(min(max(self.starts[unknown.cause][unknown.name], unknown.low), unknown.high))
         return np.array(values)
 
-    def simulators(self, recording: Recording, cache: dict) -> dict[tuple[float, bool], Simulator]:
-        """One response for every sample time and drive convention in the recording."""
-        kinds = {(r.sample_time, r.linear) for r in recording.records}
+    def simulators(self, recording: Recording, cache: dict) -> dict[Timing, Simulator]:
+        """One simulator for every timing in the recording."""
+        timings = {r.timing for r in recording.records}
         free = tuple(u.path for u in self.free_parameters)
         found = {}
-        for h, linear in kinds:
-            key = (self.causes, h, linear, tuple(cause.effect for cause in self.causes))
+        for timing in timings:
+            key = (self.causes, timing, tuple(cause.effect for cause in self.causes))
             if key not in cache:
-                cache[key] = Simulator(self.device_with_causes, free, recording.channels, h, linear)
-            found[h, linear] = cache[key]
+                cache[key] = Simulator(self.device_with_causes, free, recording.channels, *timing)
+            found[timing] = cache[key]
         return found
 
 

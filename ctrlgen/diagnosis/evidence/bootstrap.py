@@ -111,9 +111,9 @@ def redrawn(record: Record, predicted: np.ndarray, block: int, rng: np.random.Ge
 
 
 def block_length(record: Record, predicted: np.ndarray) -> int:
-    """Block length [samples]: twice the largest lag with a significant autocorrelation, at least n^(1/3); 1 for settled poses."""
+    """Block length [samples]: twice the largest lag with a significant autocorrelation, at least n^(1/3); 1 for poses."""
     n = len(record.time)
-    if not np.isfinite(record.sample_time):
+    if record.poses:
         return 1
     longest = 1
     for i in range(predicted.shape[1]):

@@ -99,7 +99,7 @@ def admissible(
         record = Record(
             f"next: {shape.kind}", "fit", first + np.arange(n) * h, template.sample_time, drive,
             np.zeros((n, template.observed.shape[1])), template.linear, None,
-            np.ones((n, template.observed.shape[1]), bool),
+            np.ones((n, template.observed.shape[1]), bool), poses=template.poses,
         )  # fmt: skip
         if _kept(simulator, p, record):
             best, first_left = (record, EXCITATION.strengths[middle]), middle + 1

@@ -88,14 +88,14 @@ def _open(search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]],
 def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:
     """The excitation signal that best separates two fits; None where none is admissible. `seed` draws the signals."""
     template = max(fitter.fit_records, key=lambda r: len(r.time))
-    settled = not np.isfinite(template.sample_time)
+    poses = template.poses
     n, n_u = (
-        min(len(template.time), EXPERIMENT.most_poses if settled else EXPERIMENT.most_samples),
+        min(len(template.time), EXPERIMENT.most_poses if poses else EXPERIMENT.most_samples),
         template.drive.shape[1],
     )
-    family = pose_sets(n, n_u, seed) if settled else time_series(n, n_u, 1 / template.sample_time, seed)
-    first = 0.0 if settled else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
-    simulator = a.structure.simulators(fitter.recording, fitter.cache)[template.sample_time, template.linear]
+    family = pose_sets(n, n_u, seed) if poses else time_series(n, n_u, 1 / template.sample_time, seed)
+    first = 0.0 if poses else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
+    simulator = a.structure.simulators(fitter.recording, fitter.cache)[template.timing]
     now = [_Sums.present(fitter, *pair) for pair in ((a, b), (b, a))]
     rows = []
     for shape in family:
@@ -147,9 +147,9 @@ class _Sums:
 
     def plus(self, fitter: Fitter, truth: Fit, refitted: Fit, record: Record) -> _Sums:
         """The same with one more record."""
-        simulator = refitted.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+        simulator = refitted.structure.simulators(fitter.recording, fitter.cache)[record.timing]
         y, slopes = simulator.sensitivities(record, refitted.theta)
-        other = truth.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+        other = truth.structure.simulators(fitter.recording, fitter.cache)[record.timing]
         delta = fitter.noise.whiten(other.simulate(record, truth.theta) - y, record.valid).ravel()
         J = fitter.noise.whiten(slopes, record.valid).reshape(len(delta), -1)
         sizes = initial_state_sd(simulator)

@@ -25,7 +25,7 @@ def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dic
     A device with inertia gets no scenario: the solver handles devices in quasi-static balance.
     """
     record = chosen.record
-    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[record.sample_time, record.linear]
+    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[record.timing]
     found = {DRIVE: _drive(simulator, chosen), RECORDING: _recording(fitter, simulator, chosen)}
     return found | (_scenario(simulator, fit, chosen, device_file) if _solved(simulator.model) else {})
 
@@ -45,7 +45,7 @@ def _drive(simulator: Simulator, chosen: Experiment) -> str:
     units = zip(record.drive.T, signal.units, strict=True)
     columns = [difference(u, unit) for u, unit in units]
     header = [f"{c} [{u}]" for c, u in zip(signal.channels, signal.units, strict=True)]
-    if not np.isfinite(record.sample_time):
+    if record.poses:
         return _csv(header, np.column_stack(columns))
     time = record.sample_time * np.arange(len(record.drive))
     return _csv(["time [s]", *header], np.column_stack([time, *columns]))
@@ -62,12 +62,14 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
         f"device = {json.dumps(recording.device)}",
         f"kind   = {json.dumps(recording.kind)}",
     ]
-    timed = np.isfinite(record.sample_time)
+    timed = not record.poses
     for role, rows in (("fit", [0, cut]), ("hold_out", [cut, n])):
         lines += ["", "[[record]]", f'file = "{DRIVE}"', f'role = "{role}"', f"rows = {rows}"]
         if timed:
             start = json.dumps(f"{rows[0] * record.sample_time:.9g} s")
             lines += ['time = { column = "time [s]", unit = "s" }', f"start = {start}"]
+        elif np.isfinite(record.sample_time):
+            lines.append(f'dwell = "{record.sample_time:.9g} s"')
         if record.linear:
             lines.append('between_samples = "linear"')
     lines += ["", "[columns]"]

@@ -52,13 +52,13 @@ class LtvModel:
     state_scale: np.ndarray
 
     @property
-    def settled(self) -> bool:
-        """Whether the samples are settled poses."""
-        return not np.isfinite(self.record.sample_time)
+    def poses(self) -> bool:
+        """Whether the samples are poses."""
+        return self.record.poses
 
     def readings(self, f: np.ndarray, axis: np.ndarray) -> np.ndarray:
         """Change of the readings (n, n_y, m) by disturbances f (n, m), of which column j acts on axis `axis`[j], SI."""
-        following = f if self.settled else np.vstack([f[1:], f[-1:]])
+        following = f if self.poses else np.vstack([f[1:], f[-1:]])
         into = self.F_f[:, :, axis] * ((f + following) / 2)[:, None, :]
         direct = self.H_f[:, :, axis] * f[:, None, :]
         states = np.empty_like(into)
@@ -95,7 +95,7 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
     if start is None:
         y = fitter.predict(fit, record)
     F_S, F_f, H_S, H_f = _linearised(simulator, record, p, chosen, before)
-    at = before if np.isfinite(record.sample_time) else after
+    at = after if record.poses else before
     m = simulator.model
     z = at[:, simulator.n_x :]
     noise = fitter.noise
@@ -118,11 +118,9 @@ def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Sim
     known = [unknown.path for unknown in fit.structure.free_parameters]
     device, probes = with_disturbance_inputs(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
-    key = ("along", fit.structure.causes, record.sample_time, record.linear)
+    key = ("along", fit.structure.causes, record.timing)
     if key not in fitter.cache:
-        fitter.cache[key] = Simulator(
-            device, [*known, *paths], fitter.recording.channels, record.sample_time, record.linear
-        )
+        fitter.cache[key] = Simulator(device, [*known, *paths], fitter.recording.channels, *record.timing)
     p = np.concatenate([fit.theta, np.zeros(len(paths))])
     return fitter.cache[key], p, list(range(len(known), len(p)))
 
@@ -155,10 +153,10 @@ def _linearised(
 
 
 def _velocity(r: Simulator, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Velocity of the axes (n, n_axes) [SI]; for settled poses the step from the previous pose."""
+    """Velocity of the axes (n, n_axes) [SI]; for poses the step from the previous pose."""
     n_v = r.model.v.numel()
     if n_v:
         return at[:, r.n_x - n_v : r.n_x]
-    if not np.isfinite(record.sample_time):
+    if record.poses:
         return np.vstack([z[:1], np.diff(z, axis=0)])
     return np.gradient(z, record.sample_time, axis=0) if len(z) > 1 else np.zeros_like(z)

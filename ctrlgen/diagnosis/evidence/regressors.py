@@ -30,7 +30,7 @@ def scales_of(to_fit: list[LtvModel], axis: int) -> Scales:
     )
     drives = np.max([np.abs(a.record.drive).max(axis=0) for a in to_fit], axis=0)
     h, longest = to_fit[0].record.sample_time, max(len(a.white) for a in to_fit)
-    lags = () if to_fit[0].settled else tuple(np.geomspace(4 * h, longest * h / 3, REGRESSORS.lags))
+    lags = () if to_fit[0].poses else tuple(np.geomspace(4 * h, longest * h / 3, REGRESSORS.lags))
     time = max(float(np.abs(a.record.time).max()) for a in to_fit)
     return Scales(travel or 1.0, speed or 1.0, np.where(drives > 0, drives, 1.0), time or 1.0, lags)
 
@@ -46,7 +46,7 @@ def features(model: LtvModel, axis: int, size: Scales) -> dict[str, np.ndarray]:
     for k, other in enumerate(model.displacement.T / size.travel):
         if k != axis:
             columns |= {f"d({model.axes[k]})": other, f"d d({model.axes[k]})": d * other}
-    if model.settled:
+    if model.poses:
         return columns
     v = model.velocity[:, axis] / size.speed
     columns |= {"v": v, "v|v|": v * np.abs(v), "v^3": v**3, "d v": d * v, "d^2 v": d**2 * v, "|v|": np.abs(v)}

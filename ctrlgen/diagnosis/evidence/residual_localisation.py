@@ -207,11 +207,11 @@ class _Maps:
         for a in self.models:
             n, t = len(a.white), a.record.time
             for part in np.array_split(
-                np.arange(n), LOCALISATION.times if not a.settled else min(LOCALISATION.times, max(n // 4, 1))
+                np.arange(n), LOCALISATION.times if not a.poses else min(LOCALISATION.times, max(n // 4, 1))
             ):
                 mask = np.zeros(self.n, bool)
                 mask[first + part] = True
-                unit = "" if a.settled else " s"
+                unit = "" if a.poses else " s"
                 cells.append(
                     (f"{PurePosixPath(a.record.name).name}: {t[part[0]]:.4g} ... {t[part[-1]]:.4g}{unit}", mask)
                 )
@@ -255,7 +255,7 @@ def equivalent_inputs(a: LtvModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Static equivalent inputs of the axes for the residual, each (n, n_axes): in SI units, over their standard deviation,
     and the whitened residual projected on the direction of each axis alone."""
     per_noise = np.where(a.usable.any(axis=0), _per_noise(a), 0.0)
-    slopes = a.H_f if a.settled else a.steady()[None]
+    slopes = a.H_f if a.poses else a.steady()[None]
     G = slopes * per_noise[:, None]
     size = np.linalg.norm(G, axis=1, keepdims=True)
     inverse = np.linalg.pinv(G, rcond=1e-6)
@@ -282,7 +282,7 @@ def _participation(w: np.ndarray) -> float:
 
 def _bands(models: list[LtvModel]) -> tuple[FrequencyBand, ...]:
     """Logarithmic bands from one over the longest record's duration to half the sampling rate; none for settled poses."""
-    if models[0].settled:
+    if models[0].poses:
         return ()
     longest, fastest = (
         max(a.record.sample_time * len(a.white) for a in models),

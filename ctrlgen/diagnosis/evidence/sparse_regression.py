@@ -106,7 +106,7 @@ def _sparse(squares: np.ndarray, G: np.ndarray, c: np.ndarray, excess: float, n:
 
 def _held(fitter: Fitter, fit: Fit, held: LtvModel, term: np.ndarray, delta: np.ndarray) -> tuple[float, float]:
     """Excess squares of one held-out record without the term and with it; the initial state is refitted."""
-    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[held.record.sample_time, held.record.linear]
+    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[held.record.timing]
     slopes = simulator.sensitivities(held.record, fit.theta)[1]
     Y = np.nan_to_num(fitter.noise.whiten(slopes, held.record.valid)).reshape(
         held.record.valid.size, -1 if slopes.size else 0

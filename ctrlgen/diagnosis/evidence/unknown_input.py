@@ -31,7 +31,7 @@ class UnknownInput:
 def estimate_unknown_input(model: LtvModel, noise: Noise, size: np.ndarray) -> UnknownInput:
     """The unknown input along one record; `size` (n_axes,) [SI] is its typical size, in which the random walk is counted."""
     problem = _Problem(model, noise, size)
-    speeds = UNKNOWN_INPUT.pose_random_walks if model.settled else UNKNOWN_INPUT.random_walks
+    speeds = UNKNOWN_INPUT.pose_random_walks if model.poses else UNKNOWN_INPUT.random_walks
     start = max(
         0,
         int(np.argmax(np.convolve(np.sum(model.white**2, axis=1), np.ones(UNKNOWN_INPUT.tried_samples))[: problem.n]))
@@ -65,7 +65,7 @@ class _Problem:
         """Transition matrix from sample k to k + 1, and output matrix at k."""
         m, total = self.m, self.m + self.k
         A = np.zeros((total, total))
-        if not self.model.settled:
+        if not self.model.poses:
             A[:m, :m], A[:m, m:] = self.model.F_S[k], self.model.F_f[k]
             A[m:, m:] = np.eye(self.k)
         H = np.hstack([self.model.H_S[k], self.model.H_f[k]])
@@ -94,7 +94,7 @@ class _Problem:
     def likelihood(self, speeds: np.ndarray, first: int, last: int) -> np.ndarray:
         """Log likelihood of each random-walk variance on samples `first` ... `last`; all filters run side by side."""
         Q = self._change(speeds)
-        P = Q if self.model.settled else np.broadcast_to(self.P_0, Q.shape)
+        P = Q if self.model.poses else np.broadcast_to(self.P_0, Q.shape)
         x, total = np.zeros((len(speeds), len(self.up))), np.zeros(len(speeds))
         for k in range(first, last):
             A, H = self._step(k)
@@ -106,7 +106,7 @@ class _Problem:
     def smoothed(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Smoothed f (n, n_axes) and its standard deviation [SI], given the whole record."""
         n, m, total, Q = self.n, self.m, len(self.up), self._change(speed)
-        x, P = np.zeros(total), Q if self.model.settled else self.P_0
+        x, P = np.zeros(total), Q if self.model.poses else self.P_0
         xs, Ps, kept = np.empty((n, total)), np.empty((n, total, total)), []
         for k in range(n):
             A, H = self._step(k)

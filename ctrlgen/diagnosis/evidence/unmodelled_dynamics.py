@@ -87,7 +87,7 @@ def _maps(estimates: list[UnknownInput], i: int) -> tuple[DependenceMap, ...]:
     def joined(name: str) -> np.ndarray:
         return np.concatenate([getattr(e.model, name)[: len(e.f), i] for e in estimates])
 
-    unit, travel, settled = estimates[0].model.units[i], estimates[0].model.travel_unit, estimates[0].model.settled
+    unit, travel, settled = estimates[0].model.units[i], estimates[0].model.travel_unit, estimates[0].model.poses
     d, everywhere = joined("displacement"), np.ones(len(f), bool)
     rows = [("position", travel, d, everywhere)]
     if not settled:

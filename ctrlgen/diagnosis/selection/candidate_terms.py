@@ -52,7 +52,7 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
     places = [(place, i) for place in reached for i in range(len(channels(physics, place)))]
     for record, start in zip(fitter.fit_records, fit.initial_states, strict=True):
-        simulator = simulators[record.sample_time, record.linear]
+        simulator = simulators[record.timing]
         m, n = simulator.model, len(record.time)
         seen = [m.law_inputs(place, i, None, {}) for place, i in places]
         still = ca.SX.zeros(1)
@@ -167,7 +167,7 @@ class CandidateTerms:
     def driven(self) -> list[int]:
         """The terms that jump with a drive which is held from sample to sample."""
         m = self.simulator.model
-        if self.simulator.linear or not np.isfinite(self.simulator.sample_time):
+        if self.simulator.linear or self.simulator.poses:
             return []
         jumping = ca.vertcat(m.u, m.held, m.heat)
         return [k for k, term in enumerate(self.terms) if ca.depends_on(ca.jacobian(term.value, term.a), jumping)]
@@ -176,7 +176,7 @@ class CandidateTerms:
         """(memory, S, u, ambient, S one sample on) -> (memory after the sample, every dterm/damplitude * size, that of the
         `driven` terms at the end of the sample), with the numbers `p`.
 
-        A settled pose is read with the memories that it has settled to.
+        A pose is read with the memories at the end of its dwell.
         """
         m = self.simulator.model
         memory = ca.vertcat(ca.SX(0, 1), *(s for term in self.terms for s in term.states))
@@ -191,7 +191,7 @@ class CandidateTerms:
             if self.driven:  # the drive stays as the sample began
                 (end,) = ca.substitute([open_[self.driven]], [memory, S], [after, S_next])
                 end = m.closed(end)
-        if not np.isfinite(self.simulator.sample_time):
+        if self.simulator.poses:
             found = ca.substitute(found, memory, after)
         given = [memory, S, m.u, self.simulator.ambient, S_next]
         general = ca.Function("general", [*given, m.p], [after, found, end])

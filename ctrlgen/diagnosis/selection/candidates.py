@@ -88,7 +88,7 @@ def fit_other_clocks(
     h = min(r.sample_time for r in trials.fitter.recording.records)
     open_ = (o for o in (h.beside(current.causes) for h in trials.screen.hypotheses) if o is not None)
     shifts = [o for o in open_ if o.effect != PARAMETER and o.law.moves_in_time]
-    if current.errors.is_noise or not np.isfinite(h) or not shifts:
+    if current.errors.is_noise or trials.fitter.recording.kind == "poses" or not shifts:
         return ()
     found: list[CandidateModel] = []
     for beside in (current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]):

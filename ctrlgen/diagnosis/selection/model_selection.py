@@ -45,13 +45,13 @@ def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> Candida
 
 
 class ModelSelection:
-    """The tests by which candidate models are compared; `candidate` fits a structure for them.
+    """The tests by which candidate models are compared; `candidate` fits a structure for them, where it can be.
 
     `mismatch` (n_y,) [SI^2] is the mean square that the device as described leaves on the held-out records, where it is known.
     """
 
     def __init__(
-        self, fitter: Fitter, candidate: Callable[..., CandidateModel], mismatch: np.ndarray | None = None
+        self, fitter: Fitter, candidate: Callable[..., list[CandidateModel]], mismatch: np.ndarray | None = None
     ) -> None:
         self.fitter, self.fit_candidate, self.mismatch = fitter, candidate, mismatch
 
@@ -208,12 +208,13 @@ class ModelSelection:
         for the model-form error of a cause, multiplied by `times`."""
         if not any(cause.prior.model_form_error for cause in current.causes):
             return False
-        most = self.fit_candidate(Structure(current.fit.structure.device), steps=FIT.max_steps)
+        (most,) = self.fit_candidate(Structure(current.fit.structure.device), None, steps=FIT.max_steps)
         for j, cause in enumerate(current.causes):
             if form_error := cause.prior.model_form_error:
-                without_one = self.fit_candidate(restart(current.fit).without(j))
-                # the model without one cause may diverge
-                if squares < (form_error * times) ** 4 * min(_lost(without_one, current), _lost(most, current)):
+                tried = self.fit_candidate(restart(current.fit).without(j), None)
+                # the model without one cause may diverge, or not stand at all
+                lost = min(_lost(t, current) for t in (*tried, most))
+                if squares < (form_error * times) ** 4 * lost:
                     return True
         return False
 

@@ -61,9 +61,9 @@ class ScoreGradient:
         numbers = [h for h in hypotheses if h.effect == PARAMETER]
         number_paths = [h.path for h in numbers if h.path not in known]
         free = [*known, *number_paths, *probes.values()]
-        key = ("screen", fit.structure.causes, tuple(free), record.sample_time, record.linear)
+        key = ("screen", fit.structure.causes, tuple(free), record.timing)
         if key not in fitter.cache:
-            fitter.cache[key] = Simulator(probed, free, fitter.recording.channels, record.sample_time, record.linear)
+            fitter.cache[key] = Simulator(probed, free, fitter.recording.channels, *record.timing)
         self.simulator: Simulator = fitter.cache[key]
         self.p = self.simulator.model.p_nominal.copy()
         self.p[: len(known)] = fit.theta
@@ -115,7 +115,7 @@ class ScoreGradient:
         act together with what they become before it changes.
         """
         r, record, n = self.simulator, self.record, len(self.record.time)
-        series = np.isfinite(r.sample_time)
+        series = not r.poses
         after, _ = r.simulate_states(record, self.p, start)
         record = r.aligned(record, self.p)
         before = np.vstack([r.starting_state(record, self.p, start), after[:-1]])

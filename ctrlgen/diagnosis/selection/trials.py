@@ -44,7 +44,7 @@ class Trials:
     @property
     def selection(self) -> ModelSelection:
         """The comparison of candidates under the present noise."""
-        return ModelSelection(self.fitter, self.fit, self.mismatch)
+        return ModelSelection(self.fitter, self.tried, self.mismatch)
 
     def use(self, fitter: Fitter) -> None:
         """Goes on with another fitter: fits and screens under other errors are forgotten."""

@@ -122,7 +122,7 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
 
 def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:
     """Causes that the held-out records do not confirm, except where the device's stated parameters alone require them."""
-    compare = ModelSelection(search.fitter, lambda *_, **__: search.chosen)
+    compare = ModelSelection(search.fitter, lambda *_, **__: [search.chosen])
     found = []
     for cause, bare in zip(search.chosen.causes, search.without_cause, strict=True):
         errors = compare.reference((bare, search.chosen))

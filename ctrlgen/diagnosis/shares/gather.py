@@ -67,16 +67,16 @@ def gather(fitter: Fitter, fit: Fit, record: Record) -> tuple[np.ndarray, Signal
     """Of one record: observed less predicted (n, n_y) [SI], NaN where not valid; its signals; and the sensitivities
     (n, n_y, k) [SI] of the readings by the k fitted numbers.
 
-    Positions and speeds are those of the simulated stage, before the drive of a sample acts; for settled poses after it.
+    Positions and speeds are those of the simulated stage, before the drive of a sample acts; for poses after it.
     """
     simulator = fitter.simulator(fit.structure, record)
     model = simulator.model
     own = [k for k, r in enumerate(fitter.fit_records) if r is record]
     start = fit.initial_states[own[0]] if own and fit.initial_states else None
     after, _ = simulator.simulate_states(record, fit.theta, start)
-    settled = not np.isfinite(record.sample_time)
+    poses = record.poses
     driven = simulator.aligned(record, fit.theta)
-    states = after if settled else np.vstack([simulator.starting_state(driven, fit.theta, start), after[:-1]])
+    states = after if poses else np.vstack([simulator.starting_state(driven, fit.theta, start), after[:-1]])
     z, n_v = states[:, simulator.n_x :], model.v.numel()
     speed = states[:, simulator.n_x - n_v : simulator.n_x]
     predicted = fitter.predict(fit, record)
