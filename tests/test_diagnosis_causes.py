@@ -428,7 +428,9 @@ def test_what_bends_a_reading_is_delayed_afterwards():
         simulator = s.simulators(fitter.recording, {})[fitter.fit_records[0].timing]
         ends[order] = simulator.simulate(fitter.fit_records[0], s.start)[:, 0]
     plain = Structure(AXIS, (delay,), ({"delay": 1.4e-3},))
-    late = plain.simulators(fitter.recording, {})[fitter.fit_records[0].timing].simulate(fitter.fit_records[0], plain.start)[:, 0]
+    late = plain.simulators(fitter.recording, {})[fitter.fit_records[0].timing].simulate(
+        fitter.fit_records[0], plain.start
+    )[:, 0]
     assert np.array_equal(*ends.values())
     bent = late + 2e3 * late**2
     assert np.abs(ends[delay, bow] - bent).max() < 0.02 * np.abs(bent - late).max()
@@ -444,7 +446,9 @@ def test_fringes_count_in_what_a_bowed_scale_says():
         .simulators(fitter.recording, {})[fitter.fit_records[0].timing]
         .simulate(fitter.fit_records[0], Structure(AXIS).start)[:, 0]
     )
-    read = both.simulators(fitter.recording, {})[fitter.fit_records[0].timing].simulate(fitter.fit_records[0], both.start)[:, 0]
+    read = both.simulators(fitter.recording, {})[fitter.fit_records[0].timing].simulate(
+        fitter.fit_records[0], both.start
+    )[:, 0]
     said = plain + 1e3 * plain**2
     assert np.abs(said - plain).max() > 1e-7  # a twentieth of a fringe
     assert read == pytest.approx(said + 3e-8 * np.sin(2 * np.pi * said / 2e-6 + 0.3), abs=1e-13)

@@ -92,7 +92,7 @@ def _diagnose(
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
-    notes = _notes(search, live.notes, spikes, tests.restless, laws, effects)
+    notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed)
     return Diagnosis(
         verdict=answer,
         findings=(*findings(search, attribution, likelihoods), *detected),
@@ -107,7 +107,7 @@ def _diagnose(
         search=search,
         fitter=search.fitter,
         profiles=likelihoods,
-        **vars(analyses),
+        **{name: value for name, value in vars(analyses).items() if name != "failed"},
     )
 
 

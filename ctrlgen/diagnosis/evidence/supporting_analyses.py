@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel, linearise_alo
 from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal, Round, SearchResult
+from ctrlgen.diagnosis.selection.trials import FAILURES
 
 NEXT_DEVICE = "../device.next.toml"  # from the folder of the next experiment
 
@@ -22,13 +24,15 @@ NEXT_DEVICE = "../device.next.toml"  # from the folder of the next experiment
 @dataclass(frozen=True, eq=False)
 class SupportingAnalyses:
     """Residual location before and after the correction, detectability, next experiment, search history, and `extra`
-    (unmodelled_force; files of the next experiment), all in the types of JSON and in the recording's units."""
+    (unmodelled_force; files of the next experiment), all in the types of JSON and in the recording's units; `failed`: what
+    could not be made, and why."""
 
     residual_location: dict[str, Any]
     detectability: dict[str, Any]
     next_experiment: dict[str, Any] | None
     search_history: tuple[dict[str, Any], ...]
     extra: dict[str, Any]
+    failed: tuple[str, ...] = ()
 
 
 def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0) -> SupportingAnalyses:
@@ -44,14 +48,23 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
     after = before if chosen is nominal else [linearise_along(fitter, chosen, record) for record in records]
     location = {"before": located(before), "after": located(after)}
     extra: dict[str, Any] = {"unmodelled_force": None, "files": {}}
-    if not explained:
-        force = vars(describe_unmodelled_force(fitter, chosen, after))
-        short = {key: value for key, value in force.items() if key != "estimates"}  # one value a sample
+    failed: list[str] = []
+
+    def tried(name: str, analysis: Callable[[], Any]) -> Any:
+        """Its result; None, with a note, where it cannot be made: no finding depends on it."""
+        try:
+            return analysis()
+        except FAILURES as error:
+            failed.append(f"{name} could not be estimated: {error}")
+            return None
+
+    if not explained and (f := tried("the unknown input", lambda: describe_unmodelled_force(fitter, chosen, after))):
+        short = {key: value for key, value in vars(f).items() if key != "estimates"}  # one value a sample
         extra["unmodelled_force"] = plain(short)
         location["after"]["unmodelled_force"] = {
             key: extra["unmodelled_force"][key] for key in ("statements", "empirical_term")
         }
-    experiment = next_experiment(search, explained, seed)
+    experiment = tried("the next experiment", lambda: next_experiment(search, explained, seed))
     if experiment is not None:
         extra["files"] = files(fitter, chosen, experiment, NEXT_DEVICE)
     return SupportingAnalyses(
@@ -60,6 +73,7 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
         next_experiment=_next(experiment),
         search_history=search_history(search),
         extra=extra,
+        failed=tuple(failed),
     )
 
 

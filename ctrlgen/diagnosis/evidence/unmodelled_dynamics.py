@@ -50,12 +50,17 @@ class UnmodelledForce:
 
 
 def describe_unmodelled_force(fitter: Fitter, fit: Fit, models: list[LtvModel]) -> UnmodelledForce:
-    """The unknown input for the residual of `fit`; `models` are its LTV models, the records to fit first."""
+    """The unknown input for the residual of `fit`; `models` are its LTV models, the records to fit first.
+
+    Raises ArithmeticError where it has no finite estimate.
+    """
     to_fit = [a for a in models if a.record.role == "fit"]
     size = np.sqrt(np.mean(np.concatenate([equivalent_inputs(a)[0] for a in to_fit]) ** 2, axis=0))
     estimates = [
         estimate_unknown_input(a, fitter.noise, np.maximum(size, 1e-12 * size.max(initial=1e-300))) for a in to_fit
     ]
+    if not all(np.isfinite(e.f).all() and np.isfinite(e.sd).all() for e in estimates):
+        raise ArithmeticError("it grows without bound along the motion")
     axes, units = models[0].axes, models[0].units
     rms = {axis: float(difference(_rms(estimates, i), units[i])) for i, axis in enumerate(axes)}
     maps = {axis: _maps(estimates, i) for i, axis in enumerate(axes)}

@@ -21,6 +21,7 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
@@ -65,7 +66,8 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
     everyone = frozenset(range(n))
     left = {frozenset[int](): _by_block(nominal), everyone: _by_block(chosen)}
     for present in _subsets(n):
-        left.setdefault(present, _by_block(left_by(rough, fit, present, records)))
+        if present not in left:
+            left[present] = _left_or_all(rough, fit, present, records, left[frozenset()])
     worst = left[frozenset()]
     left = {S: np.minimum(E, ATTRIBUTION.diverged * np.maximum(worst, 1.0)) for S, E in left.items()}
     parts = np.array([_shapley(left, k, n) for k in range(n)] + [left[everyone]])
@@ -81,6 +83,16 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
 def _by_block(left: Misfit) -> np.ndarray:
     """Energy beyond noise (b,) of each block, all channels."""
     return np.sum(left.plain - left.n_plain, axis=1)
+
+
+def _left_or_all(
+    fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record], everything: np.ndarray
+) -> np.ndarray:
+    """What `left_by` leaves of each block (b,); all of it where no such device can stand or be simulated."""
+    try:
+        return _by_block(left_by(fitter, fit, present, records))
+    except FAILURES:
+        return everything
 
 
 def _subsets(n: int) -> list[frozenset[int]]:

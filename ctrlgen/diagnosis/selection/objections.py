@@ -37,7 +37,11 @@ def objections(
         reason = (
             _outside_its_range(fit, k)
             or _on_the_lattice(recording, fit, k)
-            or ("" if exact else _no_line(recording, fit, k) or _no_event(recording, fit, k))
+            or (
+                ""
+                if exact
+                else _no_pitch(recording, fit, k) or _no_line(recording, fit, k) or _no_event(recording, fit, k)
+            )
         )
         if reason:
             found[k] = reason
@@ -75,6 +79,19 @@ def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:
     if a.effect == PARAMETER or not a.prior.repeatable or (a.effect, a.location) != (b.effect, b.location):
         return False
     return abs(_line(fit, j) - _line(fit, k)) * _covered(recording, a) < OBJECTIONS.apart
+
+
+def _no_pitch(recording: Recording, fit: Fit, k: int) -> str:
+    """Why an error that repeats along a reading does not: the reading goes no farther than about its period; empty where it may."""
+    cause = fit.structure.causes[k]
+    if cause.effect == PARAMETER or not any(_is_spatial_period(cause, p) for p in cause.law.params):
+        return ""
+    periods = _line(fit, k) * _covered(recording, cause)
+    if periods >= OBJECTIONS.fewest_pitches:
+        return ""
+    return (
+        f"the reading covers {periods:.1f} periods of it, and {OBJECTIONS.fewest_pitches:g} are needed to see it repeat"
+    )
 
 
 def _no_line(recording: Recording, fit: Fit, k: int) -> str:

@@ -181,6 +181,8 @@ class ObjectionsSettings:
     fewest_periods: float = 10.0
     """Periods of a line that the longest record to fit must hold: of fewer, any slow change looks like one.
     Judgement."""
+    fewest_pitches: float = 1.5
+    """Periods along a reading that it must cover: with less, nothing repeats and any curve looks like a part of one."""
     harmonic: float = 0.25
     """Cycles within the records to fit between a line and a harmonic of a periodic drive, below which they are one."""
     repeats: float = 0.9
