@@ -9,6 +9,7 @@ import pytest
 from axis_records import AXIS, BACKLASH, NOISE, H, fitter_of, move, played
 from misfits import BLOCKS, left
 
+from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection import attribution
 from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
@@ -51,6 +52,19 @@ def test_causes_that_add_up_have_what_each_takes_away(monkeypatch):
     found = shared(monkeypatch, lambda S: 1e5 - sum(takes[k] for k in S), 3)
     assert values(found) == pytest.approx([0.5, 0.3, 0.1, 0.1]) and found.explained == pytest.approx(0.9)
     assert found.held_out
+
+
+def test_causes_that_cannot_stand_alone_take_nothing_away_alone(monkeypatch):
+    """The second softens the stage beyond what it can stand without the first: together 90, the first alone 40."""
+    table = {(): 1e5, (0,): 6e4, (0, 1): 1e4}
+
+    def energy(S):
+        if S == {1}:
+            raise InputError("stage", [Fault("stiffness", "does not rise")])
+        return table[tuple(sorted(S))]
+
+    found = shared(monkeypatch, energy, 2)
+    assert values(found) == pytest.approx([(0.4 + 0.9) / 2, (0.0 + 0.5) / 2, 0.1])
 
 
 def test_causes_that_need_each_other_share_what_they_take_together(monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, profiles
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations, sandwich_over_model
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.evidence import unmodelled_dynamics
 from ctrlgen.diagnosis.evidence.detectability import detectability
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, time_series
 from ctrlgen.diagnosis.evidence.experiment_design import separate
@@ -347,7 +349,7 @@ def test_a_gain_shows_only_at_the_price_of_what_the_device_states():
     assert 0.05 < smallest.detectable_from < 4 * np.hypot(0.02, 0.05)
 
 
-def test_evidence_is_numbers_that_json_knows():
+def test_evidence_is_numbers_that_json_knows(monkeypatch):
     fitter = axis_fitter(lambda t, q, v, memory: (cubic(t, q, v, 0)[0] + 0.02 * detent(t, q, v, 0)[0], 0), n=1000)
     search = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None).run(AXIS)
     found = run_supporting_analyses(search, explained=False)
@@ -358,6 +360,12 @@ def test_evidence_is_numbers_that_json_knows():
     assert len(text) < 1e6
     assert found.extra["unmodelled_force"] and set(found.residual_location) == {"before", "after"}
     assert [row["round"] for row in found.search_history] == list(range(1, len(search.rounds) + 1))
+    monkeypatch.setattr(
+        unmodelled_dynamics, "estimate_unknown_input", lambda *_: SimpleNamespace(f=np.array([np.nan]), sd=np.ones(1))
+    )
+    without = run_supporting_analyses(search, explained=False)
+    assert without.extra["unmodelled_force"] is None and "unmodelled_force" not in without.residual_location["after"]
+    assert without.failed == ("the unknown input could not be estimated: it grows without bound along the motion",)
     first, last = found.search_history[0], found.search_history[-1]
     assert first["decision"] == "added stiffening at stage:axis" and first["candidates"][0]["causes"][0]["accepted"]
     assert last["decision"].endswith("stopped")

@@ -294,6 +294,21 @@ def test_a_line_lasts_ten_periods(frequency, told):
     assert objections(recording, fit, exact=True) == {} == objections(recording, fit, accepted=[HUM])
 
 
+@pytest.mark.parametrize("period, told", [(0.68, False), (0.65, True)])
+def test_a_pitch_is_seen_to_repeat(period, told):
+    """A reading that goes 1 um covers one and a half periods of 0.667 um."""
+    cause = Hypothesis("cyclic", "sensor:axis", "axis")
+    observed = np.linspace(-0.5e-6, 0.5e-6, 101)[:, None]
+    record = SimpleNamespace(role="fit", observed=observed, valid=np.ones_like(observed, bool))
+    recording = SimpleNamespace(records=[record], channels=("reading.axis",), kind="series")
+    values = {"amplitude": 1e-8, "period": 1e-6 * period, "phase": 0.3}
+    structure = SimpleNamespace(causes=(cause,), free_parameters=())
+    fit = SimpleNamespace(structure=structure, theta=(), values=lambda k: values)
+    reason = "the reading covers 1.5 periods of it, and 1.5 are needed to see it repeat"
+    assert objections(recording, fit) == ({} if told else {0: reason})
+    assert objections(recording, fit, exact=True) == {}
+
+
 def stepped(moment: float, rise: float = 1e-3) -> SimpleNamespace:
     cause = Hypothesis("force_step", "stage:axis", "axis")
     values = {p.name: 0.1 for p in cause.law.params} | {"moment": moment, "rise": rise}
