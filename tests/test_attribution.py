@@ -58,10 +58,10 @@ def test_causes_that_cannot_stand_alone_take_nothing_away_alone(monkeypatch):
     """The second softens the stage beyond what it can stand without the first: together 90, the first alone 40."""
     table = {(): 1e5, (0,): 6e4, (0, 1): 1e4}
 
-    def energy(S):
-        if S == {1}:
+    def energy(present):
+        if present == {1}:
             raise InputError("stage", [Fault("stiffness", "does not rise")])
-        return table[tuple(sorted(S))]
+        return table[tuple(sorted(present))]
 
     found = shared(monkeypatch, energy, 2)
     assert values(found) == pytest.approx([(0.4 + 0.9) / 2, (0.0 + 0.5) / 2, 0.1])
