@@ -123,15 +123,15 @@ class BalancedPhysics(DevicePhysics):
     The states follow x' = rates(x, w), w = heating_power(u); `power` shows w where it is a heater's power, and is None
     where the device has no heaters. `force_unit` is that of the balance: a length where the drive commands the
     displacement itself.
-    `second_order_kinematics` (d) is what finite rotations of the links add to the pose of a linear mechanism,
-    `tangent_compliance` (d) by how much less the stages yield to the links' load at d than at home.
+    `loop_closure` (pose, d) is zero (n_pose,) where the links of a mechanism whose `pose` is linear keep their lengths, to
+    second order; `tangent_compliance` (d) by how much less the stages yield to the links' load at d than at home.
     """
 
     force: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     rates: Callable[[ca.SX, ca.SX], ca.SX] = lambda x, heat: ca.SX(0, 1)
     heating_power: Callable[[ca.SX], ca.SX] = lambda u: u
     power: AxisSignal | None = None
-    second_order_kinematics: Callable[[ca.SX], ca.SX] | None = None
+    loop_closure: Callable[[ca.SX, ca.SX], ca.SX] | None = None
     tangent_compliance: Callable[[ca.SX], ca.SX] | None = None
 
 

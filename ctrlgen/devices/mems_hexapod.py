@@ -277,7 +277,7 @@ class MemsHexapod(Device):
             limits=limits,
             bipolar=False,
             tangent_compliance=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
-            second_order_kinematics=lambda d: hexapod.second_order(d, h),
+            loop_closure=lambda pose, d: hexapod.loop_closure(pose, d, h),
         )
 
 

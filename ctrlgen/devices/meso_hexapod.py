@@ -113,6 +113,7 @@ class MesoHexapod(Device):
             force_unit="um",
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
+            loop_closure=lambda pose, d: meso_hexapod.loop_closure(pose, d, p.hexapod, p.directions.jacobian),
         )
 
 

@@ -19,6 +19,7 @@ from ctrlgen.physics.screw import (
     move,
     parallel,
     rotation_to,
+    rotation_to_second_order,
     rotation_z,
     series,
     solve,
@@ -125,26 +126,24 @@ def kinematic_jacobian(h: Any) -> Matrix:
     return ca.solve(ca.vertcat(*rows_p), ca.vertcat(*rows_d))
 
 
-def second_order(d: Matrix, h: Any) -> Matrix:
-    """What finite rotations of struts and platform add to the twist (6,) of `kinematic_jacobian`, second order in `d` (6,) [m].
+def loop_closure(pose: Matrix, d: Matrix, h: Any) -> Matrix:
+    """(|a_i + delta - b_i|^2 - l^2) / 2l [m], shape (6, 1): zero where every strut keeps its length between the middles of its
+    wires, as on ideal ball joints there.
 
-    A strut keeps its length l between the middles of its wires. With the first-order twist (theta, delta), a = A_i and
-    w = delta + theta x a - b_i, normal to n_i: n_i . (delta' + theta' x a) = -n_i . theta x (theta x a)/2 - w.w/(2 l).
-    Neglected: third order, (d/l)^2 of the motion. Source: |A_i + delta + ... - B_i - b_i| = l, expanded.
+    a_i = R(theta) A_i + delta and b_i = B_i + M_j d, each moved half a wire along the strut, `pose` (6,) the twist (theta,
+    delta) and `d` (6,) [m] the stage displacements. Source: |A_i - B_i| = l, S1 section 3 with ideal joints.
     """
     g = geometry(h)
-    first = ca.mtimes(kinematic_jacobian(h), d)
-    theta, delta = first[:3], first[3:]
-    rows, right = [], []
+    turned = rotation_to_second_order(pose[:3])
+    rows = []
     for i in range(6):
         R, length = _strut_frame(g, i)
-        n, j = R[:, 0], STAGE_OF_STRUT[i]
-        a = g.platform[i] - n * h.wire_length / 2
-        w = delta + ca.cross(theta, a) - ca.mtimes(g.rotation[j][:, :2], d[2 * j : 2 * j + 2])
-        second = ca.cross(theta, ca.cross(theta, a)) / 2
-        rows.append(ca.horzcat(ca.cross(g.platform[i], n).T, n.T))
-        right.append(-ca.dot(n, second) - ca.dot(w, w) / (2 * (length - h.wire_length)))
-    return solve(ca.vertcat(*rows), ca.vertcat(*right))
+        half, j = R[:, 0] * h.wire_length / 2, STAGE_OF_STRUT[i]
+        upper = ca.mtimes(turned, g.platform[i] - half) + pose[3:]
+        lower = g.base[i] + half + ca.mtimes(g.rotation[j][:, :2], d[2 * j : 2 * j + 2])
+        between = length - h.wire_length
+        rows.append((ca.sumsqr(upper - lower) - between**2) / (2 * between))
+    return ca.vertcat(*rows)
 
 
 def jacobian(h: Any, C_XY: Matrix) -> Matrix:

@@ -10,14 +10,14 @@ The numbers of eq. (10) and (15) cannot be read.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.numerics.newton import newton_solver
-from ctrlgen.physics.screw import Matrix, Scalar, adjoint, rotation_vector, rotation_z
+from ctrlgen.physics.screw import Matrix, Scalar, adjoint, rotation_to_second_order, rotation_vector, rotation_z
 
 STAGE_OF_STRUT = (0, 1, 1, 2, 2, 0)  # S0 eq. (4): struts 1 and 6 on stage 1, 2 and 3 on stage 2, 4 and 5 on stage 3
 STAGE_OF_ACTUATOR = (0, 1, 1, 2, 2, 0)  # S0 eq. (6)
@@ -53,13 +53,19 @@ def travel(directions: Sequence[Scalar], strut: int) -> Matrix:
     return ca.horzcat(*columns)
 
 
-def spans(pose: Matrix, u: Matrix, h: Any, directions: Sequence[Scalar]) -> Matrix:
+def spans(
+    pose: Matrix,
+    u: Matrix,
+    h: Any,
+    directions: Sequence[Scalar],
+    rotation: Callable[[Matrix], Matrix] = rotation_vector,
+) -> Matrix:
     """A_i - B_i [m], shape (3, 6), with A_i = R(theta) A_i^0 + delta and B_i = B_i^0 + M_i U.
 
-    R(theta) is the exact rotation by the vector theta, S0 eq. (3) its first order.
+    R(theta) is the `rotation` by the vector theta, exact unless given; S0 eq. (3) is its first order.
     """
     A, B = geometry(h)
-    R = rotation_vector(pose[:3])
+    R = rotation(pose[:3])
     return ca.horzcat(
         *(ca.mtimes(R, A[:, i]) + pose[3:] - B[:, i] - ca.mtimes(travel(directions, i), u) for i in range(6))
     )
@@ -71,6 +77,12 @@ def constraint(pose: Matrix, u: Matrix, h: Any, directions: Sequence[Scalar], le
     Source: S0 eq. (2). `lengths` (6, 1) [m].
     """
     return ca.sum1(spans(pose, u, h, directions) ** 2).T - lengths**2
+
+
+def loop_closure(pose: Matrix, u: Matrix, h: Any, directions: Sequence[Scalar]) -> Matrix:
+    """`constraint` with the lengths of home, over 2 L_i [m], shape (6, 1), its rotation to second order."""
+    A_B, L = spans(pose, u, h, directions, rotation_to_second_order), home_lengths(h)
+    return (ca.sum1(A_B**2).T - L**2) / (2 * L)
 
 
 def jacobian_left(h: Any) -> Matrix:

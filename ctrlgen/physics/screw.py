@@ -47,6 +47,12 @@ def rotation_vector(theta: Matrix) -> Matrix:
     return ca.DM.eye(3) + ca.sin(a) / a * S + 2 * half**2 * ca.mtimes(S, S)
 
 
+def rotation_to_second_order(theta: Matrix) -> Matrix:
+    """R = I + S + S^2/2, S = [theta x], shape (3, 3): the rotation by the vector `theta` [rad] up to third order."""
+    S = ca.skew(theta)
+    return ca.DM.eye(3) + S + ca.mtimes(S, S) / 2
+
+
 def adjoint(rotation: Matrix | None = None, position: Sequence[Scalar] | Matrix = (0, 0, 0)) -> Matrix:
     """[Ad] = [[R, 0], [D R, R]], D the cross-product matrix of `position`, shape (6, 6).
 
