@@ -23,7 +23,6 @@ from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.settings import ATTRIBUTION
-from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
 
 
@@ -53,7 +52,12 @@ class Attribution:
 
 
 def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, seed: int = 0) -> Attribution:
-    """The shares of the causes of a `model` of what the device as `described` leaves."""
+    """The shares of the causes of a `model` of what the device as `described` leaves.
+
+    E(S) is the energy beyond noise that the causes S leave alone, all other numbers as the model has them: fitted again, the
+    device's own numbers would bend to take what is missing. The part of the mismatch that the model takes away is divided as
+    Shapley's values of E are; the rest is what it leaves of the mismatch.
+    """
     fit = model.fit
     n = len(fit.structure.causes)
     held = described.held_out.excess > ATTRIBUTION.least_excess * np.sum(described.held_out.n_plain)
@@ -62,22 +66,29 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
     if not n or nominal.excess <= 0:
         return Attribution((None,) * n, None, held)
     records = fitter.held_out_records if held else fitter.fit_records
-    rough = fitter.with_errors_of(described.fit)  # incomplete models leave much
-    everyone = frozenset(range(n))
-    left = {frozenset[int](): _by_block(nominal), everyone: _by_block(chosen)}
+    before, after = _by_block(nominal), _by_block(chosen)
+    left = {frozenset(range(n)): after}
+    rough = fitter.with_errors_of(described.fit)  # initial states of incomplete models, which leave much
     for present in _subsets(n):
-        if present not in left:
-            left[present] = _left_or_all(rough, fit, present, records, left[frozenset()])
-    worst = left[frozenset()]
-    left = {S: np.minimum(E, ATTRIBUTION.diverged * np.maximum(worst, 1.0)) for S, E in left.items()}
-    parts = np.array([_shapley(left, k, n) for k in range(n)] + [left[everyone]])
+        left[present] = _left_or_all(rough, fit, present, records, before)
+    most = ATTRIBUTION.diverged * np.maximum(np.maximum(before, left[frozenset()]), 1.0)
+    left = {S: np.minimum(E, most) for S, E in left.items()}
+    parts = np.array([_shapley(left, k, n) for k in range(n)])
     rng = np.random.default_rng(seed)
-    drawn = rng.integers(0, len(worst), (ATTRIBUTION.draws, len(worst)))
-    sums = parts[:, drawn].sum(axis=2) / np.maximum(worst[drawn].sum(axis=1), 1e-300)
-    low, high = np.quantile(sums, (0.025, 0.975), axis=1)
-    value = parts.sum(axis=1) / worst.sum()
+    drawn = rng.integers(0, len(before), (ATTRIBUTION.draws, len(before)))
+    sampled = _shares(*(v[..., drawn].sum(axis=-1) for v in (parts, before, after)))
+    low, high = np.quantile(sampled, (0.025, 0.975), axis=1)
+    value = _shares(parts.sum(axis=-1), before.sum(), after.sum())
     shares = [Share(float(v), (float(a), float(b))) for v, a, b in zip(value, low, high, strict=True)]
     return Attribution(tuple(shares[:n]), shares[n], held)
+
+
+def _shares(parts: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Shares (n + 1, ...) of n causes and of the rest, from their `parts` (n, ...) and the energies `before` and `after` (...)."""
+    rest = after / np.maximum(before, 1e-300)
+    taken = parts.sum(axis=0)
+    scale = np.where(taken > 0, (1 - rest) / np.maximum(taken, 1e-300), 1 / np.maximum(before, 1e-300))
+    return np.concatenate([parts * scale, np.asarray(rest)[None]])
 
 
 def _by_block(left: Misfit) -> np.ndarray:
@@ -96,8 +107,8 @@ def _left_or_all(
 
 
 def _subsets(n: int) -> list[frozenset[int]]:
-    """The sets of causes whose energy is needed: all, or those of one, and of all but one, where there are too many."""
-    sizes = range(1, n) if n <= ATTRIBUTION.most_causes else (1, n - 1)
+    """The sets of causes but the whole one: all, or none, those of one, and of all but one, where there are too many."""
+    sizes = range(n) if n <= ATTRIBUTION.most_causes else (0, 1, n - 1)
     return [frozenset(chosen) for size in sizes for chosen in combinations(range(n), size)]
 
 
@@ -120,25 +131,11 @@ def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarr
 
 
 def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record]) -> Misfit:
-    """What the model leaves with the `present` causes alone, its other numbers adapted."""
-    reduced = _without(fitter, fit, present)
-    residuals = [r.observed - fitter.predict(reduced, r) for r in records]
-    return misfit(fitter.noise, records, residuals)
-
-
-def _without(fitter: Fitter, fit: Fit, present: frozenset[int]) -> Fit:
-    """The fit with the causes that are not `present` taken out and the other parameters fitted again in a few steps."""
+    """What the model leaves with the `present` causes alone, its other numbers as they are."""
     structure, free = fit.structure, fit.structure.free_parameters
-    absent = [k for k in range(len(structure.causes)) if k not in present]
     kept = [i for i, p in enumerate(free) if p.cause is None or p.cause in present]
-    for k in sorted(absent, reverse=True):
+    for k in sorted(set(range(len(structure.causes))) - present, reverse=True):
         structure = structure.without(k)
-    problem = fitter.problem(structure)
-    states = np.concatenate([np.zeros(0), *fit.initial_states])
-    if len(states) != problem.n_initial:  # a cause took its memories with it
-        states = np.zeros(problem.n_initial)
-    values = np.concatenate([fit.theta[kept], states])
-    x = levenberg_marquardt(problem, problem.to_scaled(values), ATTRIBUTION.steps)
-    values = problem.to_si(x)
     nothing = np.zeros(0)
-    return Fit(structure, values[: problem.k], fit.initial_states, 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
+    reduced = Fit(structure, fit.theta[kept], (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
+    return misfit(fitter.noise, records, [r.observed - fitter.predict(reduced, r) for r in records])

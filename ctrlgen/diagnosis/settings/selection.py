@@ -215,17 +215,15 @@ class DirectDetectionSettings:
 class AttributionSettings:
     """Shares of the mismatch."""
 
-    most_causes: int = 4
-    """Causes up to which all orders are averaged: 16 subsets. Of more, coming first and coming last."""
+    most_causes: int = 6
+    """Causes up to which all orders are averaged: 64 subsets, each a simulation. Of more, coming first and coming last."""
     draws: int = 1000
     """Bootstrap samples of the blocks: they know the ends of a 95 % interval to a fifth of its width's standard deviation."""
     least_excess: float = 0.02
     """Mean square beyond the noise, over the noise's, below which held-out records show no mismatch to share."""
     diverged: float = 4.0
-    """Energy of a subset, over that of the device as described, that stands for a larger one: a cause without its partner may
+    """Energy of a subset, over that of the device without any, that stands for a larger one: a cause without its partner may
     diverge."""
-    steps: int = 4
-    """Levenberg-Marquardt steps of an incomplete model from the numbers of the complete one. Judgement."""
 
 
 @dataclass(frozen=True)
