@@ -17,7 +17,7 @@ class Backlash(Effect):
     place = Place.DISPLACEMENT
     order = 1
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash"
-    params = (Param("gap", "travel", (0.0, 2.0), "full width of the gap", off=0.0),)
+    params = (Param("gap", "travel", (0.0, 10.0), "full width of the gap", off=0.0),)
     states = (
         State("w", "travel", 1.0, stepped=True),  # counted from where it begins
         State("start", "1", 1.0, per_record=True),  # w begins at start b/2

@@ -27,7 +27,7 @@ class Yielding(Effect, listed=False):
 
 
 _SHAPE = (
-    Param("reach", "travel", (1e-3, 2.0), "travel over which it settles"),
+    Param("reach", "travel", (1e-3, 5.0), "travel over which it settles"),
     Param("loop", "1", (0.55, 1.0), "b: share of the law that depends on the direction"),
 )
 

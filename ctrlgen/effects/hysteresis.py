@@ -17,7 +17,7 @@ class Hysteresis(Effect):
     source = "W. D. Iwan, J. Appl. Mech. 33 (1966) 893; K. Kuhnen, Eur. J. Control 9 (2003) 407"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
-        Param("reach", "travel", (1e-3, 2.0), "r: travel after which all springs slip"),
+        Param("reach", "travel", (1e-3, 5.0), "r: travel after which all springs slip"),
         Param("taper", "1", (-1.0, 2.0), "q: weight of the small radii over the large ones"),
     )
     states = (

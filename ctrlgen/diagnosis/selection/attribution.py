@@ -85,7 +85,7 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
 
 def _shares(parts: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Shares (n + 1, ...) of n causes and of the rest, from their `parts` (n, ...) and the energies `before` and `after` (...)."""
-    rest = after / np.maximum(before, 1e-300)
+    rest = np.maximum(after, 0.0) / np.maximum(before, 1e-300)  # by chance less may be left than noise
     taken = parts.sum(axis=0)
     scale = np.where(taken > 0, (1 - rest) / np.maximum(taken, 1e-300), 1 / np.maximum(before, 1e-300))
     return np.concatenate([parts * scale, np.asarray(rest)[None]])
