@@ -70,7 +70,7 @@ def test_a_syntax_error_names_its_line(tmp_path):
 
 
 def test_an_effect_with_faults_names_them_all(tmp_path):
-    text = '\n[[effect]]\nkind = "creep"\ngain = "3"\ntua = "1 s"\n'
+    text = '\n[[effect]]\nkind = "creep"\ngain = "30"\ntua = "1 s"\n'
     found = faults(tmp_path, ("[actuator]", "[actuator]"), ("[hexapod]", f"{text}\n[hexapod]"))
     message = found["effect[0]"]
     assert "'tua'" in message and "tau is missing" in message and "outside" in message and "at is missing" in message

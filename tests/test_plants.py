@@ -143,6 +143,11 @@ def test_struts_have_the_linear_jacobian_when_they_move_little(device, springs):
         assert np.abs((column - J[:, k]) / scale).max() < 1e-4
 
 
+def turned(d, h) -> ca.DM:
+    """The second order of the struts' loop closure at stage displacements `d` [m]."""
+    return ca.DM(second_order(lambda pose, x: linear_hexapod.loop_closure(pose, x, h), ca.DM(d)))
+
+
 def test_turning_struts_are_the_second_order(device):
     """What rigid stages leave over of the linear Jacobian; 2 % are the wires' bending and the third order."""
     p = device.values()
@@ -151,9 +156,7 @@ def test_turning_struts_are_the_second_order(device):
     struts, scale = Hexapod(NUMBERS), np.array([1, 1, 1, 1e-6, 1e-6, 1e-6])
     for d in (np.array([30.0, 0, 0, 0, 0, 0]), np.array([26.0, 32.0, 10.0, 37.0, 21.0, 23.0])):
         left = struts.pose(struts.solve(d)) * scale - J @ (d * 1e-6)
-        expected = np.array(
-            ca.DM(second_order(lambda pose, x: linear_hexapod.loop_closure(pose, x, p.hexapod), ca.DM(d * 1e-6)))
-        ).ravel()
+        expected = np.array(turned(d * 1e-6, p.hexapod)).ravel()
         for part in (slice(0, 3), slice(3, 6)):
             assert np.abs(left[part] - expected[part]).max() < 0.02 * np.abs(expected[part]).max()
 
@@ -168,9 +171,7 @@ def test_stages_yield_less_to_the_struts_the_further_they_are_driven(whole, devi
     free = {F: stage.displacement(stage.path(np.linspace(0, F, 5))[-1]) for F in (0.04, 0.06)}
     d = ca.DM([free[F] * 1e-6 for F in forces])
     pose = whole.pose(whole.path(np.linspace(0, 1, 5)[:, None] * forces)[-1]) * [1, 1, 1, 1e-6, 1e-6, 1e-6]
-    left = np.array(
-        ca.solve(J, ca.DM(pose) - second_order(lambda pose, x: linear_hexapod.loop_closure(pose, x, p.hexapod), d)) - d
-    ).ravel()
+    left = np.array(ca.solve(J, ca.DM(pose) - turned(d, p.hexapod)) - d).ravel()
     x = ca.SX.sym("d", 6)
     given = ca.Function("c", [x], [linear_stage.stiffened(x, p.stage, p.actuator)])(d)
     assert np.linalg.norm(left - np.array(given * (loads @ d)).ravel()) < 0.5 * np.linalg.norm(left)

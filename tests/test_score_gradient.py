@@ -143,7 +143,7 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
     slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing)
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     lost = np.zeros(len(slopes.laws.terms) + len(slopes.sizes), bool)
-    blocks = [list(readings) for _, _, readings in slopes._blocks(start, lost)]
+    blocks = [list(readings) for _, _, readings in slopes.blocks(start, lost)]
     slope = np.zeros((count, 6))
     for i, seen in enumerate(slopes.spread.seen):
         if len(slopes.columns) - 1 in seen:

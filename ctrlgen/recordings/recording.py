@@ -48,7 +48,7 @@ class Record:
     poses: bool = False
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.sample_time):
+        if np.isinf(self.sample_time):  # not where it is still to be found
             object.__setattr__(self, "poses", True)
 
     @property

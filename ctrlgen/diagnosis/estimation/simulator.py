@@ -48,7 +48,7 @@ class Simulator:
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
         self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True)
-        self.poses = not self.model.inertial and (poses or not np.isfinite(sample_time))
+        self.poses = not self.model.inertial and (poses or np.isinf(sample_time))
         self._with_sensitivities: dict[bool, Recursion] = {}
         self._by_pattern: dict[tuple, ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()

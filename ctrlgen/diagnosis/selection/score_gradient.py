@@ -89,7 +89,7 @@ class ScoreGradient:
         tails = [np.zeros((len(ar), len(s))) for ar, s in zip(noise.ar, seen, strict=True)]
         total = Sums.none(U.shape[2], len(self.columns))
         lost = np.zeros(len(self.laws.terms) + len(self.sizes), bool)
-        for a, b, readings in self._blocks(start, lost):
+        for a, b, readings in self.blocks(start, lost):
             for i, Y in enumerate(readings):
                 if len(noise.ar[i]):
                     Y = np.vstack([tails[i], Y])
@@ -108,7 +108,7 @@ class ScoreGradient:
         total.US[:, gone], total.Sr[gone], total.SS[gone], total.SS[:, gone] = 0.0, 0.0, 0.0, 0.0
         return total
 
-    def _blocks(self, start: np.ndarray | None, lost: np.ndarray) -> Iterator[tuple[int, int, Iterator[np.ndarray]]]:
+    def blocks(self, start: np.ndarray | None, lost: np.ndarray) -> Iterator[tuple[int, int, Iterator[np.ndarray]]]:
         """Blocks of samples [a, b) with what each channel reads of its columns; marks terms as `lost` on the way.
 
         Every block is evaluated with the sample after it, whose terms act together with its last ones; those of a held drive
