@@ -34,6 +34,7 @@ def test_units_become_si_and_the_stated_noise_too(tmp_path, model):
     assert recording.noise == (pytest.approx(1e-8),)
     assert recording.notes == () and all(r.valid.all() for r in recording.records)
     assert [r.role for r in recording.records] == ["fit", "hold_out"]
+    assert not any(r.poses for r in recording.records)
 
 
 def test_the_drives_stand_in_the_models_order_whatever_the_files(tmp_path, model):
@@ -362,7 +363,7 @@ def test_every_third_pose_is_held_out_in_its_place(tmp_path, meso):
 
 def test_poses_with_a_dwell_have_a_clock(tmp_path, meso):
     record = load_recordings([poses(tmp_path, 12, dwell="2 s", start="1 s")], meso).records[0]
-    assert record.sample_time == 2 and np.array_equal(record.time, 1 + 2.0 * np.arange(12))
+    assert record.sample_time == 2 and np.array_equal(record.time, 1 + 2.0 * np.arange(12)) and record.poses
 
 
 # real data
