@@ -19,10 +19,13 @@ from math import comb
 import numpy as np
 
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
+from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.trials import FAILURES
-from ctrlgen.diagnosis.settings import ATTRIBUTION
+from ctrlgen.diagnosis.settings import ATTRIBUTION, STATISTICS
+from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
 
 
@@ -55,8 +58,8 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
     """The shares of the causes of a `model` of what the device as `described` leaves.
 
     E(S) is the energy beyond noise that the causes S leave alone, all other numbers as the model has them: fitted again, the
-    device's own numbers would bend to take what is missing. The part of the mismatch that the model takes away is divided as
-    Shapley's values of E are; the rest is what it leaves of the mismatch.
+    device's own would bend to take what is missing. Those that its file hardly knows are adapted. The part of the mismatch that
+    the model takes away is divided as Shapley's values of E are; the rest is what it leaves of the mismatch.
     """
     fit = model.fit
     n = len(fit.structure.causes)
@@ -131,11 +134,33 @@ def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarr
 
 
 def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record]) -> Misfit:
-    """What the model leaves with the `present` causes alone, its other numbers as they are."""
+    """What the model leaves with the `present` causes alone, those of the device's own numbers adapted that are hardly known."""
     structure, free = fit.structure, fit.structure.free_parameters
     kept = [i for i, p in enumerate(free) if p.cause is None or p.cause in present]
     for k in sorted(set(range(len(structure.causes))) - present, reverse=True):
         structure = structure.without(k)
+    problem = _WithinStated(structure, fitter, fit.theta[kept])
+    x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
     nothing = np.zeros(0)
-    reduced = Fit(structure, fit.theta[kept], (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
+    reduced = Fit(structure, problem.to_si(x)[: problem.k], (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
     return misfit(fitter.noise, records, [r.observed - fitter.predict(reduced, r) for r in records])
+
+
+class _WithinStated(LeastSquaresProblem):
+    """A fit in which numbers stay as they are, but for those of the device that are hardly known, within their stated 95 %."""
+
+    def __init__(self, structure: Structure, fitter: Fitter, theta: np.ndarray) -> None:
+        super().__init__(structure, fitter.recording, fitter.error, fitter.cache)
+        self.theta = theta
+        self.start = self.to_scaled(np.concatenate([theta, np.zeros(self.n_initial)]))
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        low, high = super().bounds
+        for i, (p, value) in enumerate(zip(self.structure.free_parameters, self.start[: self.k], strict=True)):
+            open_ = p.cause is None and p.sd is not None and p.sd >= ATTRIBUTION.hardly_known * abs(p.nominal)
+            reach = STATISTICS.z_95 * (p.sd or 0.0) / self.scale[i] if open_ else ATTRIBUTION.fixed
+            centre = p.nominal / self.scale[i] if open_ else value
+            low[i] = max(low[i], min(centre - reach, value))
+            high[i] = min(high[i], max(centre + reach, value + ATTRIBUTION.fixed))
+        return low, high

@@ -215,8 +215,8 @@ class DirectDetectionSettings:
 class AttributionSettings:
     """Shares of the mismatch."""
 
-    most_causes: int = 6
-    """Causes up to which all orders are averaged: 64 subsets, each a simulation. Of more, coming first and coming last."""
+    most_causes: int = 4
+    """Causes up to which all orders are averaged: 16 subsets. Of more, coming first and coming last."""
     draws: int = 1000
     """Bootstrap samples of the blocks: they know the ends of a 95 % interval to a fifth of its width's standard deviation."""
     least_excess: float = 0.02
@@ -224,6 +224,13 @@ class AttributionSettings:
     diverged: float = 4.0
     """Energy of a subset, over that of the device without any, that stands for a larger one: a cause without its partner may
     diverge."""
+    steps: int = 4
+    """Levenberg-Marquardt steps of an incomplete model from the numbers of the complete one. Judgement."""
+    hardly_known: float = 0.25
+    """Stated standard deviation of a number of the device, over the number, from which on it is adapted to incomplete models, as
+    it was to the chosen one. Judgement."""
+    fixed: float = 1e-9
+    """Range, over its typical size, of a number that stays as it is: rounding."""
 
 
 @dataclass(frozen=True)
