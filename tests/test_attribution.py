@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.settings import ATTRIBUTION
 HUM = Hypothesis("vibration", "disturbance:axis", "axis")
 
 
-def shared(monkeypatch, energy, causes: int, held: float = 1.0, blocks=None) -> Attribution:
+def shared(monkeypatch, energy, causes: int, held: float = 1.0, blocks=None, described=None) -> Attribution:
     """Shares of `causes` causes where those of a set S leave energy(S) on the records to fit; held out `held` times as much."""
 
     def misfit_of(present, times=1.0):
@@ -40,6 +40,8 @@ def shared(monkeypatch, energy, causes: int, held: float = 1.0, blocks=None) -> 
         )
         for name, present in (("nominal", ()), ("chosen", range(causes)))
     }
+    if described is not None:
+        trial["nominal"].fitted = trial["nominal"].held_out = left(described)
     return attribute(fitter, trial["nominal"], trial["chosen"])
 
 
@@ -65,6 +67,13 @@ def test_causes_that_cannot_stand_alone_take_nothing_away_alone(monkeypatch):
 
     found = shared(monkeypatch, energy, 2)
     assert values(found) == pytest.approx([(0.4 + 0.9) / 2, (0.0 + 0.5) / 2, 0.1])
+
+
+@pytest.mark.parametrize("leaves, share", [(1.9e3, 0.99), (2.1e3, 1 - 1 / 2.1)])
+def test_numbers_that_bend_until_they_hide_a_mismatch_do_not_hide_its_share(monkeypatch, leaves, share):
+    """The device as described leaves twice what the model leaves, its numbers bent; with the model's own it leaves a hundred times."""
+    found = shared(monkeypatch, lambda S: 1e3 if S else 1e5, 1, described=leaves)
+    assert found.shares[0].value == pytest.approx(share)
 
 
 def test_causes_that_need_each_other_share_what_they_take_together(monkeypatch):

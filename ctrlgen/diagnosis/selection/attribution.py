@@ -21,7 +21,8 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
-from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.settings import ATTRIBUTION, STATISTICS
@@ -74,6 +75,9 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
     rough = fitter.with_errors_of(described.fit)  # initial states of incomplete models, which leave much
     for present in _subsets(n):
         left[present] = _left_or_all(rough, fit, present, records, before)
+    bare = left[frozenset()]
+    if after.sum() > ATTRIBUTION.hidden * before.sum() and before.sum() < ATTRIBUTION.hidden * bare.sum():
+        before = bare  # the device's own numbers, as they were fitted to it as described, hide the mismatch
     most = ATTRIBUTION.diverged * np.maximum(np.maximum(before, left[frozenset()]), 1.0)
     left = {S: np.minimum(E, most) for S, E in left.items()}
     parts = np.array([_shapley(left, k, n) for k in range(n)])
@@ -135,15 +139,21 @@ def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarr
 
 def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record]) -> Misfit:
     """What the model leaves with the `present` causes alone, those of the device's own numbers adapted that are hardly known."""
-    structure, free = fit.structure, fit.structure.free_parameters
-    kept = [i for i, p in enumerate(free) if p.cause is None or p.cause in present]
+    structure = fit.structure
+    found = {_key(structure, p): value for p, value in zip(structure.free_parameters, fit.theta, strict=True)}
     for k in sorted(set(range(len(structure.causes))) - present, reverse=True):
         structure = structure.without(k)
-    problem = _WithinStated(structure, fitter, fit.theta[kept])
+    theta = np.array([found.get(_key(structure, p), p.nominal) for p in structure.free_parameters])
+    problem = _WithinStated(structure, fitter, theta)
     x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
     nothing = np.zeros(0)
     reduced = Fit(structure, problem.to_si(x)[: problem.k], (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
     return misfit(fitter.noise, records, [r.observed - fitter.predict(reduced, r) for r in records])
+
+
+def _key(structure: Structure, p: FreeParameter) -> tuple[Hypothesis | None, str]:
+    """What a number is in any structure: a cause's, or the device's own, which a cause may have been."""
+    return (None, p.path) if p.cause is None else (structure.causes[p.cause], p.name)
 
 
 class _WithinStated(LeastSquaresProblem):

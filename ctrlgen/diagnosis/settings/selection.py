@@ -226,6 +226,9 @@ class AttributionSettings:
     diverge."""
     steps: int = 4
     """Levenberg-Marquardt steps of an incomplete model from the numbers of the complete one. Judgement."""
+    hidden: float = 0.5
+    """Energy that the model leaves, over that of the device as described, from which on the numbers of that device hide the mismatch,
+    if it leaves less than this share of what it leaves with the model's numbers: then the mismatch is that. Judgement."""
     hardly_known: float = 0.25
     """Stated standard deviation of a number of the device, over the number, from which on it is adapted to incomplete models, as
     it was to the chosen one. Judgement."""
