@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,8 @@ from axis_records import AXIS, BACKLASH, NOISE, H, fitter_of, move, played
 from misfits import BLOCKS, left
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.diagnosis.estimation.misfit import misfit
+from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection import attribution
 from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
@@ -74,6 +77,21 @@ def test_numbers_that_bend_until_they_hide_a_mismatch_do_not_hide_its_share(monk
     """The device as described leaves twice what the model leaves, its numbers bent; with the model's own it leaves a hundred times."""
     found = shared(monkeypatch, lambda S: 1e3 if S else 1e5, 1, described=leaves)
     assert found.shares[0].value == pytest.approx(share)
+
+
+@pytest.mark.parametrize("over, adapted", [(1.01, False), (0.99, True)])
+def test_only_numbers_that_the_device_hardly_knows_are_adapted(monkeypatch, over, adapted):
+    """Without the play the numbers stay those of the model, but for one that is known no better than the limit: it bends to it."""
+    fitter = fitter_of(played)
+    fit = fitter.fit(Structure(AXIS, (BACKLASH,), ({"gap": 6e-8},)))
+    own = [i for i, p in enumerate(fit.structure.free_parameters) if p.cause is None]
+    loosest = max(p.sd / abs(p.nominal) for p in (fit.structure.free_parameters[i] for i in own))
+    monkeypatch.setattr(attribution, "ATTRIBUTION", replace(ATTRIBUTION, hardly_known=over * loosest))
+    bare = replace(fit, structure=Structure(AXIS), theta=fit.theta[own])
+    records = list(fitter.fit_records)
+    kept = misfit(fitter.noise, records, [r.observed - fitter.predict(bare, r) for r in records]).plain.sum()
+    left_over = attribution.left_by(fitter, fit, frozenset(), records).plain.sum()
+    assert left_over < (1 - 1e-4) * kept if adapted else left_over == pytest.approx(kept, rel=1e-6)
 
 
 def test_causes_that_need_each_other_share_what_they_take_together(monkeypatch):

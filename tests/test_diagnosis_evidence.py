@@ -365,7 +365,7 @@ def test_evidence_is_numbers_that_json_knows(monkeypatch):
     )
     without = run_supporting_analyses(search, explained=False)
     assert without.extra["unmodelled_force"] is None and "unmodelled_force" not in without.residual_location["after"]
-    assert without.failed == ("the unknown input could not be estimated: it grows without bound along the motion",)
+    assert without.failed == ("the unknown input is left out: it grows without bound along the motion",)
     first, last = found.search_history[0], found.search_history[-1]
     assert first["decision"] == "added stiffening at stage:axis" and first["candidates"][0]["causes"][0]["accepted"]
     assert last["decision"].endswith("stopped")

@@ -132,7 +132,7 @@ POSED = [
 
 @pytest.mark.parametrize("law", POSED, ids=lambda h: f"{h.effect}-{h.at}")
 def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulations(hexapod, law):
-    count, dwell = 30, 0.02  # the heaters of this device need three times as long
+    count, dwell = 30, 0.02  # four time constants of the heaters
     u = build_model(HEXAPOD).u_scale * np.random.default_rng(5).uniform(0.2, 0.8, (count, 6))
     records = tuple(
         Record(role, role, dwell * np.arange(count), dwell, u, np.zeros((count, 6)), False, None, np.ones((count, 6), bool), poses=True)

@@ -55,7 +55,7 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
         try:
             return analysis()
         except FAILURES as error:
-            failed.append(f"{name} could not be estimated: {error}")
+            failed.append(f"{name} is left out: {error}")
             return None
 
     if not explained and (f := tried("the unknown input", lambda: describe_unmodelled_force(fitter, chosen, after))):

@@ -78,7 +78,7 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
     bare = left[frozenset()]
     if after.sum() > ATTRIBUTION.hidden * before.sum() and before.sum() < ATTRIBUTION.hidden * bare.sum():
         before = bare  # the device's own numbers, as they were fitted to it as described, hide the mismatch
-    most = ATTRIBUTION.diverged * np.maximum(np.maximum(before, left[frozenset()]), 1.0)
+    most = ATTRIBUTION.diverged * np.maximum(np.maximum(before, bare), 1.0)
     left = {S: np.minimum(E, most) for S, E in left.items()}
     parts = np.array([_shapley(left, k, n) for k in range(n)])
     rng = np.random.default_rng(seed)
@@ -161,7 +161,6 @@ class _WithinStated(LeastSquaresProblem):
 
     def __init__(self, structure: Structure, fitter: Fitter, theta: np.ndarray) -> None:
         super().__init__(structure, fitter.recording, fitter.error, fitter.cache)
-        self.theta = theta
         self.start = self.to_scaled(np.concatenate([theta, np.zeros(self.n_initial)]))
 
     @property
