@@ -454,3 +454,33 @@ def test_a_rise_is_half_over_at_its_moment(way):
     p = SimpleNamespace(offset=1.0, moment=3.0, rise=way)
     at = [float(law.term(SimpleNamespace(t=t), p)) for t in (3.0 - way / 2, 3.0, 3.0 + way / 2)]
     assert at == pytest.approx([0.0414, 0.5, 0.9586], abs=1e-4)  # (1 -+ tanh(pi/2))/2, to the digits written
+
+
+@pytest.mark.parametrize(
+    "first, then, why",
+    [
+        ("bow", "cyclic", "the fringes of a bent scale are counted along the bent scale"),
+        ("cubic_sensor", "cyclic", "the same"),
+        ("drift", "cyclic", "what drifts moves the target along the fringes"),
+        ("temperature_sensitivity", "cyclic", "the same"),
+        ("cyclic", "low_pass", "the readout follows the fringe signal"),
+        ("low_pass", "delay", "a filtered reading is sent"),
+        ("delay", "quantisation", "digits are what arrives"),
+        ("delay", "stuck", "what no longer changes is what arrives"),
+    ],
+)
+def test_a_reading_passes_the_laws_in_the_order_of_its_chain(first, then, why):
+    assert Effect.library[first].order < Effect.library[then].order, why
+
+
+def test_the_force_of_dry_friction_at_standstill_is_whatever_holds_the_stage():
+    assert {kind for kind, law in Effect.library.items() if law.set_valued} == {
+        "coulomb",
+        "directional_friction",
+        "stribeck",
+    }
+
+
+def test_an_event_is_looked_for_on_either_side_of_the_zero_of_time():
+    events = [p for law in Effect.library.values() for p in law.params if p.name == "moment"]
+    assert events and all(p.bounds[0] == -p.bounds[1] for p in events)
