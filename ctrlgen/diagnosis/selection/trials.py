@@ -129,7 +129,7 @@ class Trials:
     def with_errors(self, candidate: CandidateModel) -> CandidateModel:
         """The same structure under the discrepancy that it leaves itself, estimated and fitted in turn."""
         for _ in range(DISCREPANCY.updates):
-            fitter = self.fitter.with_errors_of(candidate.fit)
+            fitter = replace(self.fitter, errors=candidate.errors)
             if np.allclose(fitter.error.weighted.sd, self.fitter.error.weighted.sd, rtol=DISCREPANCY.same):
                 break
             before = self.fitter
