@@ -30,7 +30,7 @@ comma := ,
 CONCEALED = out/battery_$(SIZE)_$(SEED)$(if $(CLASSES),_$(subst $(comma),_,$(CLASSES)))
 battery: $(VENV)/installed-test
 	test -e $(CONCEALED)/battery.json || $(BIN)/python -m battery make --out $(CONCEALED) --seed $(SEED) --size $(SIZE) --classes "$(CLASSES)"
-	$(BIN)/python -m battery score $(CONCEALED) --run "$(BIN)/ctrlgen diagnose" --opponents $(OPPONENTS)
+	$(BIN)/python -m battery score $(CONCEALED) --run "$(BIN)/ctrlgen diagnose --jobs 0" --opponents $(OPPONENTS)
 
 # make loop    drives the independent plant with generated C, diagnoses it, corrects the device, drives it again (minutes)
 loop: $(VENV)/installed

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,6 +17,10 @@ ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
 DEVICES = SCENARIOS / "devices"
 DEVICE, AXIS_FILE, MESO_FILE = (DEVICES / f"{name}.toml" for name in ("mems_hexapod", "flexure_axis", "meso_hexapod"))
+
+
+# pytest-xdist uses the cores, and lines that run in a fork are not seen by coverage
+os.environ.setdefault("CTRLGEN_JOBS", "1")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
 from ctrlgen.diagnosis.estimation.fit import Fitter
@@ -58,20 +59,24 @@ def diagnose_recording(
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     laws: Sequence[str] | None = None,
+    jobs: int | None = None,
 ) -> Diagnosis:
     """The physics that `recording` shows and `device` leaves out.
 
-    Deterministic for a given `seed`. `progress` is called with a sentence before each step. Fits that the `checkpoint`
-    holds are not repeated. `laws` restricts the hypotheses to the effects of these names and the device's own parameters.
+    Deterministic for a given `seed`, whatever the number of processes, `jobs`: one per core unless given, 0 for this one alone.
+    `progress` is called with a sentence before each step. Fits that the `checkpoint` holds are not repeated. `laws` restricts the
+    hypotheses to the effects of these names and the device's own parameters.
     Raises InputError where no record has the role fit or hold_out, where no channel varies, or for an unknown effect.
     """
     # One thread: the matrices are small. No warnings: a candidate model may diverge, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _diagnose(device, recording, seed, progress or (lambda _: None), checkpoint, laws)
+        processes = usable_cores() if jobs is None else max(jobs, 1)
+        return _diagnose(device, recording, seed, progress or (lambda _: None), checkpoint, laws, processes)
 
 
 def _diagnose(
-    device: Device, recording: Recording, seed: int, step: Progress, checkpoint: Checkpoint | None, laws: Sequence[str] | None
+    device: Device, recording: Recording, seed: int, step: Progress, checkpoint: Checkpoint | None, laws: Sequence[str] | None,
+    jobs: int,
 ) -> Diagnosis:  # fmt: skip
     effects = selected_laws(laws)
     recording = _relative_ambient(_with_both_roles(recording))
@@ -82,10 +87,10 @@ def _diagnose(
     known = fitter.noise.known
     suspected = _hypotheses(device, live.recording, effects)
     step(f"refit of the device as described, {len(suspected)} hypotheses")
-    search = Searcher(fitter, Screen(fitter, suspected, seed), step).run(device)
+    search = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs).run(device)
     step("residual tests")
     tests = run_residual_tests(search.fitter, search.chosen.fit)
-    attribution = attribute(search.fitter, search.nominal, search.chosen, seed)
+    attribution = attribute(search.fitter, search.nominal, search.chosen, seed, jobs)
     detected = (*live.findings, *directly_detected_findings(search, effects))
     answer = verdict(search, tests, attribution, bool(detected), in_another_unit(search))
     step("supporting analyses")

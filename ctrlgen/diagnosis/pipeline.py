@@ -55,11 +55,13 @@ def diagnose(
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     laws: Sequence[str] | None = None,
+    jobs: int | None = None,
 ) -> Diagnosis:
     """The physics that `recording` shows and `device` leaves out; each may be an object or its file, a recording also several.
 
-    Deterministic for a given `seed`; `progress` is called with a sentence before each step. `laws` restricts the hypotheses
-    to the effects of these names and the device's own parameters. Raises InputError.
+    Deterministic for a given `seed`, whatever the number of processes, `jobs`: one per core unless given, 0 for this one alone.
+    `progress` is called with a sentence before each step. `laws` restricts the hypotheses to the effects of these names and the
+    device's own parameters. Raises InputError.
     """
     device = device if isinstance(device, Device) else load_device(device)
     if not isinstance(recording, Recording):
@@ -67,7 +69,7 @@ def diagnose(
             progress("reading")
         paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
         recording = load_recordings(paths, build_model(device))
-    return diagnose_recording(device, recording, seed, progress, checkpoint, laws)
+    return diagnose_recording(device, recording, seed, progress, checkpoint, laws, jobs)
 
 
 def diagnose_into(
@@ -78,6 +80,7 @@ def diagnose_into(
     progress: Progress | None = None,
     replicates: Replicates | None = None,
     laws: Sequence[str] | None = None,
+    jobs: int | None = None,
 ) -> Diagnosis:
     """`diagnose`, reported into the folder `out`, which is replaced as a whole or left unchanged. Raises InputError.
 
@@ -92,7 +95,7 @@ def diagnose_into(
         checkpoint = _checkpoint(Path(out), device, recordings, seed, laws)
         if checkpoint.reused:
             step(f"continuing after {checkpoint.reused} fits")
-        found = diagnose(model.device, recording, seed, step, checkpoint, laws)
+        found = diagnose(model.device, recording, seed, step, checkpoint, laws, jobs)
         if replicates is not None:
             found.extra["bootstrap"] = replicates.of(found, seed, step)
             write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")

@@ -4,12 +4,14 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class Bow(Effect):
-    """Delta y = b y^2. Holds while the sensor's nonlinearity is a few per cent of the reading."""
+    """Delta y = b y^2. Holds while the sensor's nonlinearity is a few per cent of the reading; with |b| > 1/2 the reading would turn
+    back within its range.
+    """
 
     place = Place.SENSOR
     order = -1  # before `cyclic`: the fringes of a bent scale are counted along the bent scale
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
-    params = (Param("curvature", "1/channel", (-0.3, 0.3), "nonlinearity per reading squared", off=0.0),)
+    params = (Param("curvature", "1/channel", (-0.5, 0.5), "nonlinearity per reading squared", off=0.0),)
 
     def term(self, s, p):
         return p.curvature * s.value**2

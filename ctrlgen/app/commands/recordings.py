@@ -65,15 +65,15 @@ def diagnose(
     """
     from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, unfinished
 
-    if (scheduler is not None or jobs is not None) and not bootstrap:
+    if scheduler is not None and not bootstrap:
         raise typer.BadParameter(
-            "--scheduler and --jobs only distribute the replicates of --bootstrap; add --bootstrap 200, or leave them out"
+            "--scheduler only distributes the replicates of --bootstrap; add --bootstrap 200, or leave it out"
         )
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         chosen = None if laws is None else [name.strip() for name in laws.split(",") if name.strip()]
         with progress() as advance:
-            found = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen)
+            found = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen, jobs)
     except KeyboardInterrupt:
         kept = unfinished(out_folder)
         if kept.exists():

@@ -16,7 +16,7 @@ class Checkpoint:
     """Optima by key in the text file `path`, one JSON pair a line after a header line.
 
     `made_from` describes the diagnosis: program version, seed, digests of its files. A file with another header is ignored
-    and replaced by the first `keep`. `reused` counts the optima that were read.
+    and replaced by the first `begin`. `reused` counts the optima that were read.
     """
 
     def __init__(self, path: Path, made_from: dict[str, Any]) -> None:
@@ -41,13 +41,16 @@ class Checkpoint:
 
     def keep(self, key: str, optimum: np.ndarray) -> None:
         """Appends an optimum (k,) to the file."""
+        self.begin()
         self.optima[key] = optimum.tolist()
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(_line((key, self.optima[key])))
+
+    def begin(self) -> None:
+        """Writes the file with the optima that were read, so that forks of this process may append to it."""
         if not self._has_header:
             write_text(self.path, _line(self.made_from) + "".join(map(_line, self.optima.items())))
             self._has_header = True
-            return
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(_line((key, self.optima[key])))
 
     def done(self) -> None:
         """Deletes the file: the diagnosis is complete."""

@@ -3,8 +3,8 @@
 D+ = F_S D + F_c dc/dp,  dy/dp = H_S D + H_c dc/dp,  D = dS/dp. They are kept transposed, T = D' (m, n_s), a row a parameter,
 because CasADi multiplies by a sparse matrix along columns.
 
-A model in balance is differentiated as a whole. A model with inertia takes many integrator steps a sample, and T is
-propagated from step to step: a step is linear but for the nonlinear rates N, so it needs only constant matrices and the
+A model in balance is differentiated as a whole. A model with inertia takes one or more integrator steps a sample, and T is
+propagated from point to point of each: a step is linear but for the nonlinear rates N, so it needs only constant matrices and the
 derivatives of N at the points where the step evaluates it.
 """
 
@@ -38,7 +38,7 @@ def forward_sensitivities(
         """(d value/dp)' from the transposed derivatives by S and, where there is a seed, by c."""
         return sum((V @ derivative for V, derivative in zip((T, seed), derivatives, strict=False)))
 
-    if not takes_several_steps(equations):
+    if equations.steps is None:
         values = [equations.following, equations.y]
         one = ca.Function("one", equations.given, [*values, *_transposed_jacobians(values, symbols)])
         following, y, *by = one(*given)
@@ -54,12 +54,6 @@ def forward_sensitivities(
         places = list(m.stepped)
         following[places], T[:, places] = stepped, of_stepped
     return following, T, y, Y
-
-
-def takes_several_steps(equations: SampleEquations) -> bool:
-    """Whether a sample takes more than one explicit integrator step, or implicit ones: not to be differentiated whole."""
-    steps = equations.steps
-    return steps is not None and (isinstance(steps, ImplicitRadau) or steps.count > 1)
 
 
 def _transposed_jacobians(values: list[ca.SX], symbols: list[ca.SX]) -> list[ca.SX]:
@@ -135,9 +129,14 @@ def _step_with_jacobians(equations: SampleEquations, c_varies: bool) -> ca.Funct
     Y, u, _, e, c = equations.given
     held, u_end = equations.model.held, ca.SX.sym("end", u.numel())
     constant = ca.vertcat(held, c) if c_varies else held
-    N = ca.Function("N", [Y, u, held, e, c], [equations.integrator.nonlinear_rates(equations.model)])
-    by = _transposed_jacobians([N(Y, u, held, e, c)], [Y, constant])
-    jacobians = ca.Function("jacobians", [Y, u, held, e, c], by)
+    value = equations.integrator.nonlinear_rates(equations.model)
+    N = ca.Function("N", [Y, u, held, e, c], [value])
+    jacobians = ca.Function(
+        "jacobians", [Y, u, held, e, c], _transposed_jacobians([value], [Y, constant]), {"cse": True}
+    )
+    if isinstance(equations.integrator, ExponentialRungeKutta):
+        # called at each point, not written out there: a quarter of the code, which takes longer to compile than to run
+        Y, u, u_end, held, e, c = (ca.MX.sym("given", value.numel()) for value in (Y, u, u_end, held, e, c))
     after, points = equations.integrator.points(lambda Y, u: N(Y, u, held, e, c), Y, u, u_end)
     by_Y, by_constant = zip(*(jacobians(*point, held, e, c) for point in points), strict=True)
     return ca.Function("step", [Y, u, u_end, held, e, c], [after, *by_Y, *by_constant], {"cse": True})

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.forward_sensitivities import forward_sensitivities, takes_several_steps
+from ctrlgen.diagnosis.estimation.forward_sensitivities import forward_sensitivities
 from ctrlgen.diagnosis.estimation.sample_equations import SampleEquations, build_sample_equations
 from ctrlgen.diagnosis.settings import SIMULATION
 from ctrlgen.model.assembly import build_model
@@ -111,7 +111,7 @@ class Simulator:
         c, c_p = self.equations.constants(p)
         given = self._symbols[:4]
         c_f = c_p[:, list(chosen)]
-        if takes_several_steps(self.equations):
+        if self.equations.steps is not None:
             jacobians = self._jacobians_by_steps(c_f.sparsity())(*given, c, c_f)
         else:
             F_S, F_c, H_S, H_c = self._jacobians(*given, c)

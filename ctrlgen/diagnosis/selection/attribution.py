@@ -18,6 +18,7 @@ from math import comb
 
 import numpy as np
 
+from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
@@ -55,12 +56,15 @@ class Attribution:
         return 0.0 if self.rest is None else 1.0 - self.rest.value
 
 
-def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, seed: int = 0) -> Attribution:
+def attribute(
+    fitter: Fitter, described: CandidateModel, model: CandidateModel, seed: int = 0, jobs: int = 1
+) -> Attribution:
     """The shares of the causes of a `model` of what the device as `described` leaves.
 
     E(S) is the energy beyond noise that the causes S leave alone, all other numbers as the model has them: fitted again, the
     device's own would bend to take what is missing. Those that its file hardly knows are adapted. The part of the mismatch that
-    the model takes away is divided as Shapley's values of E are; the rest is what it leaves of the mismatch.
+    the model takes away is divided as Shapley's values of E are; the rest is what it leaves of the mismatch. The sets are fitted in
+    `jobs` processes.
     """
     fit = model.fit
     n = len(fit.structure.causes)
@@ -73,8 +77,9 @@ def attribute(fitter: Fitter, described: CandidateModel, model: CandidateModel, 
     before, after = _by_block(nominal), _by_block(chosen)
     left = {frozenset(range(n)): after}
     rough = fitter.with_errors_of(described.fit)  # initial states of incomplete models, which leave much
-    for present in _subsets(n):
-        left[present] = _left_or_all(rough, fit, present, records, before)
+    subsets = _subsets(n)
+    found = in_forks(lambda present: _left_or_all(rough, fit, present, records, before), subsets, jobs)
+    left |= dict(zip(subsets, found, strict=True))
     bare = left[frozenset()]
     if after.sum() > ATTRIBUTION.hidden * before.sum() and before.sum() < ATTRIBUTION.hidden * bare.sum():
         before = bare  # the device's own numbers, as they were fitted to it as described, hide the mismatch

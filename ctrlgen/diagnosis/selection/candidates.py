@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,9 +19,11 @@ from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
     """All that is tried beside `current`, the promising ones fitted to their end."""
-    found = fit_each(trials, current.fit, significant(trials, current, screened))
-    if not current.errors.is_noise:
-        found = tuple(restart_elsewhere(trials, t, current, screened) for t in found)
+
+    def in_other_shapes(own: Trials, t: CandidateModel) -> CandidateModel:
+        return t if current.errors.is_noise else restart_elsewhere(own, t, current, screened)
+
+    found = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
     found = (*found, *fit_other_clocks(trials, current, found))
     if trials.selection.parameters_may_mask_cause(current.fit):
         found = (*found, *_as_stated(trials, current))
@@ -45,13 +47,23 @@ def significant(trials: Trials, current: CandidateModel, screened: Screened) -> 
     return chosen
 
 
-def fit_each(trials: Trials, fit: Fit, suspects: Sequence[Suspect]) -> tuple[CandidateModel, ...]:
-    """Each suspect beside what is fitted."""
-    found: list[CandidateModel] = []
-    for s in suspects:
-        trials.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location}")
-        found += trials.tried(restart_with(fit, s.hypothesis, s.start), s.hypothesis, fit)
-    return tuple(found)
+def fit_each(
+    trials: Trials,
+    fit: Fit,
+    suspects: Sequence[Suspect],
+    finish: Callable[[Trials, CandidateModel], CandidateModel] = lambda _, t: t,
+) -> tuple[CandidateModel, ...]:
+    """Each suspect beside what is fitted, and what `finish` makes of it."""
+
+    def one(own: Trials, s: Suspect) -> list[CandidateModel]:
+        return [finish(own, t) for t in own.tried(restart_with(fit, s.hypothesis, s.start), s.hypothesis, fit)]
+
+    return tuple(t for found in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in found)
+
+
+def trying(*causes: Hypothesis) -> str:
+    """What is told of a trial."""
+    return "trying " + ", ".join(f"{c.effect} at {c.location}" for c in causes)
 
 
 def restart_elsewhere(
@@ -90,8 +102,8 @@ def fit_other_clocks(
     shifts = [o for o in open_ if o.effect != PARAMETER and o.law.moves_in_time]
     if current.errors.is_noise or trials.fitter.recording.kind == "poses" or not shifts:
         return ()
-    found: list[CandidateModel] = []
-    for beside in (current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]):
+
+    def one(own: Trials, beside: CandidateModel) -> list[CandidateModel]:
         begun: list[tuple[float, Hypothesis, Structure]] = []
         for cause in shifts:
             p = cause.law.amplitude()
@@ -99,14 +111,16 @@ def fit_other_clocks(
             try:
                 for start in (2**k * h for k in range(SEARCH.clock_doublings) if low <= 2**k * h <= high):
                     structure = restart_with(beside.fit, cause, {p.name: start})
-                    begun.append((trials.fitter.initial_objective(structure), cause, structure))
+                    begun.append((own.fitter.initial_objective(structure), cause, structure))
             except FAILURES as error:
-                trials.note_failure(cause, error)
-        if begun:
-            _, cause, structure = min(begun, key=lambda b: b[0])
-            trials.step(f"trying {cause.effect} at {cause.location}")
-            found += trials.tried(structure, cause, beside.fit)
-    return tuple(found)
+                own.note_failure(cause, error)
+        if not begun:
+            return []
+        _, cause, structure = min(begun, key=lambda b: b[0])
+        return own.tried(structure, cause, beside.fit)
+
+    besides = [current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]]
+    return tuple(t for found in trials.each(one, besides, lambda _: trying(*shifts)) for t in found)
 
 
 def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
@@ -131,18 +145,22 @@ def fit_subsets(
     best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
     least = min((t.fitted.excess for t in singles), default=np.inf)
     found: list[CandidateModel] = []
+
+    def one(own: Trials, suspects: Sequence[Suspect]) -> list[CandidateModel]:
+        structure = restart(current.fit)
+        for s in suspects:
+            structure = structure.with_cause(s.hypothesis, s.start)
+        return own.tried(structure, suspects[-1].hypothesis, current.fit)
+
     for size in (2, 3, 4):
         explained = least <= (1 - MODEL_SELECTION.most_of_mismatch) * current.fitted.excess
         if size > 2 and explained and trials.fitter.recording.kind == "series":
             break
         left = current.fit.objective - best
         enough = best + max(trials.selection.required_z2(current, screened), SEARCH.subset_share * left)
-        for suspects in _promising_sets(screened, size, enough, trials.per_round):
-            structure = restart(current.fit)
-            for s in suspects:
-                structure = structure.with_cause(s.hypothesis, s.start)
-            trials.step("trying " + ", ".join(f"{s.hypothesis.effect} at {s.hypothesis.location}" for s in suspects))
-            found += trials.tried(structure, suspects[-1].hypothesis, current.fit)
+        sets = _promising_sets(screened, size, enough, trials.per_round)
+        tried = trials.each(one, sets, lambda suspects: trying(*(s.hypothesis for s in suspects)))
+        found += [t for fitted in tried for t in fitted]
         sound = [t for t in found if not trials.objections(t)]
         best = max([best, *(current.fit.objective - t.fit.objective for t in sound)])
         least = min([least, *(t.fitted.excess for t in sound)])
@@ -174,4 +192,5 @@ def _converge_promising(
     early = [
         t for t in best if t.fit.objective < current.fit.objective and not trials.selection.improves_enough(current, t)
     ]
-    return tuple(trials.converged(t) if t in early else t for t in candidates)
+    ends = dict(zip(map(id, early), trials.each(lambda own, t: own.converged(t), early), strict=True))
+    return tuple(ends.get(id(t), t) for t in candidates)

@@ -16,8 +16,8 @@ from ctrlgen.diagnosis.selection.trials import Trials
 def all_pruned(trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel]) -> list[CandidateModel]:
     """The candidates that meet no objection, and of the others what is left without the causes that do."""
     found: dict[frozenset, CandidateModel] = {}
-    for candidate in candidates:
-        if (kept := pruned(trials, candidate, current.causes)) is not None:
+    for kept in trials.each(lambda own, t: pruned(own, t, current.causes), candidates):
+        if kept is not None:
             found.setdefault(frozenset(kept.causes), kept)
     return list(found.values())
 

@@ -9,7 +9,7 @@ from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum, restart
-from ctrlgen.diagnosis.selection.candidates import significant
+from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.screen import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
@@ -87,12 +87,15 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
         for s in significant(trials, current, screened)
         if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
     ]
-    found: list[CandidateModel] = []
-    for s in able[: SEARCH.most_rivals]:
-        trials.step(f"trying {s.hypothesis.effect} at {s.hypothesis.location} instead")
-        found += trials.tried(replace_cause(trials, current.fit, k, others, s), s.hypothesis)
+
+    def one(own: Trials, s: Suspect) -> list[CandidateModel]:
+        return own.tried(replace_cause(own, current.fit, k, others, s), s.hypothesis)
+
+    tried = trials.each(one, able[: SEARCH.most_rivals], lambda s: f"{trying(s.hypothesis)} instead")
+    found = [t for fitted in tried for t in fitted]
     near = trials.close_contenders(without, current, trials.selection.ranked(found))
-    return trials.selection.ranked([trials.converged(t) if t in near else t for t in found])
+    ends = trials.each(lambda own, t: own.converged(t), near)
+    return trials.selection.ranked([*ends, *(t for t in found if t not in near)])
 
 
 def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:

@@ -29,8 +29,8 @@ from ctrlgen.diagnosis.settings import FIT, SEARCH
 class Searcher:
     """Looks for the causes of a mismatch in one recording."""
 
-    def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
-        self.trials = Trials(fitter, screen, step)
+    def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None], jobs: int = 1) -> None:
+        self.trials = Trials(fitter, screen, step, jobs)
 
     def run(self, device: Device) -> SearchResult:
         """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
@@ -55,18 +55,13 @@ class Searcher:
             trials.fitter, trials.fitter.described(device)[1]
         )  # its numbers not bent by errors of a better model
         each = range(len(current.causes))
-        bare = tuple(self._without(current, k, nominal) for k in each)
-        alike = tuple(rivals(trials, current, k, rounds) for k in each)
+        bare = tuple(trials.each(lambda own, k: _without(own, current, k, nominal), each))
+        alike = tuple(trials.each(lambda own, k: rivals(own, current, k, rounds), each))
         return SearchResult(trials.fitter, nominal, current, bare, alike, tuple(rounds), trials.screened(current))
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
         return without_needless(self.trials, self.trials.with_errors(self.trials.converged(current)))
-
-    def _without(self, current: CandidateModel, k: int, nominal: CandidateModel) -> CandidateModel:
-        """The model without cause k; the device as described where that cannot be simulated."""
-        found = self.trials.tried(restart(current.fit).without(k), None, None)
-        return found[0] if found else nominal
 
     def _forward_rounds(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
         """Forward rounds from `current`, with swaps in between, until nothing more is justified; appends each to `rounds`."""
@@ -99,7 +94,7 @@ class Searcher:
         trials = self.trials
         first = trials.selection.most_parsimonious(better)
         near = trials.close_contenders(current.fit.objective, first, [t for t in better if t is not first])
-        ends = [restart_elsewhere(trials, trials.converged(t), current, screened) for t in (first, *near)]
+        ends = trials.each(lambda own, t: restart_elsewhere(own, own.converged(t), current, screened), (first, *near))
         sound = [t for t in ends if not trials.objections(t, current.causes)]
         return trials.selection.most_parsimonious(sound or [first])
 
@@ -118,3 +113,9 @@ class Searcher:
             refused=tuple(r for r in self.trials.refused if compare.advantage(r.candidate, best) > 0),
             failed=tuple(dict.fromkeys(self.trials.failed)),
         )
+
+
+def _without(trials: Trials, current: CandidateModel, k: int, nominal: CandidateModel) -> CandidateModel:
+    """The model without cause k; the device as described where that cannot be simulated."""
+    found = trials.tried(restart(current.fit).without(k), None, None)
+    return found[0] if found else nominal

@@ -5,12 +5,15 @@ A structure is fitted once under the same errors. No trial can end the search: o
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from ctrlgen.core.errors import CtrlgenError, InputError
+from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.noise_update import update_noise_size
 from ctrlgen.diagnosis.estimation.structure import Structure
@@ -21,19 +24,22 @@ from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.settings import DISCREPANCY, FIT, SEARCH
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 FAILURES = (CtrlgenError, ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 """What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge."""
+_Learnt = tuple[dict[frozenset, tuple[CandidateModel, int]], list[Refusal], list[str]]
 
 
 class Trials:
     """Fits structures for a search, and keeps what was fitted, screened, `refused` and `failed`.
 
     It replaces its own fitter as it learns the errors. `mismatch` is that of `ModelSelection`. `step` is called with a sentence
-    before each trial.
+    before each trial. Trials that do not depend on one another are made in `jobs` processes.
     """
 
-    def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None]) -> None:
-        self.fitter, self.screen, self.step = fitter, screen, step
+    def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None], jobs: int = 1) -> None:
+        self.fitter, self.screen, self.step, self.jobs = fitter, screen, step, jobs
         self.fitted: dict[frozenset, tuple[CandidateModel, int]] = {}
         self.screens: dict[frozenset, tuple[Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
@@ -52,6 +58,42 @@ class Trials:
         self.screen.fitter = fitter
         self.fitted.clear()
         self.screens.clear()
+
+    def each(
+        self,
+        function: Callable[[Trials, Item], Result],
+        items: Sequence[Item],
+        sentence: Callable[[Item], str] | None = None,
+    ) -> list[Result]:
+        """function(trials, item) of every item, in as many processes as there may be.
+
+        Each item begins with what these trials know now, and what it learnt is kept here in the order of the items: the result
+        does not depend on the number of processes. `sentence` of an item is told as it begins.
+        """
+
+        if self.fitter.checkpoint is not None:
+            self.fitter.checkpoint.begin()
+
+        def work(item: Item) -> tuple[Result, _Learnt]:
+            branch = copy.copy(self)
+            branch.jobs, branch.step = 1, (lambda _: None)
+            # a compiled simulator expands about the numbers of the structure that was first in need of it
+            branch.fitter = replace(self.fitter, cache=dict(self.fitter.cache))
+            branch.fitted, branch.screens, branch.refused, branch.failed = dict(self.fitted), dict(self.screens), [], []
+            result = function(branch, item)
+            new = {key: value for key, value in branch.fitted.items() if self.fitted.get(key) is not value}
+            return result, (new, branch.refused, branch.failed)
+
+        devices = {id(c.fit.structure.device): c.fit.structure.device for c, _ in self.fitted.values()}
+        shared = (self.fitter.recording, self.fitter.noise, self.fitter.errors, *devices.values())
+        begun = (lambda item: self.step(sentence(item))) if sentence else (lambda item: None)
+        results = []
+        for result, (new, refused, failed) in in_forks(work, items, self.jobs, begun, shared):
+            self.fitted.update(new)
+            self.refused += refused
+            self.failed += failed
+            results.append(result)
+        return results
 
     def new_round(self) -> None:
         """Forgets what was refused and what failed."""
