@@ -361,6 +361,9 @@ def test_all_pairs_of_lines_are_looked_at_whatever_stands_between():
     assert not lines(5.0, 5.01, 9.0, 9.01, accepted=(0, 1))
 
 
+TURNED = "its amplitude is so large beside its period that the reading would turn back"
+
+
 @pytest.mark.parametrize("period, means", [(6.29, True), (6.28, False)])
 def test_a_cause_whose_law_does_not_hold_means_nothing(period, means):
     """Fringes of one metre must be longer than 2 pi metres, or the reading would fall as the position rises."""
@@ -368,5 +371,15 @@ def test_a_cause_whose_law_does_not_hold_means_nothing(period, means):
     fit = fitted(causes=(cause, GAIN))
     fit.values = lambda k: {"amplitude": 1.0, "period": period, "phase": 0.0} if k == 0 else {"gain": 0.1}
     found = objections(timed(np.arange(11.0)), fit)
-    assert found == ({} if means else {0: "its numbers contradict one another"})
+    assert found == ({} if means else {0: TURNED})
     assert objections(timed(np.arange(11.0)), fit, (cause,)) == {}
+
+
+@pytest.mark.parametrize("damping, means", [(0.70, True), (0.71, False)])
+def test_a_resonance_without_a_peak_is_none(damping, means):
+    """From 1/sqrt(2) of critical damping on the response falls from the beginning: it is a lag."""
+    cause = Hypothesis("resonance", "stage:axis", "axis")
+    fit = fitted(causes=(cause, GAIN))
+    fit.values = lambda k: {"stiffness": 1.0, "frequency": 9.0, "damping": damping} if k == 0 else {"gain": 0.1}
+    found = objections(timed(np.arange(11.0)), fit)
+    assert found == ({} if means else {0: "a damping ratio of 0.71 leaves no resonance, only a lag"})

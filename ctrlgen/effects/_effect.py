@@ -94,9 +94,9 @@ class Effect:
         return next(p for p in cls.params if p.off is not None)
 
     @classmethod
-    def holds(cls, p: dict[str, float]) -> bool:
-        """Whether the law is valid with these parameters [SI]."""
-        return True
+    def contradiction(cls, p: dict[str, float]) -> str:
+        """Why parameters [SI] describe something else than the law; empty where they do not."""
+        return ""
 
     @classmethod
     def applies_to(cls, channel: Channel) -> bool:

@@ -26,8 +26,9 @@ class Cyclic(Effect):
     )  # fmt: skip
 
     @classmethod
-    def holds(cls, p):
-        return 2 * math.pi * abs(p["amplitude"]) < p["period"]
+    def contradiction(cls, p):
+        back = 2 * math.pi * abs(p["amplitude"]) >= p["period"]
+        return "its amplitude is so large beside its period that the reading would turn back" if back else ""
 
     def term(self, s, p):
         return p.amplitude * ca.sin(2 * ca.pi * s.value / p.period + p.phase)

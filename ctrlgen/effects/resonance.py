@@ -21,6 +21,12 @@ class Resonance(Effect):
     )
     states = (State("q", "travel", 1.0), State("p", "travel", 1.0))
 
+    @classmethod
+    def contradiction(cls, p):
+        return (
+            f"a damping ratio of {p['damping']:.2g} leaves no resonance, only a lag" if p["damping"] > 0.5**0.5 else ""
+        )
+
     def term(self, s, p):
         w = 2 * ca.pi * p.frequency
         return p.stiffness * (s.q - s.displacement + 2 * p.damping * (s.p - s.velocity / w))

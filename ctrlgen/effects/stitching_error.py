@@ -21,8 +21,12 @@ class StitchingError(Effect):
     )
 
     @classmethod
-    def holds(cls, p):
-        return p["offset"] > -p["width"]
+    def contradiction(cls, p):
+        return (
+            "its offset is so large beside its width that the reading would turn back"
+            if p["offset"] <= -p["width"]
+            else ""
+        )
 
     def term(self, s, p):
         return p.offset * (1 + ca.tanh(2 * (s.value - p.position) / p.width)) / 2

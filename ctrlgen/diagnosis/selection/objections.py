@@ -55,8 +55,8 @@ def objections(
 def _outside_its_range(fit: Fit, k: int) -> str:
     """Why the numbers of cause k are not those of its law; empty where they are."""
     structure, cause = fit.structure, fit.structure.causes[k]
-    if cause.effect != PARAMETER and not cause.law.holds(fit.values(k)):
-        return "its numbers contradict one another"
+    if cause.effect != PARAMETER and (reason := cause.law.contradiction(fit.values(k))):
+        return reason
     for u, value in zip(structure.free_parameters, fit.theta, strict=True):
         if u.cause != k or not u.amplitude:
             continue
