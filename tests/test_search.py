@@ -292,3 +292,16 @@ def test_a_model_leaves_noise_alone_only_where_the_held_out_record_says_so_too()
     for change, alone in ((bent, False), (lambda y, u: y, True)):
         fitter = axis_fitter(change=change)
         assert scored(fitter, fitter.fit(Structure(AXIS))).errors.is_noise is alone
+
+
+@pytest.mark.parametrize("share, over", [(0.009, True), (0.011, False)])
+def test_nothing_matters_any_more_below_a_hundredth_of_the_mismatch(share, over):
+    """Of energy, on the held-out record, and only where more than noise is left."""
+    fitter = fitter_of()
+    nominal = trials_of(fitter).fit(Structure(AXIS))
+    mismatch = nominal.held_out.plain_mean * fitter.noise.floor**2 / share
+    rough = replace(nominal, errors=ErrorModel(fitter.noise, np.array([2 * NOISE]), np.array([5.0])))
+    smooth = replace(nominal, errors=ErrorModel.of_noise(fitter.noise))
+    assert ModelSelection(fitter, lambda *_: [], mismatch).nothing_left_matters(rough) is over
+    assert not ModelSelection(fitter, lambda *_: [], mismatch).nothing_left_matters(smooth)
+    assert not ModelSelection(fitter, lambda *_: []).nothing_left_matters(rough)

@@ -13,6 +13,7 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
 from ctrlgen.diagnosis.selection.verdict import EXPLAINED
+from ctrlgen.reporting.plots import draw_path
 
 INERTIA, WEIGHT, DAMPING, MOTOR = 2e-4, 0.02, 4e-4, 0.015
 STEP = 2e-3
@@ -254,3 +255,28 @@ def test_it_travels_between_processes_where_its_functions_do():
     drive = np.ones((50, 1))
     a, b = (ctrlgen.simulate(ctrlgen.build_model(d), drive, STEP).z for d in (device, other))
     assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    "axes, labels",
+    [(("rx",), ["time [s]", "rx [mrad]"]), (("rx", "ry"), ["rx [mrad]", "ry [mrad]"])],
+)
+def test_a_mirror_that_tilts_is_led_along_a_path_and_drawn_in_its_own_unit(tmp_path, axes, labels):
+    """k theta = k_m u: 1 V for each 7.5 mrad."""
+    device = ctrlgen.user_device(
+        "mirror",
+        parameters={"stiffness": ("2 N*m/rad", "0.1 N*m/rad"), "motor": ("15 mN*m/V", "1 mN*m/V")},
+        drive=dict.fromkeys(axes, "20 V"),
+        axes=dict.fromkeys(axes, "100 mrad"),
+        force=lambda u, p: [p.motor * getattr(u, axis) for axis in axes],
+        restoring_force=lambda d, p: [p.stiffness * getattr(d, axis) for axis in axes],
+    )
+    ends = (", ".join(f'{axis} = "{angle * (k + 1)} mrad"' for k, axis in enumerate(axes)) for angle in (0, 15))
+    path = '[path]\nkind = "line"\nstart = {{ {} }}\nend = {{ {} }}\n'.format(*ends)
+    file = tmp_path / "tilt.toml"
+    file.write_text(f'title = "tilt"\ndevice = "mirror"\nsample_rate = "1 kHz"\nduration = "0.1 s"\n{path}')
+    solution = ctrlgen.solve(ctrlgen.load_scenario(file, device), ctrlgen.build_model(device))
+    assert solution.drive[-1] == pytest.approx([2.0 * (k + 1) for k in range(len(axes))], rel=1e-6)
+    left, right = draw_path(solution).axes
+    assert [left.get_xlabel(), left.get_ylabel()] == labels and right.get_ylabel() == "modelled - commanded [urad]"
+    assert left.lines[0].get_ydata()[-1] == pytest.approx(15.0 * len(axes), rel=1e-6)

@@ -67,45 +67,45 @@ def draw_all(solution: Solution) -> dict[str, str]:
     return figures
 
 
+FINER = {"um": "nm", "mm": "um", "rad": "urad", "mrad": "urad", "urad": "nrad"}
+
+
 def draw_path(solution: Solution) -> Figure:
-    """The two translations that move most: commanded path, modelled samples, and the error over time."""
+    """Commanded path and modelled samples, and the error over time: the two channels of one unit that move most, one against the
+    other, or one over time where it is alone."""
     signal = solution.model.signals["pose"]
     reached, command = solution.trace.signals["pose"], solution.command
-    lengths = [i for i, unit in enumerate(signal.units) if unit == "um"]
-    first, second = sorted(sorted(lengths, key=lambda i: -np.ptp(command[:, i]))[:2])
+    time, closed = solution.trace.time, solution.scenario.closed
+    most = int(np.argmax(np.ptp(command, axis=0) / signal.scale))
+    unit = signal.units[most]
+    alike = [i for i, other in enumerate(signal.units) if other == unit]
+    shown = sorted(sorted(alike, key=lambda i: -np.ptp(command[:, i]))[:2])
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.9), width_ratios=(1, 1.15))
-    x, y = (from_si(command[:, i], "um") for i in (first, second))
-    left.plot(
-        np.append(x, x[0]) if solution.scenario.closed else x,
-        np.append(y, y[0]) if solution.scenario.closed else y,
-        color="#999999",
-        lw=3,
-        label="commanded",
-    )
-    step = max(1, len(command) // 40)
-    left.plot(
-        from_si(reached[::step, first], "um"),
-        from_si(reached[::step, second], "um"),
-        ".",
-        ms=5,
-        color=COLOURS[2],
-        label="modelled",
-    )
-    left.set_aspect("equal", adjustable="datalim")
-    left.set_xlabel(f"{signal.channels[first]} [um]")
-    left.set_ylabel(f"{signal.channels[second]} [um]")
-    left.legend(loc="center", fontsize=8)
-    time, tolerance = solution.trace.time, from_si(FEASIBILITY_TOLERANCE * signal.scale[lengths[0]], "nm")
-    for i, colour in zip(lengths, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
-        right.plot(
-            time, from_si(reached[:, i] - command[:, i], "um") * 1e3, color=colour, lw=1, label=signal.channels[i]
-        )
+
+    def drawn(values: np.ndarray, every: int = 1, close: bool = False) -> list[np.ndarray]:
+        """What the left axes show of a signal."""
+        columns = [from_si(values[::every, i], unit) for i in shown]
+        columns = [np.append(c, c[0]) for c in columns] if close else columns
+        return columns if len(columns) == 2 else [time[::every], *columns]
+
+    alone = len(shown) == 1
+    left.plot(*drawn(command, close=closed and not alone), color="#999999", lw=3, label="commanded")
+    left.plot(*drawn(reached, max(1, len(command) // 40)), ".", ms=5, color=COLOURS[2], label="modelled")
+    if not alone:
+        left.set_aspect("equal", adjustable="datalim")
+    left.set_xlabel("time [s]" if alone else f"{signal.channels[shown[0]]} [{unit}]")
+    left.set_ylabel(f"{signal.channels[shown[-1]]} [{unit}]")
+    left.legend(loc="center" if closed else "best", fontsize=8)
+    fine = FINER.get(unit, unit)
+    tolerance = from_si(FEASIBILITY_TOLERANCE * signal.scale[most], fine)
+    for i, colour in zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
+        right.plot(time, from_si(reached[:, i] - command[:, i], fine), color=colour, lw=1, label=signal.channels[i])
     right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0)
     span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
     right.set_ylim(-span, span)
     right.set_xlabel("time [s]")
-    right.set_ylabel("modelled - commanded [nm]")
-    right.set_title(f"grey: tolerance of {tolerance:g} nm", fontsize=8)
+    right.set_ylabel(f"modelled - commanded [{fine}]")
+    right.set_title(f"grey: tolerance of {tolerance:.3g} {fine}", fontsize=8)
     right.legend(fontsize=8, ncols=3, loc="upper right")
     return figure
 

@@ -179,6 +179,14 @@ class ModelSelection:
         gain = (before.held_out.plain_mean - after.held_out.plain_mean) * self.fitter.noise.floor**2
         return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch))
 
+    def nothing_left_matters(self, current: CandidateModel) -> bool:
+        """Whether no cause could take away a share of the mismatch that is worth a name: only one that leaves noise alone would
+        be accepted."""
+        if self.mismatch is None or current.errors.is_noise:
+            return False
+        left = current.held_out.plain_mean * self.fitter.noise.floor**2
+        return bool(np.all(left <= MODEL_SELECTION.least_share * self.mismatch))
+
     def unseen_in_held_out(self, candidate: CandidateModel) -> bool:
         """Whether the residual exceeds the noise on the records to fit, but not on the held-out records."""
         most = RESIDUAL_TESTS.error_ratio**2
