@@ -102,5 +102,5 @@ def test_a_path_for_a_stage_with_inertia_is_refused_before_anything_is_solved(tm
         '[path]\nkind = "line"\nend = { axis = "20 um" }\n'
     )
     scenario = load_scenario(file)
-    with pytest.raises(InputError, match="has inertia.*not be led along a path"):
+    with pytest.raises(InputError, match=r"has inertia.*not be led along a path"):
         scenario.command(build_model(scenario.device))
