@@ -44,8 +44,8 @@ def in_forks(
     """[function(item) ...] in the order of the items, in at most `jobs` forks; with one job or one item in this process.
 
     `begun` is called here as each item begins. Objects in `shared` that are parts of a result are not sent but are those of this
-    process. What `function` changes otherwise is lost with its fork. Raises what an item raises, the first in order;
-    RuntimeError where a fork dies.
+    process. What `function` changes otherwise is lost with its fork. Work whose fork dies, or whose result cannot be sent, is done
+    here. Raises what an item raises, the first in order.
     """
     if min(jobs, len(items)) < 2:
         results = []
@@ -59,7 +59,7 @@ def in_forks(
     os.close(give)
     context = multiprocessing.get_context("fork")
     workers: dict[Connection, Any] = {}
-    found: dict[int, tuple[bool, Any]] = {}
+    found: dict[int, tuple[bool, Any]] = {}  # whether it has a result, and the result or what was raised
     try:
         for _ in range(min(jobs, len(items))):
             receive, send = context.Pipe(duplex=False)
@@ -79,18 +79,19 @@ def in_forks(
                     continue
                 if message is None:
                     begun(items[k])
-                else:
+                elif message:
                     found[k] = _Unpickler(io.BytesIO(message), shared).load()
     finally:
         os.close(waiting)
         for worker in workers.values():
             worker.terminate()
-    if len(found) < len(items):
-        raise RuntimeError(f"{len(items) - len(found)} of {len(items)} pieces of work died with their process")
-    for k in range(len(items)):
-        if not found[k][0]:
-            raise found[k][1]
-    return [found[k][1] for k in range(len(items))]
+    results = []
+    for k, item in enumerate(items):
+        done, result = found[k] if k in found else (True, function(item))
+        if not done:
+            raise result
+        results.append(result)
+    return results
 
 
 def _work(
@@ -111,12 +112,12 @@ def _work(
 
 
 def _pickled(outcome: tuple[bool, Any], shared: Sequence[Any]) -> bytes:
+    """What is sent of an outcome; nothing where it cannot be."""
     file = io.BytesIO()
     try:
         _Pickler(file, shared).dump(outcome)
-    except Exception as error:  # pickle raises what the object's own code raises
-        file = io.BytesIO()
-        pickle.Pickler(file).dump((False, RuntimeError(f"a result cannot be sent: {error}")))
+    except Exception:  # pickle raises what the object's own code raises
+        return b""
     return file.getvalue()
 
 

@@ -39,7 +39,7 @@ class Compilable:
             return False
         self.seconds += seconds
         if self._code is None:
-            if self.seconds < 0.05:  # what never runs need not be written as C
+            if self.seconds < 0.2:  # what hardly runs need not be written as C
                 return False
             self._code = _c_of(self.function)
         price = len(self._code) * SECONDS_PER_CHARACTER

@@ -6,7 +6,7 @@ The nominal device is nested in every structure: an effect at its `off`, a numbe
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -65,6 +65,10 @@ class Structure:
     causes: tuple[Hypothesis, ...] = ()
     starts: tuple[dict[str, float], ...] = ()
     nominal_starts: dict[str, float] = field(default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Its fields: what is derived from them need not be sent to another process, and cannot be where a user wrote the device."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def with_cause(self, cause: Hypothesis, start: dict[str, float]) -> Structure:
         """The same with one cause more."""

@@ -179,6 +179,12 @@ class ModelSelection:
         gain = (before.held_out.plain_mean - after.held_out.plain_mean) * self.fitter.noise.floor**2
         return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch))
 
+    def contradicted(self, before: CandidateModel, after: CandidateModel) -> bool:
+        """Whether `after` predicts the held-out records worse than `before`, beyond chance."""
+        errors = self.reference((before, after))
+        lost = self.held_out_loss(after, errors) - self.held_out_loss(before, errors)
+        return lost > MODEL_SELECTION.largest_contradiction
+
     def nothing_left_matters(self, current: CandidateModel) -> bool:
         """Whether no cause could take away a share of the mismatch that is worth a name: only one that leaves noise alone would
         be accepted."""

@@ -57,4 +57,8 @@ def _needed(trials: Trials, bare: CandidateModel, current: CandidateModel) -> bo
     compare = trials.selection
     if current.errors.is_noise:
         return compare.improves_enough(bare, current)
-    return compare.advantage(current, bare) > 0 and compare.matters(bare, current)
+    return (
+        compare.advantage(current, bare) > 0
+        and compare.matters(bare, current)
+        and not compare.contradicted(bare, current)
+    )

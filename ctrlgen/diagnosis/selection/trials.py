@@ -77,8 +77,9 @@ class Trials:
         def work(item: Item) -> tuple[Result, _Learnt]:
             branch = copy.copy(self)
             branch.jobs, branch.step = 1, (lambda _: None)
-            # a compiled simulator expands about the numbers of the structure that was first in need of it
-            branch.fitter = replace(self.fitter, cache=dict(self.fitter.cache))
+            if any(simulator.model.inertial for simulator in self.fitter.cache.values()):
+                # steps in time are expanded about the numbers of the structure that was first in need of them
+                branch.fitter = replace(self.fitter, cache=dict(self.fitter.cache))
             branch.fitted, branch.screens, branch.refused, branch.failed = dict(self.fitted), dict(self.screens), [], []
             result = function(branch, item)
             new = {key: value for key, value in branch.fitted.items() if self.fitted.get(key) is not value}
