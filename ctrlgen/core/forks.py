@@ -89,7 +89,7 @@ def in_forks(
     for k, item in enumerate(items):
         done, result = found[k] if k in found else (True, function(item))
         if not done:
-            raise result
+            raise cast(Exception, result)
         results.append(result)
     return results
 
