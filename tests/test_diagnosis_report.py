@@ -348,8 +348,8 @@ def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path
     assert json.loads((tmp_path / "next" / "diagnosis.json").read_text())["verdict"] == CONSISTENT
 
 
-@pytest.mark.parametrize("where", [("--jobs", 2), ("--scheduler", "tcp://nowhere:1")])
-def test_a_place_for_replicates_that_nobody_asked_for_is_refused(creeping, tmp_path, capsys, where):
+def test_a_place_for_replicates_that_nobody_asked_for_is_refused(creeping, tmp_path, capsys):
+    where = "--scheduler", "tcp://nowhere:1"
     assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path / "out", *where) == 2
     assert "--bootstrap" in capsys.readouterr().err and not (tmp_path / "out").exists()
 

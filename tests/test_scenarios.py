@@ -10,7 +10,7 @@ import pytest
 from conftest import SCENARIOS
 from result_files import faults
 
-from ctrlgen import InputError, Unreachable, build_model, load_scenario, run
+from ctrlgen import InputError, Unreachable, build_model, load_scenario, run, solve
 from ctrlgen.trajectory.metrics import expectations, metric
 
 ALL = sorted(path.parent.name for path in SCENARIOS.glob("*/scenario.toml"))
@@ -103,4 +103,4 @@ def test_a_path_for_a_stage_with_inertia_is_refused_before_anything_is_solved(tm
     )
     scenario = load_scenario(file)
     with pytest.raises(InputError, match=r"has inertia.*not be led along a path"):
-        scenario.command(build_model(scenario.device))
+        solve(scenario, build_model(scenario.device))

@@ -122,12 +122,6 @@ class Scenario:
 
     def command(self, model: Model) -> np.ndarray:
         """The commanded samples (n, channels) of the followed signal, SI. Raises InputError."""
-        if model.inertial:
-            what = (
-                f"{self.device.name} has inertia: it can be simulated and diagnosed, but not be led along a path yet; "
-                "name a device that is in balance at every moment"
-            )
-            raise InputError(self.path, [Fault("device", what)])
         signal = model.signals[self.file.follow]
         frame = Frame(signal.channels, signal.units)
         path = self.file.path

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.core.errors import SolverError
+from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, infeasibility_error
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.scenario import Scenario
 
+INERTIA = "has inertia: it can be simulated, diagnosed and exported as a plant, but not be led along a path yet"
 BROKEN = 1e-7  # of a limit: an excess below is what IPOPT's relaxed bounds (1e-8) may leave
 
 
@@ -54,11 +55,15 @@ class Solution:
 
 
 def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
-    """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where IPOPT fails.
+    """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where IPOPT fails, and
+    InputError for a device with inertia.
 
     Composite limits (stress, rotation) are left out at first; those that the solution breaks are added and the problem is
     solved again. An optimum without them that keeps all of them is the optimum with them. `progress` is called before each.
     """
+    if model.inertial:
+        what = f"{model.name} {INERTIA}; name a device that is in balance at every moment"
+        raise InputError(scenario.path, [Fault("device", what)])
     command = scenario.command(model)
     programme = TrajectoryProgramme(model, scenario, command)
     rows: list[Limit] = []

@@ -22,6 +22,7 @@ from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.schema import FILE as RECORDING
 from ctrlgen.trajectory.paths import Frame
 from ctrlgen.trajectory.scenario import load_scenario
+from ctrlgen.trajectory.solution import INERTIA
 
 
 @app.command()
@@ -55,8 +56,11 @@ def check(
         return
     if file.is_dir() or "kind" not in read_toml(file):
         scenario = load_scenario(file)
-        count = len(scenario.command(build_model(scenario.device)))
+        model = build_model(scenario.device)
+        count = len(scenario.command(model))
         out.print(f"{scenario.file.title}: {count} samples, device {scenario.device.name}", markup=False)
+        if model.inertial:
+            out.print(f"{scenario.device.name} {INERTIA}", markup=False)
         return
     device = load_device(file)
     model = build_model(device)
