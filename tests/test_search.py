@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, axis_fitter, fitter_of, move, played
+from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, fitter_of, move, played
 from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewhere
-from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.rivals import replace_cause
 from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
@@ -280,28 +280,3 @@ def test_fringes_as_short_as_the_steps_of_a_reading_are_its_rounding(steps, told
     against = objections(fitter.recording, fit)
     assert against == ({} if told else {0: "it repeats with the steps of the reading"})
     assert objections(fitter.recording, fit, accepted=(fringe,)) == {}
-
-
-def test_a_model_leaves_noise_alone_only_where_the_held_out_record_says_so_too():
-    """A scale that is bent in the held-out record alone, by four noises at its ends: no number of the device can take that."""
-
-    def bent(y, u):
-        held_out = np.ptp(u) < 3.0
-        return y + 4 * NOISE * (y / np.max(np.abs(y))) ** 2 * held_out
-
-    for change, alone in ((bent, False), (lambda y, u: y, True)):
-        fitter = axis_fitter(change=change)
-        assert scored(fitter, fitter.fit(Structure(AXIS))).errors.is_noise is alone
-
-
-@pytest.mark.parametrize("share, over", [(0.009, True), (0.011, False)])
-def test_nothing_matters_any_more_below_a_hundredth_of_the_mismatch(share, over):
-    """Of energy, on the held-out record, and only where more than noise is left."""
-    fitter = fitter_of()
-    nominal = trials_of(fitter).fit(Structure(AXIS))
-    mismatch = nominal.held_out.plain_mean * fitter.noise.floor**2 / share
-    rough = replace(nominal, errors=ErrorModel(fitter.noise, np.array([2 * NOISE]), np.array([5.0])))
-    smooth = replace(nominal, errors=ErrorModel.of_noise(fitter.noise))
-    assert ModelSelection(fitter, lambda *_: [], mismatch).nothing_left_matters(rough) is over
-    assert not ModelSelection(fitter, lambda *_: [], mismatch).nothing_left_matters(smooth)
-    assert not ModelSelection(fitter, lambda *_: []).nothing_left_matters(rough)

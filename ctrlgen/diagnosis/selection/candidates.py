@@ -18,15 +18,12 @@ from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 
 
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
-    """All that is tried beside `current`, the promising ones fitted to their end. Where no cause could matter any more, single
-    causes alone are tried: one may leave noise."""
+    """All that is tried beside `current`, the promising ones fitted to their end."""
 
     def in_other_shapes(own: Trials, t: CandidateModel) -> CandidateModel:
         return t if current.errors.is_noise else restart_elsewhere(own, t, current, screened)
 
     found = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
-    if trials.selection.nothing_left_matters(current):
-        return _converge_promising(trials, current, found)
     found = (*found, *fit_other_clocks(trials, current, found))
     if trials.selection.parameters_may_mask_cause(current.fit):
         found = (*found, *_as_stated(trials, current))

@@ -29,22 +29,19 @@ from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT, MODEL_SELECTION, RES
 
 
 def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> CandidateModel:
-    """The candidate model of a fit, with what it leaves on the records to fit and on the held-out records.
-
-    It leaves noise alone where both kinds of records say so: few records to fit may hide by their parameters what the held-out
-    ones show.
-    """
-    noise, records, unseen = fitter.noise, fitter.fit_records, fitter.held_out_records
+    """The candidate model of a fit, with what it leaves on the records to fit and on the held-out records."""
+    records = fitter.fit_records
     left = [np.nan_to_num(r.observed - fitter.predict(fit, r), nan=1e150) for r in records]
-    apart = [r.observed - fitter.predict(fit, r) for r in unseen]
-    errors, penalty = error_model(noise, records, left), 0.0
-    if errors.is_noise and noise.known.all():
+    errors = error_model(fitter.noise, records, left)
+    held, penalty = fit, 0.0
+    if errors.is_noise and fitter.noise.known.all():
         refit = refit_to_held_out(fitter, fit, HELD_OUT_REFIT.max_steps)
-        again = [r.observed - fitter.predict(refit.fit, r) for r in unseen]
-        errors = error_model(noise, (*records, *unseen), (*left, *(np.nan_to_num(e, nan=1e150) for e in again)))
-        if errors.is_noise:
-            apart, penalty = again, refit.penalty + refit.log_det
-    return CandidateModel(fit, errors, misfit(noise, records, left), misfit(noise, unseen, apart), penalty, cause)
+        held, penalty = refit.fit, refit.penalty + refit.log_det
+    unseen = fitter.held_out_records
+    apart = [r.observed - fitter.predict(held, r) for r in unseen]
+    return CandidateModel(
+        fit, errors, misfit(fitter.noise, records, left), misfit(fitter.noise, unseen, apart), penalty, cause
+    )
 
 
 class ModelSelection:
@@ -184,14 +181,6 @@ class ModelSelection:
         errors = self.reference((before, after))
         lost = self.held_out_loss(after, errors) - self.held_out_loss(before, errors)
         return lost > MODEL_SELECTION.largest_contradiction
-
-    def nothing_left_matters(self, current: CandidateModel) -> bool:
-        """Whether no cause could take away a share of the mismatch that is worth a name: only one that leaves noise alone would
-        be accepted."""
-        if self.mismatch is None or current.errors.is_noise:
-            return False
-        left = current.held_out.plain_mean * self.fitter.noise.floor**2
-        return bool(np.all(left <= MODEL_SELECTION.least_share * self.mismatch))
 
     def unseen_in_held_out(self, candidate: CandidateModel) -> bool:
         """Whether the residual exceeds the noise on the records to fit, but not on the held-out records."""
