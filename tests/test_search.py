@@ -280,3 +280,14 @@ def test_fringes_as_short_as_the_steps_of_a_reading_are_its_rounding(steps, told
     against = objections(fitter.recording, fit)
     assert against == ({} if told else {0: "it repeats with the steps of the reading"})
     assert objections(fitter.recording, fit, accepted=(fringe,)) == {}
+
+
+@pytest.mark.parametrize("lost, contradicted", [(4.1, True), (3.9, False), (-4.1, False)])
+def test_held_out_records_contradict_a_cause_beyond_two_standard_deviations(lost, contradicted):
+    """z^2 = 4, and only where the model with the cause predicts worse than the one without."""
+    fitter = fitter_of()
+    without = trials_of(fitter).fit(Structure(AXIS))
+    beside = replace(without)
+    compare = ModelSelection(fitter, lambda *_: [])
+    compare.held_out_loss = lambda t, errors: 100.0 + lost * (t is beside)
+    assert compare.contradicted(without, beside) is contradicted

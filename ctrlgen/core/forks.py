@@ -3,7 +3,7 @@
     results = in_forks(function, items, jobs=2)
 
 For many short pieces of work on large objects that cannot be sent, such as compiled models. Longer work that can be sent is
-for `ctrlgen.core.parallel`, which also survives the death of a worker.
+for `ctrlgen.core.parallel`.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ INDEX_BYTES = 4
 
 
 def usable_cores() -> int:
-    """Processes that one diagnosis may use: the variable CTRLGEN_JOBS, else one per core; 1 where processes cannot be forked, and
-    in a process that is itself a worker."""
-    if not hasattr(os, "fork") or sys.platform == "darwin" or multiprocessing.parent_process() is not None:
-        return 1  # system libraries of macOS do not survive a fork
+    """Processes that one diagnosis may use: the variable CTRLGEN_JOBS, else one per core; 1 on other systems than Linux, and in a
+    process that is itself a worker."""
+    if not sys.platform.startswith("linux") or multiprocessing.parent_process() is not None:
+        return 1  # Windows has no fork, and system libraries of macOS do not survive one
     given = os.environ.get(JOBS_VARIABLE, "")
     return max(int(given), 1) if given.isdecimal() else len(os.sched_getaffinity(0))
 
@@ -74,7 +74,7 @@ def in_forks(
             for receive in cast(list[Connection], wait(list(workers))):
                 try:
                     k, message = receive.recv()
-                except EOFError:
+                except (EOFError, OSError):  # it ended, or was killed while it sent
                     workers.pop(receive).join()
                     continue
                 if message is None:
