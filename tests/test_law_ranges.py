@@ -54,6 +54,7 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
             "level",
             "linear",
             "taper",
+            "reversible",
             "skew",
         )
         assert either or p.bounds[0] >= 0.0

@@ -139,7 +139,10 @@ LAWS = {
         lambda s, p: {"z": (s.velocity - abs(s.velocity) * s.z) / 0.02, "w": abs(s.velocity) * (1 - s.w) / 0.02},
     ),
     "displacement_bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.share * s.z),
-    "displacement_hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.share * weighted(s, p, s.value)),
+    "displacement_hysteresis": (
+        {"reach": 0.3, "taper": 0.5, "reversible": 0.7},
+        lambda s, p: -p.share * (weighted(s, p, s.value) - 0.7 * s.value),
+    ),
     "drive_offset": ({}, lambda s, p: p.offset),
     "end_stop": ({"gap": -0.4, "power": 1.5}, stop),
     "expansion": ({}, lambda s, p: p.slope * (s.state - s.rest) * s.value),

@@ -5,11 +5,12 @@ from ctrlgen.effects._play_operators import play_states, updated_plays, weighted
 
 
 class DisplacementHysteresis(Effect):
-    """Delta d = g (sum_j w_j P_j - d), j = 1..8: P_j is the play of d with radius r j/8, w_j ~ j^-q, sum w_j = 1.
+    """Delta d = g (sum_j w_j P_j - d + k d), j = 1..8: P_j is the play of d with radius r j/8, w_j ~ j^-q, sum w_j = 1.
 
     Prandtl-Ishlinskii with play operators, rate-independent; in a set of poses the memory goes from pose to pose in their
-    order. g < 0 leads, as behind a controller that overcompensates. Holds for congruent loops, behind the stage: what
-    lags in its guide is the force `hysteresis`.
+    order. The operator's own reversible part k decides where the loop leaves the gain as it is: k = 0 where all plays follow, 1
+    at small motions, where none does. g < 0 leads, as behind a controller that overcompensates. Holds for congruent loops,
+    behind the stage: what lags in its guide is the force `hysteresis`.
     """
 
     place = Place.DISPLACEMENT
@@ -20,11 +21,12 @@ class DisplacementHysteresis(Effect):
         Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0),
         Param("reach", "travel", (1e-4, 10.0), "r: travel after which all plays follow"),
         Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
+        Param("reversible", "1", (-3.0, 3.0), "k: reversible displacement over the share that lags"),
     )
     states = play_states("travel")
 
     def term(self, s, p):
-        return -p.share * weighted_lag(s, s.value, p.reach, p.taper)
+        return -p.share * (weighted_lag(s, s.value, p.reach, p.taper) - p.reversible * s.value)
 
     def update(self, s, p):
         return updated_plays(s, [s.value], p.reach)

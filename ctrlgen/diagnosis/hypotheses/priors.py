@@ -335,7 +335,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         _HYSTERESIS,
         model_form_error=0.02,
         family="hysteresis",
-        parameters={"reach": _peaks(0.03, 0.1, 0.3, 1.0), "taper": _starts((0.5,))},
+        parameters={"reach": _peaks(0.03, 0.1, 0.3, 1.0), "taper": _starts((0.5,)), "reversible": _starts((0.0, 1.0))},
     ),
     "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
     "lever_ratio": LawPrior(
