@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis
 from ctrlgen.diagnosis.selection import score_gradient as slopes_module
+from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -65,12 +66,9 @@ def brute(slopes, start):
     after, _ = r.simulate_states(record, slopes.p, start)
     before = np.vstack([r.starting_state(record, slopes.p, start), after[:-1]])
     F_S, F_p, H_S, H_p = slopes.linear.evaluate_along(before, *r.inputs(record))
-    step, memory, f, ends = slopes.laws.compiled(slopes.p), slopes.laws.start(record.time[0]), [], []
-    for k in range(N):
-        memory, term, end = step(memory, before[k], record.drive[k], 0.0, after[k])
-        f.append([*term.full().ravel(), *slopes.sizes])
-        ends.append(end.full().ravel())
-    f = np.array(f)
+    motion = (before, record.drive, np.zeros((N, 1)), after)
+    _, f, ends = slopes.laws.along(slopes.p, slopes.laws.start(record.time[0]), *motion)
+    f = np.hstack([f, np.tile(slopes.sizes, (N, 1))])
     following = np.vstack([f[1:], f[-1:]])
     following[:, slopes.laws.driven] = ends
     mean = (f + following) / 2
@@ -89,7 +87,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
     monkeypatch.setattr(slopes_module, "CANDIDATE_TERMS", replace(CANDIDATE_TERMS, block=123))
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = ScoreGradient(hexapod, fit, record, LAWS, shows_nothing)
+    slopes = ScoreGradient(hexapod, fit, record, LAWS, shows_nothing, LawTerms(record.timing))
     white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
     found = slopes.sums(white, J, fit.initial_states[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
@@ -113,7 +111,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = ScoreGradient(hexapod, fit, record, [law], shows_nothing)
+    slopes = ScoreGradient(hexapod, fit, record, [law], shows_nothing, LawTerms(record.timing))
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
     slope = brute(slopes, start)[:, :, -1]
@@ -140,7 +138,7 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
     )  # fmt: skip
     fitter = Fitter(replace(hexapod.recording, kind="poses", records=records), hexapod.noise)
     fit = fitter.fit(Structure(HEXAPOD), steps=0)
-    slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing)
+    slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing, LawTerms(records[0].timing))
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     lost = np.zeros(len(slopes.laws.terms) + len(slopes.sizes), bool)
     blocks = [list(readings) for _, _, readings in slopes.blocks(start, lost)]
@@ -155,6 +153,24 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
     ends = [simulator.simulate(records[0], np.array([off + share * column.size])) for share in (0.01, 0.0)]
     apart = (ends[0] - ends[1]) / 0.01
     assert np.linalg.norm(slope - apart) < 0.04 * np.linalg.norm(apart)
+
+
+def test_terms_written_down_for_one_structure_serve_another(hexapod):
+    """What a law reads differs between structures: before the gain of 1Y its heater is told something else than after it."""
+    record, kept = hexapod.fit_records[0], LawTerms(hexapod.fit_records[0].timing)
+    structures = [Structure(HEXAPOD), Structure(HEXAPOD).with_cause(LAWS[3], {"gain": 0.2})]
+    lag = Hypothesis("second_pole", "actuator:1Y", "1Y")
+    found = []
+    for structure in structures:
+        fit = hexapod.fit(structure, steps=0)
+        white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
+        for laws in (kept, LawTerms(record.timing)):
+            slopes = ScoreGradient(hexapod, fit, record, [*LAWS[:3], lag], shows_nothing, laws)
+            found.append(slopes.sums(white, J, fit.initial_states[0]))
+    first, same, second, alike = (np.sqrt(np.diag(sums.SS)) for sums in found)
+    assert np.array_equal(found[0].SS, found[1].SS)
+    assert np.allclose(second, alike, rtol=1e-12)
+    assert np.abs(second / first - 1)[-1] > 0.1  # the lag takes what the gain has made of the command
 
 
 def test_groups_carry_only_what_enters_them():

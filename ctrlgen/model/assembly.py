@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -92,10 +92,12 @@ def _assemble(
 ) -> Model:
     """The model of `device` with the parameters `free` as symbols: the one place where a Model is made."""
     nominal = dict(device.quantities())
-    symbols = {path: ca.SX.sym(path) for path in free}
+    own_symbols, physics = _physics(
+        device.model_copy(update={"effect": ()}), tuple(path for path in free if not path.startswith("effect["))
+    )
+    symbols = {path: own_symbols[path] if path in own_symbols else ca.SX.sym(path) for path in free}
     values = device.values(symbols)
     p, p_nominal = ca.vertcat(NONE, *symbols.values()), np.array([nominal[path].si for path in free])
-    physics = device.physics(values)
     n = len(physics.axes)
     inertial = isinstance(physics, InertialPhysics)
     z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n if inertial else 0), ca.SX.sym("a", n if inertial else 0)
@@ -176,6 +178,13 @@ def _assemble(
         u_scale=np.array(physics.drive.scale),
         force_scale=physics.force_scale,
     )  # fmt: skip
+
+
+@lru_cache(maxsize=16)  # a diagnosis builds hundreds of models of one device, each with other effects
+def _physics(without_effects: Device, free: tuple[str, ...]) -> tuple[dict[str, ca.SX], DevicePhysics]:
+    """The symbols of the numbers `free` and the physics with them; models of one device share both."""
+    symbols = {path: ca.SX.sym(path) for path in free}
+    return symbols, without_effects.physics(without_effects.values(symbols))
 
 
 def _balanced(physics: BalancedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:

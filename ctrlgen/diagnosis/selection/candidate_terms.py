@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -18,10 +17,9 @@ from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import DataHints, Hypothesis, nominal_physics
-from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
+from ctrlgen.diagnosis.selection.law_terms import CompiledTerms, LawTerm, LawTerms, SignalsRead
 from ctrlgen.effects import Effect, Place
 from ctrlgen.model.effect_terms import channels
-from ctrlgen.numerics.phi_functions import lag_increment, phi_matrices
 
 UNUSABLE = (CtrlgenError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
 """What a law that cannot be written down at a place may end with."""
@@ -70,21 +68,6 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Term:
-    """One law at one place: its `value`, by its amplitude `a` around `off` in steps of `size`, with its states' symbols,
-    `rates` and new values (`stepped`, None where a state is not)."""
-
-    value: ca.SX
-    a: ca.SX
-    off: float
-    size: float
-    states: list[ca.SX]
-    rates: list[ca.SX]
-    stepped: list[ca.SX | None]
-    clocks: list[bool]
-
-
 class CandidateTerms:
     """The terms of `hypotheses` on the motions of `simulator`, and one column for every choice of shape.
 
@@ -92,12 +75,12 @@ class CandidateTerms:
     """
 
     def __init__(
-        self, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
+        self, laws: LawTerms, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
         probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], DataHints],
     ) -> None:  # fmt: skip
-        self.simulator = simulator
-        self.terms: list[_Term] = []
-        self._known: dict[tuple, int] = {}
+        self.laws, self.simulator = laws, simulator
+        self.terms: list[LawTerm] = []
+        self._places: dict[LawTerm, int] = {}  # in `terms`
         self.columns: list[CandidateTerm] = []
         self.unusable: dict[Hypothesis, str] = {}
         for h in hypotheses:
@@ -137,84 +120,58 @@ class CandidateTerms:
     def _term(
         self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float, finite: float
     ) -> int:
-        """The slope at `off`, or from there to the amplitude `finite`."""
-        key = (law.kind, i, partner, tuple(shape.items()), off, size, finite)
-        if key not in self._known:
-            states = {s.name: ca.SX.sym(f"m{len(self.terms)}_{s.name}") for s in law.states}
-            a = ca.SX.sym("a")
-            p = SimpleNamespace(**shape, **{law.amplitude().name: a})
-            s = self.simulator.model.law_inputs(law.place, i, partner, states, law.order)
-            new = law.after_sample(s, p)
-            s.__dict__.update(new)
-            change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
-            self._known[key] = len(self.terms)
-            at = finite or off
-            rates = [ca.substitute(ca.SX(change[state.name]), a, at) for state in law.states]
-            stepped = [ca.substitute(ca.SX(new[state.name]), a, at) if state.stepped else None for state in law.states]
-            clocks = [state.clock for state in law.states]
-            value = ca.SX(law.term(s, p))
-            if finite:
-                value = ca.substitute(value, a, finite) * (a - off) / (finite - off)
-            self.terms.append(_Term(value, a, off, size, list(states.values()), rates, stepped, clocks))
-        return self._known[key]
+        """The place in `terms` of the slope at `off`, or from there to the amplitude `finite`."""
+        term = self.laws.term(self.simulator.model, law, i, partner, shape, off, size, finite)
+        if term not in self._places:
+            self._places[term] = len(self.terms)
+            self.terms.append(term)
+        return self._places[term]
 
-    def start(self, time: float) -> np.ndarray:
-        """The laws' states before the first sample, at `time` [s]: zero, but for clocks."""
-        clocks = [clock for term in self.terms for clock in term.clocks]
-        return np.where(clocks, time if np.isfinite(self.simulator.sample_time) else 0.0, 0.0)
+    @cached_property
+    def groups(self) -> list[tuple[list[int], CompiledTerms]]:
+        """The terms kind by kind: their places in `terms`, and their functions."""
+        kinds: dict[str, list[int]] = {}
+        for k, term in enumerate(self.terms):
+            kinds.setdefault(term.kind, []).append(k)
+        return [
+            (own, self.laws.compiled([self.terms[k] for k in own], [k in self.driven for k in own]))
+            for own in kinds.values()
+        ]
+
+    @cached_property
+    def signals(self) -> SignalsRead:
+        """What the laws read."""
+        return SignalsRead(self.simulator, self.laws.symbols)
 
     @cached_property
     def driven(self) -> list[int]:
         """The terms that jump with a drive which is held from sample to sample."""
-        m = self.simulator.model
         if self.simulator.linear or self.simulator.poses:
             return []
-        jumping = ca.vertcat(m.u, m.held, m.heat)
-        return [k for k, term in enumerate(self.terms) if ca.depends_on(ca.jacobian(term.value, term.a), jumping)]
+        jumping = self.signals.jumping
+        return [k for k, term in enumerate(self.terms) if term.reads & jumping]
 
-    def compiled(self, p: np.ndarray) -> ca.Function:
-        """(memory, S, u, ambient, S one sample on) -> (memory after the sample, every dterm/damplitude * size, that of the
-        `driven` terms at the end of the sample), with the numbers `p`.
+    def start(self, time: float) -> list[np.ndarray]:
+        """The laws' states before the first sample, group by group, at `time` [s]: zero, but for clocks."""
+        begin = time if np.isfinite(self.simulator.sample_time) else 0.0
+        clocks = ([clock for k in own for clock in self.terms[k].clocks] for own, _ in self.groups)
+        return [np.where(np.array(each, bool), begin, 0.0) for each in clocks]
+
+    def along(
+        self, p: np.ndarray, memories: list[np.ndarray], *motion: np.ndarray
+    ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+        """Memories after each of n samples, group by group, every dterm/damplitude * size (n, terms) and that of the `driven` terms
+        at the end of each sample, with the numbers `p`; `motion` is S (n, n_s), u, the surroundings, and S one sample on.
 
         A pose is read with the memories at the end of its dwell.
         """
-        m = self.simulator.model
-        memory = ca.vertcat(ca.SX(0, 1), *(s for term in self.terms for s in term.states))
-        after = m.closed(ca.vertcat(ca.SX(0, 1), *(value for term in self.terms for value in self._after(term))))
-        found = end = ca.SX(0, 1)
-        S, S_next = ca.vertcat(m.x, m.z), ca.SX.sym("S_next", m.x.numel() + m.z.numel())
-        if self.terms:  # each term depends on its own amplitude alone: one derivative of all of them
-            a, offs = ca.vertcat(*(t.a for t in self.terms)), ca.DM([t.off for t in self.terms])
-            every = ca.vertcat(*(t.value for t in self.terms))
-            open_ = ca.substitute(ca.jtimes(every, a, ca.DM([t.size for t in self.terms])), a, offs)
-            found = m.closed(open_)
-            if self.driven:  # the drive stays as the sample began
-                (end,) = ca.substitute([open_[self.driven]], [memory, S], [after, S_next])
-                end = m.closed(end)
-        if self.simulator.poses:
-            found = ca.substitute(found, memory, after)
-        given = [memory, S, m.u, self.simulator.ambient, S_next]
-        general = ca.Function("general", [*given, m.p], [after, found, end])
-        return ca.Function("laws", given, [ca.densify(value) for value in general(*given, p)], {"cse": True})
-
-    def _after(self, term: _Term) -> list[ca.SX]:
-        """The states of one law after a sample: linear ones exactly, stepped ones by their update."""
-        if not term.states:
-            return []
-        h = self.simulator.sample_time
-        settled = not np.isfinite(h)
-        h = CANDIDATE_TERMS.settled_time if settled else h
-        memory, rates = ca.vertcat(*term.states), ca.vertcat(*term.rates)
-        A = ca.jacobian(rates, memory)
-        if not ca.symvar(A):
-            step = h * ca.DM(phi_matrices(h * ca.DM(A).full(), 1)[1]) @ rates
-        elif A.sparsity().is_diag():
-            step = lag_increment(ca.diag(A), [rates], h)
-        else:
-            step = h * rates
-        return [
-            new if new is not None else state + (1.0 if settled else h) if clock else state + change
-            for state, new, clock, change in zip(
-                term.states, term.stepped, term.clocks, ca.vertsplit(step), strict=True
-            )
-        ]
+        n = len(motion[0])
+        found, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
+        read, at_end = self.signals.along(p, *motion)
+        after = []
+        for (own, group), memory in zip(self.groups, memories, strict=True):
+            rows = self.signals.columns(group.reads)
+            states, found[:, own], jumped = group.along(memory, read[:, rows], at_end[:, rows])
+            ends[:, [k for k in own if k in self.driven]] = jumped
+            after.append(states)
+        return after, found, ends[:, self.driven]

@@ -16,10 +16,10 @@ from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, CandidateTerms
+from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
-from ctrlgen.numerics.batched_evaluation import evaluate
 from ctrlgen.recordings.recording import Record
 
 
@@ -52,6 +52,7 @@ class ScoreGradient:
         record: Record,
         hypotheses: list[Hypothesis],
         seen: Callable[[Place, int], DataHints],
+        laws: LawTerms,
     ) -> None:
         self.fitter, self.record = fitter, record
         probed, probes = with_disturbance_inputs(
@@ -70,7 +71,7 @@ class ScoreGradient:
         self.p[len(known) + len(number_paths) :] = 0.0
         entered = {where: free.index(path) for where, path in probes.items()}
         others = [h for h in hypotheses if h.effect != PARAMETER]
-        self.laws = CandidateTerms(self.simulator, fit.structure, others, entered, seen)
+        self.laws = CandidateTerms(laws, self.simulator, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]
         self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
         self.columns = list(self.laws.columns)
@@ -122,13 +123,12 @@ class ScoreGradient:
         inputs = (before, *r.inputs(record))
         seen = (before if series else after, record.drive, inputs[3], after)
         size = min(CANDIDATE_TERMS.block, n)
-        laws = self.laws.compiled(self.p).mapaccum(size + 1)
         memory = self.laws.start(record.time[0])
         for a in range(0, n, size):
             here = np.minimum(np.arange(a, a + size + 1), n - 1)  # the last block is filled up
             k = min(size, n - a)
-            memories, found, ends = evaluate(laws, memory, *(x[here] for x in seen))
-            memory = memories[size - 1]
+            memories, found, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
+            memory = [states[size - 1] for states in memories]
             if a + k == n:
                 found[k:] = found[k - 1]
             found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])

@@ -19,6 +19,7 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks
+from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums
 from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
@@ -26,6 +27,7 @@ from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
+from ctrlgen.recordings.recording import Timing
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,7 @@ class Screen:
     def __init__(self, fitter: Fitter, hypotheses: list[Hypothesis], seed: int = 0) -> None:
         self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
         self.peaks: Peaks | None = None
+        self.laws: dict[Timing, LawTerms] = {}
 
     def run(self, fit: Fit, dropped: dict[Hypothesis, str] | None = None) -> Screened:
         """All hypotheses that the fit does not contain yet, without those `dropped`, any whose law cannot be evaluated, and offsets
@@ -70,7 +73,8 @@ class Screen:
         for record, start in zip(
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
         ):
-            slopes = ScoreGradient(self.fitter, fit, record, open_, seen)
+            laws = self.laws.setdefault(record.timing, LawTerms(record.timing))
+            slopes = ScoreGradient(self.fitter, fit, record, open_, seen, laws)
             if slopes.laws.unusable:  # the columns must be the same on every record
                 return self.run(fit, dropped | slopes.laws.unusable)
             columns = slopes.columns
