@@ -167,7 +167,7 @@ def test_terms_written_down_for_one_structure_serve_another(hexapod):
         for laws in (kept, LawTerms(record.timing)):
             slopes = ScoreGradient(hexapod, fit, record, [*LAWS[:3], lag], shows_nothing, laws)
             found.append(slopes.sums(white, J, fit.initial_states[0]))
-    first, same, second, alike = (np.sqrt(np.diag(sums.SS)) for sums in found)
+    first, _, second, alike = (np.sqrt(np.diag(sums.SS)) for sums in found)
     assert np.array_equal(found[0].SS, found[1].SS)
     assert np.allclose(second, alike, rtol=1e-12)
     assert np.abs(second / first - 1)[-1] > 0.1  # the lag takes what the gain has made of the command
