@@ -137,7 +137,7 @@ def test_an_earlier_result_is_replaced_whole_and_kept_when_the_next_run_fails(sc
 
 def test_unreachable_says_which_actuator_by_how_much_and_what_is_nearest(tmp_path):
     done = ctrlgen("run", SCENARIOS / "unreachable", "--out", tmp_path / "out")
-    refused(done, "actuator 2X: needs -5 um", "only pushes", "nearest reachable")
+    refused(done, "actuator 2X: needs -5 um", "only pushes", "nearest pose")
     assert not (tmp_path / "out").exists()
 
 
@@ -279,6 +279,18 @@ def test_check_tells_what_a_file_describes():
     assert "6 actuators" in ctrlgen("check", DEVICE).stdout
     assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20").stdout
     assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20" / "scenario.toml").stdout
+    assert "can be followed within every limit" in ctrlgen("check", SCENARIOS / "circle20").stdout
+    assert "as expected: cannot follow 1 of 1 samples" in ctrlgen("check", SCENARIOS / "unreachable").stdout
+
+
+def test_check_explains_a_path_that_cannot_be_followed_and_a_duration_that_is_no_number_of_samples(tmp_path):
+    text = (SCENARIOS / "circle20" / "scenario.toml").read_text().replace("../devices/mems_hexapod.toml", str(DEVICE))
+    (tmp_path / "scenario.toml").write_text(text.replace('centre = { delta_z = "20 um" }', ""))
+    ended = ctrlgen("check", tmp_path)
+    assert ended.returncode == 1 and "the actuator only pushes" in ended.stderr and "shifted by delta_z" in ended.stderr
+    (tmp_path / "scenario.toml").write_text(text.replace('duration = "1 s"', 'duration = "1.0005 s"'))
+    ended = ctrlgen("check", tmp_path)
+    assert ended.returncode == 1 and 'write duration = "1 s" or "1.001 s"' in ended.stderr
 
 
 @pytest.mark.parametrize("suffix", ["svg", "png"])

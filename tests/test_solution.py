@@ -61,7 +61,7 @@ def test_a_limit_that_the_relaxed_solution_breaks_is_added(scenario):
     s = scenario('[path]\nkind = "poses"\npoints = [{ theta_y = "-4.1 mrad", delta_z = "30 um" }]\n')
     with pytest.raises(Unreachable, match="wire flexure stress") as caught:
         solve(s, build_model(s.device))
-    nearest = caught.value.infeasibility.nearest[0]
+    nearest = caught.value.infeasibility.nearest
     assert abs(nearest[1] + 4.1e-3) > 1e-6 and abs(nearest[5] - 3e-5) < 2e-6
 
 
@@ -74,7 +74,7 @@ def test_the_nearest_pose_of_an_unreachable_one_is_reachable(scenario):
         "actuator 2X: needs -5 um" in message and "3Y: needs -8.66 um" in message
     )  # rigid translation: d = R(psi)' (10, 0)
     assert "1X" not in message.split("nearest")[0]
-    p = short.nearest[0] * 0.999  # reachable poses form a cone, so shrinking stays inside
+    p = short.nearest * 0.999  # reachable poses form a cone, so shrinking stays inside
     theta = ", ".join(f'theta_{a} = "{v!r} rad"' for a, v in zip("xyz", p[:3].tolist(), strict=True))
     delta = ", ".join(f'delta_{a} = "{v!r} m"' for a, v in zip("xyz", p[3:].tolist(), strict=True))
     s = scenario(f'[path]\nkind = "poses"\npoints = [{{ {theta}, {delta} }}]\n')

@@ -2,14 +2,14 @@
 
 CtrlgenError
 ├── InputError        a file or an argument is wrong; lists every fault found
-├── Unreachable       the device cannot follow the trajectory; carries the nearest one
+├── Unreachable       the device cannot follow the trajectory; carries what can be followed
 ├── SolverError       IPOPT or a simulation ended without a solution
 └── ToolError         a compiler is missing or refuses the generated C
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,13 +42,19 @@ class InputError(CtrlgenError):
 
 @dataclass(frozen=True)
 class Infeasibility:
-    """Where a trajectory cannot be followed: `samples` at which a limit is active, the `worst` of them, the `command`
-    (n, channels) and the `nearest` trajectory (n, channels) that can be followed, SI."""
+    """Where a trajectory cannot be followed: `samples` at which a limit is broken, the `worst` of them, the `command`
+    (n, channels) [SI].
+
+    `nearest` (channels,) is the pose that can be held nearest to the worst sample, None where that sample itself can be held and
+    only the pace is at fault. `alternatives`: paths (n, channels) [SI] that can be followed, by what they are compared with the
+    commanded one ("shifted by delta_z = +12 um").
+    """
 
     samples: tuple[int, ...]
     worst: int
     command: np.ndarray
-    nearest: np.ndarray
+    nearest: np.ndarray | None
+    alternatives: Mapping[str, np.ndarray]
 
 
 class Unreachable(CtrlgenError):

@@ -50,7 +50,7 @@ class Actuator(Section):
     """Increase of alpha per kelvin."""
     ambient: Annotated[Quantity, In("degC", low=200.0, high=400.0)]
     """Temperature T_amb at which the actuators are without force and to which they cool."""
-    temperature_limit: Annotated[Quantity, In("degC", positive=True)]
+    temperature_limit: Annotated[Quantity, In("degC", positive=True, high=3700.0)]  # tungsten melts
     """Largest average temperature of an actuator; a limit of trajectories and of the generated controller."""
     thermal_resistance: Annotated[Quantity, In("K/W", positive=True)]
     """R_th: temperature rise per heater power in the steady state."""

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -169,6 +170,11 @@ class Model:
                 if limit.upper is not None:
                     high[i] = min(high[i], limit.upper)
         return low, high
+
+    def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u"] | None:
+        """Whether a limit is on one of the states, displacements or drives itself; None where it is on an expression of them."""
+        variables: tuple[tuple[Literal["x", "z", "u"], ca.SX], ...] = (("x", self.x), ("z", self.z), ("u", self.u))
+        return next((name for name, s in variables if channel in dict(_positions(limit, s))), None)
 
     def composite_limits(self) -> list[Limit]:
         """Limits on an expression, such as a stress, and not on a state, displacement or drive itself."""

@@ -1,68 +1,132 @@
-"""Why a trajectory cannot be followed: which samples, which actuators, by how much, and what is nearest."""
+"""Why a trajectory cannot be followed: which samples, which actuators, by how much, and what could be followed instead."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ctrlgen.core.errors import Infeasibility, Unreachable
+from ctrlgen.core.errors import Infeasibility, SolverError, Unreachable
 from ctrlgen.core.units import from_si, show
-from ctrlgen.model.feedforward import Controller
-from ctrlgen.model.model import Limit, Model, Signal
-from ctrlgen.trajectory.optimisation import OptimisationResult
+from ctrlgen.model.model import Model, Signal
+from ctrlgen.trajectory.alternatives import Alternatives
+from ctrlgen.trajectory.excess import Excess, excesses
+from ctrlgen.trajectory.optimisation import TrajectoryProgramme
+from ctrlgen.trajectory.path_inverse import Needed, PathInverse
 from ctrlgen.trajectory.scenario import Scenario
 
 FEASIBILITY_TOLERANCE = (
     1e-5  # typical sizes (1 um, or 1 um at the platform's rim) off the command that count as none: 10 pm
 )
-SMALLEST_EXCESS = 1e-12  # m; less beyond a stroke's end is rounding
-AT_BOUND = 1e-6  # of the larger bound: a drive or state so near a bound is held there
 SHOWN_RUNS = 6  # runs of samples that a message lists
+SHOWN_CAUSES = 8  # limits that it lists
 
 
-def infeasibility_error(
-    scenario: Scenario,
-    model: Model,
-    command: np.ndarray,
-    relaxed: OptimisationResult,
-    nearest: OptimisationResult | None,
-    rows: Sequence[Limit],
-) -> Unreachable:
-    """The error that names the samples, the actuators or limits, by how much, and the nearest trajectory.
-
-    `relaxed` is the solution without the limits `rows`, which it breaks; `nearest` the one that keeps every limit, None
-    where IPOPT found none.
-    """
+def unreachable(
+    scenario: Scenario, inverse: PathInverse, command: np.ndarray, needed: Needed, certain: bool = False
+) -> Unreachable | None:
+    """The error that names the samples, the actuators and limits, by how much, and what can be followed instead; None where
+    what is `needed` breaks no limit, or perhaps none, unless it is `certain` from elsewhere that the path cannot be followed."""
+    model, n = inverse.model, len(command)
+    causes = primary(model, excesses(model, needed.x, needed.z, needed.u))
+    if not needed.exact and not certain:
+        # of what may still change, or is out of the equations' range, only displacements far enough out of theirs
+        least = 0.0 if not needed.solved else 2 * needed.unsettled * float(model.z_scale.max())
+        causes = [c for c in causes if model.limited_variable(c.limit, c.channel) == "z" and c.beyond.max() > least]
+    if not causes:
+        return None
     signal = model.signals[scenario.file.follow]
-    excess = _excess(model, relaxed, rows)
-    distance = np.linalg.norm((nearest or relaxed).unreachable_by, axis=1)
-    size = distance if nearest else np.max([e.max(axis=1) for e in excess.values()], axis=0)
-    samples = tuple(int(k) for k in np.flatnonzero(size > (FEASIBILITY_TOLERANCE if nearest else 0.0)))
-    worst = int(np.argmax(size))
-    where = f"the worst is sample {worst}: {_point(signal, command[worst])}"
-    lines = [f"cannot follow {len(samples)} of {len(command)} samples ({_runs(samples)}); {where}"]
-    strokes = _stroke_causes(scenario, model, command, relaxed)
-    drives = _drive_causes(model, relaxed, samples) if scenario.sample_time and not strokes and not rows else []
-    limits = [_limit_cause(limit, table, len(command)) for limit, table in excess.items()]
-    lines += strokes + drives + limits or ["  the limits of several actuators together"]
-    reached = None if nearest is None else nearest.trace.signals[scenario.file.follow]
-    if reached is None:
-        lines.append("  no nearest trajectory was found; shrink the path until every limit above is kept")
-    else:
-        lines.append(f"  nearest reachable pose of that sample: {_point(signal, reached[worst])}")
-    advice = []
-    if any("only pushes" in line for line in strokes):
-        advice.append(
-            "add a common motion that every actuator can push toward (for a hexapod: height), or shrink the path"
+    samples = tuple(map(int, np.flatnonzero(np.any([c.beyond > 0 for c in causes], axis=0))))
+    worst = causes[0].worst
+    at = _moment(scenario)
+    lines = [
+        f"cannot follow {len(samples)} of {n} samples ({_runs(samples)}); the worst is sample {worst}{at(worst)}: "
+        f"{_point(signal, command[worst])}"
+    ]
+    x, z, u = inverse.at_rest(command[worst])
+    held = excesses(model, x[None], z[None], u[None])
+    listed, also = _grouped(model, causes)
+    lines += [
+        f"  {_said(model, cause, bool(held))}, worst at sample {cause.worst}{at(cause.worst)}, in {len(cause.samples)} of {n} "
+        f"samples{f'; {others} more like it' if others else ''}"
+        for cause, others in zip(listed[:SHOWN_CAUSES], also, strict=False)
+    ]
+    if len(listed) > SHOWN_CAUSES:
+        lines.append(f"  and {len(listed) - SHOWN_CAUSES} more limits")
+    nearest = _nearest_pose(model, scenario.file.follow, command[worst]) if held else None
+    if nearest is not None:
+        lines.append(f"  nearest pose of that sample that can be held: {_point(signal, nearest)}")
+    slowed = None if scenario.sample_time is None else scenario.slowed(model)
+    found = Alternatives(inverse, signal, command, scenario.closed, slowed, [c.worst for c in causes]).found()
+    if found:
+        lines.append(f"  the path can be followed {'; or '.join(a.what for a in found)}")
+    elif len(command) > 1:
+        lines.append(
+            "  no shifted, smaller or slower path was found that can be followed; command smaller motions near home"
         )
-    if any("stroke ends" in line for line in strokes) or limits:
-        advice.append("shrink the path or move it toward home")
-    if drives:
-        advice.append("slow the path down")
-    lines.append("  " + "; ".join(advice or ["shrink the path or move it"]))
-    infeasibility = Infeasibility(samples, worst, command, command if reached is None else reached)
-    return Unreachable("\n".join(lines), infeasibility)
+    return Unreachable(
+        "\n".join(lines), Infeasibility(samples, worst, command, nearest, {a.what: a.command for a in found})
+    )
+
+
+def primary(model: Model, broken: Sequence[Excess]) -> list[Excess]:
+    """Of the limits that would be `broken` those that do not follow from another: where a displacement is out of range, so are the
+    force, the state and the drive that would hold it there; where a state is, the drive that would lead to it."""
+    left = list(broken)
+    for variable in ("z", "x"):
+        first = [e for e in left if model.limited_variable(e.limit, e.channel) == variable]
+        if first:
+            out = np.any([e.beyond > 0 for e in first], axis=0)
+            out |= np.roll(out, -1) | np.roll(out, 1)  # the drive before it leads there, that after it back
+            left = [e for e in left if any(e is f for f in first) or np.any((e.beyond > 0) & ~out)]
+    return left
+
+
+def _grouped(model: Model, causes: Sequence[Excess]) -> tuple[list[Excess], list[int]]:
+    """The causes to list, and how many more channels break the same: of a limit on an expression the worst channel stands for all."""
+    listed: dict[object, list[Excess]] = {}
+    for cause in causes:
+        composite = model.limited_variable(cause.limit, cause.channel) is None
+        listed.setdefault(cause.limit.name if composite else (cause.limit.name, cause.channel), []).append(cause)
+    return [own[0] for own in listed.values()], [len(own) - 1 for own in listed.values()]
+
+
+def _said(model: Model, cause: Excess, held: bool) -> str:
+    """What is needed of whom, against which bound, and why there is one; `held`: a limit is also broken at rest."""
+    limit, channel, value = cause.limit, cause.limit.channels[cause.channel], cause.value[cause.worst]
+    below, variable = value < cause.bound, model.limited_variable(limit, cause.channel)
+    side, missing = "below" if below else "above", _distance(abs(value - cause.bound), limit.unit)
+    amount = f"{show(value, limit.unit)}, {missing} {side} {show(cause.bound, limit.unit)}"
+    if variable == "z":
+        why = "the actuator only pushes" if below and cause.bound == 0 else "its stroke ends there"
+        return f"actuator {channel}: needs {amount} ({why})"
+    if variable is None:
+        return f"{limit.label} at {channel} would be {amount}"
+    own = f"{limit.label} of {channel} would have to be {amount}"
+    if variable == "u" and not held:
+        heated = below and "power" in model.signals
+        return f"{own} ({'it cannot cool faster than passively' if heated else 'the path is too fast'})"
+    return own
+
+
+def _distance(value: float, unit: str) -> str:
+    """A difference, in kelvin where the unit is a temperature."""
+    return show(value, "K" if unit == "degC" else unit)
+
+
+def _nearest_pose(model: Model, follow: str, target: np.ndarray) -> np.ndarray | None:
+    """The pose that can be held nearest to `target`, by IPOPT; None where it finds none."""
+    try:
+        result, _ = TrajectoryProgramme(model, follow, target[None]).optimum()
+    except SolverError:
+        return None
+    return result.trace.signals[follow][0]
+
+
+def _moment(scenario: Scenario) -> Callable[[int], str]:
+    """The text of a sample's time."""
+    h = scenario.sample_time
+    return lambda k: "" if h is None else f" at {show(k * h, 's')}"
 
 
 def _runs(samples: Sequence[int]) -> str:
@@ -75,70 +139,6 @@ def _runs(samples: Sequence[int]) -> str:
             runs.append([k, k])
     shown = [f"{a}" if a == b else f"{a}-{b}" for a, b in runs[:SHOWN_RUNS]]
     return ", ".join(shown) + (f", ... {len(runs) - SHOWN_RUNS} more runs" if len(runs) > SHOWN_RUNS else "")
-
-
-def _stroke_causes(scenario: Scenario, model: Model, command: np.ndarray, relaxed: OptimisationResult) -> list[str]:
-    """Actuators that would have to leave their displacement range."""
-    kernel = Controller(model, scenario.file.follow, None).static.displacement
-    needed = kernel.map(len(command))(relaxed.x.T, relaxed.z.T, command.T).full().T
-    low, high = model.z_bounds
-    causes = []
-    for i, axis in enumerate(model.axes):
-        beyond = np.maximum(low[i] - needed[:, i], needed[:, i] - high[i])
-        broken = np.flatnonzero(beyond > SMALLEST_EXCESS)
-        if not broken.size:
-            continue
-        k = int(np.argmax(beyond))
-        value = needed[k, i]
-        why = "the actuator only pushes" if value < low[i] == 0 else "its stroke ends there"
-        bound = low[i] if value < low[i] else high[i]
-        amount = f"needs {show(value, 'um')}, {show(abs(value - bound), 'um')} beyond {show(bound, 'um')} ({why})"
-        causes.append(f"  actuator {axis}: {amount}, worst at sample {k}, in {broken.size} of {len(command)} samples")
-    return causes
-
-
-def _excess(model: Model, relaxed: OptimisationResult, rows: Sequence[Limit]) -> dict[Limit, np.ndarray]:
-    """(n, channels) by which the relaxed solution exceeds each limit of `rows`, SI."""
-    n = len(relaxed.u)
-    p = np.tile(model.p_nominal[:, None], (1, n))
-    values = model.evaluate_limits.map(n)(relaxed.x.T, relaxed.z.T, relaxed.u.T, p)
-    tables = dict(zip(model.limits, values, strict=True))
-    return {limit: np.maximum(tables[limit].full().T - limit.upper, 0.0) for limit in rows if limit.upper is not None}
-
-
-def _limit_cause(limit: Limit, excess: np.ndarray, count: int) -> str:
-    """The channel that breaks a limit most, by how much, and in how many samples."""
-    k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
-    value = show((limit.upper or 0.0) + excess[k, i], limit.unit)
-    broken = int(np.count_nonzero(excess.max(axis=1) > 0))
-    amount = f"would be {value}, {show(excess[k, i], limit.unit)} above {show(limit.upper or 0.0, limit.unit)}"
-    return f"  {limit.label} at {limit.channels[i]}: {amount}, worst at sample {k}, in {broken} of {count} samples"
-
-
-def _drive_causes(model: Model, result: OptimisationResult, samples: Sequence[int]) -> list[str]:
-    """Actuators whose drive or state is held at a bound around the samples that are not followed."""
-    slowest = "it cannot cool faster than passively" if "power" in model.signals else "that is its minimum"
-    around = sorted({max(k + shift, 0) for k in samples for shift in (-1, 0)})
-    causes = []
-    for values, bounds, what, low_reason in (
-        (result.u, model.u_bounds, model.signals["drive"], slowest),
-        (
-            result.x[:, : model.n_states],
-            model.x_bounds,
-            model.signals.get("state"),
-            "it cannot fall below its value at rest",
-        ),
-    ):
-        if what is None:
-            continue
-        low, high = bounds
-        for i, axis in enumerate(model.axes):
-            for bound, reason in ((low[i], low_reason), (high[i], "that is its maximum")):
-                if np.isfinite(bound) and np.any(
-                    np.abs(values[around, i] - bound) < AT_BOUND * max(abs(high[i]), abs(low[i]))
-                ):
-                    causes.append(f"  actuator {axis}: {what.label} is held at {show(bound, what.units[i])}; {reason}")
-    return causes
 
 
 def _point(signal: Signal, values: np.ndarray) -> str:

@@ -8,27 +8,29 @@
 
 in variables divided by their typical sizes; derivatives are exact and sparse. Closed paths are periodic; open ones
 start in equilibrium at their first sample. With s = 0 the trajectory is followed; otherwise the solution is the nearest
-admissible one, and `solve` raises Unreachable.
+admissible one, and `solve` raises Unreachable. IPOPT begins at the inverse of the path (`path_inverse`).
 Reference: A. Waechter, L. T. Biegler, Math. Program. 106 (2006) 25 (IPOPT).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.errors import SolverError
 from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
-from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.excess import excesses
+from ctrlgen.trajectory.path_inverse import Needed
 
 SLACK_WEIGHT = 1e8  # against IPOPT's barrier, which otherwise keeps the solution sqrt(mu) off an active bound
 TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error
 MOST_ITERATIONS = 120
+MOST_FROM_EXACT = 30  # from a solution that only needs confirming: where kinks keep IPOPT from it, more do not help
 DRIVE_GUESS = 0.2  # of its typical size, where IPOPT begins
 
 
@@ -48,23 +50,23 @@ class OptimisationResult:
 
 
 class TrajectoryProgramme:
-    """The nonlinear programme of one scenario; `run` solves it with the composite limits that are chosen."""
+    """The nonlinear programme of one path, `command` (n, channels) [SI] of the signal `follow` every `sample_time` [s] (None:
+    separate equilibria); `run` solves it with the composite limits that are chosen."""
 
-    def __init__(self, model: Model, scenario: Scenario, command: np.ndarray) -> None:
-        self.model, self.scenario = model, scenario
-        self.signal = model.signals[scenario.file.follow]
-        if model.clocks and scenario.closed:
-            what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
-            raise InputError(scenario.name, [Fault("path", what)])
+    def __init__(
+        self, model: Model, follow: str, command: np.ndarray, sample_time: float | None = None, closed: bool = False
+    ) -> None:
+        self.model, self.sample_time, self.closed = model, sample_time, closed
+        self.signal = model.signals[follow]
         self.n_command = len(command)  # an open path is held for one more sample, so that its last drive is determined
-        held = scenario.sample_time is not None and not scenario.closed
+        held = sample_time is not None and not closed
         self.command = np.vstack([command, command[-1:]]) if held else command
         self.n = len(self.command)
         self.sizes = (model.x.numel(), model.z.numel(), model.u.numel(), self.signal.expr.numel())
 
     def _rows(self, limits: Sequence[Limit]) -> tuple[ca.Function, np.ndarray, np.ndarray]:
         """One sample's constraints (x, z, u_before, u, s, x_next, command) and their bounds."""
-        m, h = self.model, self.scenario.sample_time
+        m, h = self.model, self.sample_time
         x, z, v, u, s, x_1 = (
             ca.SX.sym(name, size)
             for name, size in zip(
@@ -98,9 +100,12 @@ class TrajectoryProgramme:
             rows[i] = m.x[i] - ca.substitute(value, m.x[stepped], ca.SX.zeros(len(stepped)))
         return ca.Function("settled", [m.x, m.z, m.u, m.p], [rows])
 
-    def run(self, limits: Sequence[Limit]) -> OptimisationResult:
-        """IPOPT's solution with the composite `limits` as rows. Raises SolverError, and KeyboardInterrupt on a signal."""
-        m, n, static, closed = self.model, self.n, self.scenario.sample_time is None, self.scenario.closed
+    def run(self, limits: Sequence[Limit], begin: Needed | None = None) -> OptimisationResult:
+        """IPOPT's solution with the composite `limits` as rows, begun at what the path needs where that is given.
+
+        Raises SolverError, and KeyboardInterrupt on a signal.
+        """
+        m, n, static, closed = self.model, self.n, self.sample_time is None, self.closed
         rows, row_low, row_high = self._rows(limits)
         variables = ca.MX.sym("w", sum(self.sizes), n)
         X, Z, U, S = ca.vertsplit(variables, list(np.cumsum([0, *self.sizes])))
@@ -123,15 +128,7 @@ class TrajectoryProgramme:
         G = rows.map(n)(X, Z, U_before, U, S, X_next, command.T)
         w, g = ca.vertcat(ca.vec(variables), *extra), ca.vertcat(ca.vec(G), *extra_rows)
         low, high = zip(*(self._bounds(s) for s in "xzus"), strict=True)
-        guess = np.concatenate(
-            [
-                np.ones(self.sizes[0]),
-                np.ones(self.sizes[1]),
-                np.full(self.sizes[2], DRIVE_GUESS),
-                np.zeros(self.sizes[3]),
-            ]
-        )
-        start = [np.tile(guess, n)] + [np.full(e.numel(), DRIVE_GUESS) for e in extra]
+        start = self._start(begin, bool(extra))
         zeros = np.zeros(sum(e.numel() for e in extra_rows))
         options = {
             "print_time": False,
@@ -140,13 +137,13 @@ class TrajectoryProgramme:
                 "sb": "yes",
                 "tol": TOLERANCE,
                 "mu_strategy": "adaptive",
-                "max_iter": MOST_ITERATIONS,
+                "max_iter": MOST_FROM_EXACT if begin is not None and begin.exact else MOST_ITERATIONS,
                 "nlp_scaling_method": "none",
             },
         }
         solver = ca.nlpsol("trajectory", "ipopt", {"x": w, "f": 0.5 * SLACK_WEIGHT * ca.sumsqr(S), "g": g}, options)
         answer = solver(
-            x0=np.concatenate(start),
+            x0=start,
             lbx=np.concatenate([np.tile(np.concatenate(low), n), *extra_low]),
             ubx=np.concatenate([np.tile(np.concatenate(high), n), *extra_high]),
             lbg=np.concatenate([np.tile(row_low, n), zeros]),
@@ -173,11 +170,56 @@ class TrajectoryProgramme:
         )
         keep = slice(0, self.n_command)
         x, z, u, s, before = x[keep], z[keep], u[keep], s[keep], before[keep]
-        result = trace(m, np.arange(len(x)) * (self.scenario.sample_time or 0.0), x, z, u)
-        if not static:
-            reached = trace(m, result.time, x, z, before)
+        return self._result(x, z, u, before, s, stats["iter_count"])
+
+    def optimum(
+        self, begin: Needed | None = None, progress: Callable[[Sequence[Limit]], None] = lambda _: None
+    ) -> tuple[OptimisationResult, list[Limit]]:
+        """The solution that keeps every limit, and the composite limits that were added as rows. Raises SolverError.
+
+        Composite limits (stress, rotation) are left out at first; those that the solution breaks are added and the problem is
+        solved again. An optimum without them that keeps all of them is the optimum with them. `progress` is called before each.
+        """
+        rows: list[Limit] = []
+        while True:
+            progress(rows)
+            result = self.run(rows, begin)
+            broken = {e.limit.name: e.limit for e in excesses(self.model, result.x, result.z, result.u)}
+            added = [limit for limit in broken.values() if limit not in rows]
+            if not added:
+                return result, rows
+            rows += added
+
+    def exact(self, needed: Needed) -> OptimisationResult:
+        """What the path needs as the solution: an optimum where it keeps every limit, as its slack is zero."""
+        before = needed.u
+        if self.sample_time is not None:
+            before = np.vstack([needed.u[-1:] if self.closed else needed.u_start[None], needed.u[:-1]])
+        none = np.zeros((self.n_command, self.sizes[3]))
+        return self._result(needed.x, needed.z, needed.u, before, none, 0)
+
+    def _result(
+        self, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: np.ndarray, slack: np.ndarray, iterations: int
+    ) -> OptimisationResult:
+        """With the signals that follow the drive `before` each sample, where there is time."""
+        result = trace(self.model, np.arange(len(x)) * (self.sample_time or 0.0), x, z, u)
+        if self.sample_time is not None:
+            reached = trace(self.model, result.time, x, z, before)
             result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
-        return OptimisationResult(x, z, u, s, result, stats["iter_count"])
+        return OptimisationResult(x, z, u, slack, result, iterations)
+
+    def _start(self, begin: Needed | None, starts_settled: bool) -> np.ndarray:
+        """Where IPOPT begins, scaled, inside the bounds."""
+        m = self.model
+        if begin is None or not all(np.all(np.isfinite(v)) for v in (begin.x, begin.z, begin.u)):
+            guess = [np.ones(self.sizes[0]), np.ones(self.sizes[1]), np.full(self.sizes[2], DRIVE_GUESS)]
+            rows = np.tile(np.concatenate([*guess, np.zeros(self.sizes[3])]), self.n)
+            return np.concatenate([rows, np.full((self.sizes[2] + self.sizes[0]) * starts_settled, DRIVE_GUESS)])
+        last = np.minimum(np.arange(self.n), self.n_command - 1)
+        scaled = ((begin.x - m.rest) / m.x_scale, begin.z / m.z_scale, begin.u / m.u_scale)
+        slack = np.zeros((self.n, self.sizes[3]))
+        rows = np.concatenate([*(v[last] for v in scaled), slack], axis=1).ravel()
+        return np.concatenate([rows, begin.u_start / m.u_scale, scaled[0][-1]]) if starts_settled else rows
 
     def _bounds(self, symbol: str) -> tuple[np.ndarray, np.ndarray]:
         """Scaled bounds of x, z, u or the slack s of one sample."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,7 +14,7 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import In, Quantity
+from ctrlgen.core.units import In, Quantity, read_quantity, show, written_unit
 from ctrlgen.devices import Device, load_device
 from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
@@ -21,6 +22,7 @@ from ctrlgen.trajectory.paths import Frame, PathKind, Poses
 
 FILE = "scenario.toml"
 MOST_SAMPLES = 1_000_000  # of one path: what memory holds
+WHOLE = 1e-6  # of the number of samples, by which rate times duration may be off a whole one: durations are written with six digits
 
 
 class Expectation(Section):
@@ -120,6 +122,20 @@ class Scenario:
         """Whether the path is periodic: its first sample follows the last one."""
         return self.sample_time is not None and type(self.file.path).closed
 
+    def slowed(self, model: Model) -> Callable[[float], np.ndarray] | None:
+        """How many times as long -> the commanded samples (n, channels) [SI] of the same path; None for one that is not shaped by a
+        formula."""
+        if isinstance(self.file.path, Poses) or self.file.duration is None or self.file.sample_rate is None:
+            return None
+        n, rate = len(self.command(model)), self.file.sample_rate
+
+        def command(times: float) -> np.ndarray:
+            samples = min(round(times * n), MOST_SAMPLES)
+            longer = read_quantity("s", f"{samples / rate.si!r} s")
+            return replace(self, file=self.file.model_copy(update={"duration": longer})).command(model)
+
+        return command
+
     def command(self, model: Model) -> np.ndarray:
         """The commanded samples (n, channels) of the followed signal, SI. Raises InputError."""
         signal = model.signals[self.file.follow]
@@ -129,17 +145,7 @@ class Scenario:
             path = path.model_copy(update={"folder": self.path.parent})
         n = self.file.points or 0
         if self.file.sample_rate and self.file.duration:
-            n = round(self.file.sample_rate.si * self.file.duration.si)
-            if not 2 <= n <= MOST_SAMPLES:
-                raise InputError(
-                    self.path,
-                    [
-                        Fault(
-                            "duration",
-                            f"gives {n} samples; between 2 and {MOST_SAMPLES} are possible: change duration or sample_rate",
-                        )
-                    ],
-                )
+            n = self._sample_count(self.file.sample_rate, self.file.duration)
         try:
             samples = path.samples(frame, n)
         except InputError as error:
@@ -157,6 +163,19 @@ class Scenario:
                 ],
             )
         return samples
+
+    def _sample_count(self, rate: Quantity, duration: Quantity) -> int:
+        """Rate times duration as a whole number. Raises InputError where it is none, or not one that a path can have."""
+        samples = rate.si * duration.si
+        n, what = round(samples), ""
+        if not 2 <= samples <= MOST_SAMPLES:
+            what = f"gives {samples:.6g} samples; between 2 and {MOST_SAMPLES} are possible: change duration or sample_rate"
+        elif abs(samples - n) > WHOLE * samples:
+            near = [show(k / rate.si, written_unit(duration.text), 7) for k in (int(samples), int(samples) + 1)]
+            what = f'gives {samples:.7g} samples, which is no whole number; write duration = "{near[0]}" or "{near[1]}"'
+        if what:
+            raise InputError(self.path, [Fault("duration", what)])
+        return n
 
 
 def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:

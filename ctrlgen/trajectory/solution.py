@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +10,12 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace
-from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, infeasibility_error
+from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
+from ctrlgen.trajectory.path_inverse import Needed, PathInverse
 from ctrlgen.trajectory.scenario import Scenario
 
 INERTIA = "has inertia: it can be simulated, diagnosed and exported as a plant, but not be led along a path yet"
-BROKEN = 1e-7  # of a limit: an excess below is what IPOPT's relaxed bounds (1e-8) may leave
 
 
 @dataclass(frozen=True)
@@ -54,39 +54,54 @@ class Solution:
         return min((m for m in self.margins if m.share is not None), key=lambda m: m.share or 0.0)
 
 
-def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
-    """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where IPOPT fails, and
-    InputError for a device with inertia.
-
-    Composite limits (stress, rotation) are left out at first; those that the solution breaks are added and the problem is
-    solved again. An optimum without them that keeps all of them is the optimum with them. `progress` is called before each.
-    """
+def foresee(scenario: Scenario, model: Model, command: np.ndarray) -> tuple[PathInverse, Needed]:
+    """The inverse of `command` (n, channels) [SI] and what it needs, without IPOPT. Raises Unreachable where that breaks a limit, and
+    InputError for a device with inertia or a closed path of one that changes with time."""
     if model.inertial:
         what = f"{model.name} {INERTIA}; name a device that is in balance at every moment"
         raise InputError(scenario.path, [Fault("device", what)])
+    if model.clocks and scenario.closed:
+        what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
+        raise InputError(scenario.path, [Fault("path", what)])
+    inverse = PathInverse(model, scenario.file.follow, scenario.sample_time)
+    needed = inverse.needed(command, scenario.closed)
+    if (error := unreachable(scenario, inverse, command, needed)) is not None:
+        raise error
+    return inverse, needed
+
+
+def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
+    """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where IPOPT fails, and
+    InputError for a device with inertia or a closed path of one that changes with time.
+
+    The inverse of the path says sample by sample what it takes. Where that breaks a limit the path cannot be followed; where it
+    keeps all of them it is the solution, from which IPOPT begins, and the answer where IPOPT ends elsewhere. `progress` is called
+    before each run of IPOPT.
+    """
     command = scenario.command(model)
-    programme = TrajectoryProgramme(model, scenario, command)
-    rows: list[Limit] = []
-    relaxed: OptimisationResult | None = None
-    while True:
+    inverse, needed = foresee(scenario, model, command)
+
+    def step(rows: Sequence[Limit]) -> None:
         progress(f"IPOPT, {len(command)} samples" + (f", with {', '.join(r.label for r in rows)}" if rows else ""))
-        try:
-            result = programme.run(rows)
-        except SolverError:
-            if relaxed is None:
-                raise
-            raise infeasibility_error(scenario, model, command, relaxed, None, rows) from None
-        if np.linalg.norm(result.unreachable_by, axis=1).max() > FEASIBILITY_TOLERANCE:
-            raise infeasibility_error(scenario, model, command, relaxed or result, result, rows)
-        margins = _margins(model, result)
-        broken = [
-            m.limit for m in margins if m.distance < -BROKEN * max(abs(m.bound), abs(m.value)) and m.limit not in rows
-        ]
-        if not broken:
-            added = tuple(limit.name for limit in rows)
-            return Solution(scenario, model, command, result.trace, result.u, tuple(margins), result.iterations, added)
-        relaxed = relaxed or result
-        rows += broken
+
+    programme = TrajectoryProgramme(model, scenario.file.follow, command, scenario.sample_time, scenario.closed)
+    try:
+        result, rows = programme.optimum(needed, step)
+    except SolverError:
+        if not needed.exact:
+            raise
+        result, rows = programme.exact(needed), []
+    if np.linalg.norm(result.unreachable_by, axis=1).max() > FEASIBILITY_TOLERANCE:
+        if not needed.exact:
+            off = np.linalg.norm(result.unreachable_by, axis=1)
+            raise unreachable(scenario, inverse, command, needed, certain=True) or SolverError(
+                f"the nearest trajectory that IPOPT found is off the command, most at sample {int(off.argmax())}, and the inverse "
+                "finds no drives there that satisfy the device's equations; command smaller or slower motions"
+            )
+        result, rows = programme.exact(needed), []
+    added = tuple(limit.name for limit in rows)
+    margins = tuple(_margins(model, result))
+    return Solution(scenario, model, command, result.trace, result.u, margins, result.iterations, added)
 
 
 def _margins(model: Model, result: OptimisationResult) -> list[Margin]:

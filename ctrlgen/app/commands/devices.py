@@ -11,7 +11,7 @@ import typer
 from ctrlgen.app import pipeline
 from ctrlgen.app.commands.app import DevicePath, OutFolder, app
 from ctrlgen.app.console import err, out, print_recording, print_reproduced, print_workspace, progress
-from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show
 from ctrlgen.devices import load_device
@@ -22,7 +22,7 @@ from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.schema import FILE as RECORDING
 from ctrlgen.trajectory.paths import Frame
 from ctrlgen.trajectory.scenario import load_scenario
-from ctrlgen.trajectory.solution import INERTIA
+from ctrlgen.trajectory.solution import INERTIA, foresee
 
 
 @app.command()
@@ -38,9 +38,10 @@ def check(
         Path | None, typer.Option("--device", help="The device that a recording was made on.", show_default=False)
     ] = None,
 ) -> None:
-    """Read a device, scenario or recording and list every fault, or summarise what it describes. Nothing is solved.
+    """Read a device, scenario or recording and list every fault, or summarise what it describes.
 
-    Of a generated folder it says which files were changed.
+    Of a scenario it says whether its path can be followed, and where not, why and what could be followed instead; of a
+    generated folder which files were changed.
 
     Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
     """
@@ -57,10 +58,24 @@ def check(
     if file.is_dir() or "kind" not in read_toml(file):
         scenario = load_scenario(file)
         model = build_model(scenario.device)
-        count = len(scenario.command(model))
-        out.print(f"{scenario.file.title}: {count} samples, device {scenario.device.name}", markup=False)
+        command = scenario.command(model)
+        out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
         if model.inertial:
             out.print(f"{scenario.device.name} {INERTIA}", markup=False)
+            return
+        try:
+            _, needed = foresee(scenario, model, command)
+        except Unreachable as error:
+            if scenario.file.outcome == "solved":
+                raise
+            out.print(f"as expected: {error}", markup=False, soft_wrap=True)
+            return
+        unsettled = (
+            "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
+        )
+        out.print(
+            "the path can be followed within every limit" if needed.exact else unsettled, markup=False, soft_wrap=True
+        )
         return
     device = load_device(file)
     model = build_model(device)

@@ -1,0 +1,227 @@
+"""The nearest paths that can be followed where the commanded one cannot: shifted, smaller, slower.
+
+Each is found with the inverse of the path alone, which costs microseconds a sample; while it is searched, a path is
+looked at in a few hundred places and without the effects' memories, and what is found is confirmed with all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.units import from_si, show
+from ctrlgen.model.model import Signal
+from ctrlgen.trajectory.path_inverse import PathInverse
+
+SHARES = 2.0 ** -np.arange(7, -1, -1)  # of the way to the end of an admissible range, where a shift is tried
+HALVINGS = 9  # of an interval: a shift or a scale to a five-hundredth
+SMALLEST_SCALE = 1e-3  # below, a path is no longer the same
+SLOWEST = 64.0  # times the duration
+LOOKED_AT = 200  # samples along a path, beside its extremes, while it is searched
+MARGINS = (0.003, 0.01, 0.03, 0.1)  # shares of the limits that are left to memories, where these are not searched with
+CONFIRMING_PERIODS = 3  # of a closed path with memories
+INSIDE = 1e-4  # of an axis' range that a shifted path stays inside of it: rounding the shift to be shown costs less
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A path that can be followed: `what` it is compared with the commanded one, and its samples (n, channels) [SI]."""
+
+    what: str
+    command: np.ndarray
+
+
+class Alternatives:
+    """The paths nearest to `command` (n, channels) [SI] that can be followed.
+
+    `slowed` gives the command that takes a number of times as long, None where the samples are equilibria or listed; `worst` are
+    the samples at which limits are broken most.
+    """
+
+    def __init__(
+        self, inverse: PathInverse, signal: Signal, command: np.ndarray, closed: bool,
+        slowed: Callable[[float], np.ndarray] | None, worst: Sequence[int],
+    ) -> None:  # fmt: skip
+        self.confirming, self.inverse = inverse, inverse.without_memories
+        self.signal, self.command, self.closed, self.slowed = signal, command, closed, slowed
+        self.scale = np.array(signal.scale)
+        z = self.inverse.needed(command, closed).z
+        extreme = np.concatenate([z.argmin(axis=0), z.argmax(axis=0), np.array(worst)]) / len(command)
+        self.places = np.concatenate(
+            [np.linspace(0, 1, LOOKED_AT), extreme]
+        )  # along the path, where it is looked at first
+        self.everywhere, self.margin = False, 0.0
+
+    def found(self) -> tuple[Alternative, ...]:
+        """Those that exist: a slower one where the path itself is within reach, else a shifted and a smaller one, else both."""
+        alone = [a for a in map(self._searched, (self._slower, self._shifted, self._smaller)) if a]
+        both = None if alone else self._searched(self._smaller_and_shifted)
+        return (*alone, *([both] if both else []))
+
+    def _searched(self, search: Callable[[], Alternative | None]) -> Alternative | None:
+        """What a search finds in a few places and all samples confirm; looking at all of them, and with a margin for memories, where
+        they do not."""
+        for self.everywhere, self.margin in ((False, 0.0), (True, 0.0), *((False, share) for share in MARGINS)):
+            found = search()
+            if found is None or self.confirming.keeps_limits(found.command, self.closed, periods=CONFIRMING_PERIODS):
+                return found
+            if self.everywhere and self.confirming is self.inverse:
+                return None
+        return None
+
+    def _follows(self, command: np.ndarray) -> bool:
+        n = len(command)
+        chosen = np.unique(np.minimum((self.places * n).round().astype(int), n - 1))
+        return self.inverse.keeps_limits(command, self.closed, None if self.everywhere else chosen, self.margin)
+
+    def _slower(self) -> Alternative | None:
+        if self.slowed is None:
+            return None
+        slowed = self.slowed
+        factors = 2.0 ** np.arange(1, np.log2(SLOWEST) + 1)
+        enough = next((f for f in factors if self._follows(slowed(f))), None)
+        if enough is None:
+            return None
+        factor = np.ceil(100 * _least(lambda f: self._follows(slowed(f)), enough / 2, enough)) / 100
+        command = slowed(float(factor))
+        duration = show(len(command) * (self.inverse.sample_time or 0.0), "s")
+        return Alternative(f'{factor:g} times slower (duration = "{duration}")', command)
+
+    def _middle(self) -> np.ndarray:
+        return (self.command.min(axis=0) + self.command.max(axis=0)) / 2
+
+    def _scaled(self, share: float) -> np.ndarray:
+        middle = self._middle()
+        return middle + share * (self.command - middle)
+
+    @property
+    def _has_extent(self) -> bool:
+        return bool(np.ptp(self.command, axis=0).max() > 0)
+
+    def _smaller(self) -> Alternative | None:
+        if not self._has_extent or not self._follows(self._scaled(SMALLEST_SCALE)):
+            return None
+        share = _largest_share(lambda s: self._follows(self._scaled(s)))
+        return Alternative(_scaled_to(share), self._scaled(share))
+
+    def _shifted(self) -> Alternative | None:
+        shift, _ = self._shift(self.command)
+        return None if shift is None else Alternative(self._shifted_by(shift), self.command + shift)
+
+    def _smaller_and_shifted(self) -> Alternative | None:
+        """The largest path about its own middle that follows once it is shifted the way in which the smallest one does."""
+        if not self._has_extent:
+            return None
+        shift, way = self._shift(self._scaled(SMALLEST_SCALE))
+        if shift is None:
+            return None
+        share = _largest_share(lambda s: self._shift(self._scaled(s), way)[0] is not None)
+        shift, _ = self._shift(self._scaled(share), way)
+        if shift is None:
+            return None
+        return Alternative(f"{_scaled_to(share)} and {self._shifted_by(shift)}", self._scaled(share) + shift)
+
+    def _shift(self, command: np.ndarray, way: np.ndarray | None = None) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """The least shift of `command` (channels,) and its direction: along `way` where that is given, else along one channel; where
+        none of them does, along all of them as the least shift into range says."""
+        ways = list(np.diag(self.scale)) if way is None else [way]
+        found = [(s, each) for each in ways if (s := self._along(command, each)) is not None]
+        if not found and way is None:
+            several = self._least_shift(command)
+            shift = None if several is None else self._along(command, several)
+            return shift, several
+        return min(found, key=lambda f: float(np.linalg.norm(f[0] / self.scale)), default=(None, way))
+
+    def _shifted_by(self, shift: np.ndarray) -> str:
+        rows = zip(self.signal.channels, self.signal.units, shift, self.scale, strict=True)
+        parts = [f"{c} = {'+' if v > 0 else ''}{show(v, u)}" for c, u, v, size in rows if abs(v) > 1e-6 * size]
+        return f"shifted by {', '.join(parts)}"
+
+    def _along(self, command: np.ndarray, direction: np.ndarray) -> np.ndarray | None:
+        """The least shift along `direction` (channels,) with which `command` can be followed, rounded to be shown."""
+        low, high = self._room(command)
+        slope = self.slope @ direction
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.array([low, high]) / slope
+        free = slope == 0
+        if np.any(free & ((low > 0) | (high < 0))):
+            return None
+        first = np.max(np.where(free, -np.inf, ends.min(axis=0)))
+        last = np.min(np.where(free, np.inf, ends.max(axis=0)))
+        if first > last or not np.isfinite([first, last]).any():
+            return None
+        nearest = float(np.clip(0.0, first, last))
+        tries = [
+            nearest,
+            *(nearest + share * (end - nearest) for end in (first, last) if np.isfinite(end) for share in SHARES),
+        ]
+        tries = sorted(dict.fromkeys(tries), key=abs)
+        size = next((t for t in tries if t != 0 and self._follows(command + t * direction)), None)
+        if size is None:
+            return None
+        if size != nearest:
+            size = _least(lambda t: self._follows(command + t * direction), nearest, size)
+        for digits in (3, 4, 6):
+            shift = self._shown(size * direction, digits)
+            if self._follows(command + shift):
+                return shift
+        return None
+
+    def _shown(self, shift: np.ndarray, digits: int) -> np.ndarray:
+        """`shift` with so many digits in the reader's units, away from zero."""
+        rounded = np.zeros(len(shift))
+        for i, (value, unit) in enumerate(zip(shift, self.signal.units, strict=True)):
+            one = 1 / from_si(1.0, unit)
+            if value:
+                step = 10.0 ** (np.floor(np.log10(abs(value / one))) - digits + 1)
+                rounded[i] = np.sign(value) * np.ceil(abs(value / one) / step * (1 - 1e-9)) * step * one
+        return rounded
+
+    def _room(self, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """By how much each displacement must at least and may at most be moved to be in range at every sample."""
+        z = self.inverse.needed(command, self.closed).z
+        low, high = self.inverse.model.z_bounds
+        inside = (INSIDE + self.margin) * np.where(np.isfinite(high - low), high - low, 0.0)
+        return low + inside - z.min(axis=0), high - inside - z.max(axis=0)
+
+    @property
+    def slope(self) -> np.ndarray:
+        """(n_axes, channels) d displacement / d command at the middle of the path."""
+        m, k = self.inverse.model, self.inverse.static
+        target = ca.SX.sym("target", len(self.scale))
+        z = k.displacement(ca.DM(m.rest), ca.DM.zeros(m.z.numel()), target)
+        return ca.Function("slope", [target], [ca.jacobian(z, target)])(self._middle()).full()
+
+    def _least_shift(self, command: np.ndarray) -> np.ndarray | None:
+        """The least shift in typical sizes that brings every displacement into range, to first order; None where there is none."""
+        low, high = self._room(command)
+        if np.any(low > high):
+            return None
+        A, size = self.slope * self.scale, self.inverse.model.z_scale
+        program = ca.conic("shift", "qrqp", {"h": ca.Sparsity.dense(*[len(self.scale)] * 2), "a": ca.Sparsity.dense(*A.shape)}, {
+            "print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False,
+        })  # fmt: skip
+        answer = program(h=np.eye(len(self.scale)), a=A / size[:, None], lba=low / size, uba=high / size)
+        return answer["x"].full().ravel() * self.scale if program.stats()["success"] else None
+
+
+def _scaled_to(share: float) -> str:
+    return f"scaled to {100 * share:.3g} % about its middle"
+
+
+def _largest_share(holds: Callable[[float], bool]) -> float:
+    """Near the largest share at which something holds, as it does at the smallest; rounded down to three digits."""
+    share = np.exp(-_least(lambda t: holds(np.exp(-t)), 0.0, -np.log(SMALLEST_SCALE)))
+    digit = 10.0 ** (np.floor(np.log10(share)) - 2)
+    return float(np.floor(share / digit * (1 + 1e-9)) * digit)
+
+
+def _least(holds: Callable[[float], bool], fails: float, held: float) -> float:
+    """Near the number nearest to `fails` at which something holds, as it does at `held`."""
+    for _ in range(HALVINGS):
+        middle = (fails + held) / 2
+        fails, held = (fails, middle) if holds(middle) else (middle, held)
+    return held

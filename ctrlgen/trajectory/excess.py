@@ -1,0 +1,59 @@
+"""Which limits of a device a motion would break: where, when and by how much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.model.model import Limit, Model
+
+NEGLIGIBLE = (
+    1e-7  # of a limit: 5 pm of a stroke of 50 um; less is rounding, or what IPOPT's relaxed bounds (1e-8) leave
+)
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A limit that one channel would break: `beyond` (n,) [SI] by how much at each sample, zero where it is kept, `value` (n,)
+    the limited quantity. `bound` is the side that is broken most, `share` what is missing there, of the limit's range."""
+
+    limit: Limit
+    channel: int
+    bound: float
+    value: np.ndarray
+    beyond: np.ndarray
+    share: float
+
+    @property
+    def worst(self) -> int:
+        """The sample at which most is missing."""
+        return int(np.argmax(self.beyond))
+
+    @property
+    def samples(self) -> np.ndarray:
+        """The samples (m,) at which the limit is broken."""
+        return np.flatnonzero(self.beyond)
+
+
+def excesses(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, margin: float = 0.0) -> list[Excess]:
+    """Every limit that the states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u) [SI] break, channel by channel,
+    those that miss most first; with a `margin`, a share of the limit's range (of the limit, where there is one) by which it is to be kept.
+
+    A value that is not finite breaks no limit: where the equations end, a displacement is out of range.
+    """
+    n = len(x)
+    found = []
+    tables = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
+    for limit, values in zip(model.limits, tables, strict=True):
+        given = [bound for bound in (limit.lower, limit.upper) if bound is not None]
+        unit = (max(given) - min(given) if len(given) == 2 else abs(given[0])) or model.force_scale
+        low = -np.inf if limit.lower is None else limit.lower + margin * unit
+        high = np.inf if limit.upper is None else limit.upper - margin * unit
+        for i, value in enumerate(values.full()):
+            beyond = np.nan_to_num(np.maximum(low - value, value - high), nan=0.0, posinf=np.finfo(float).max)
+            beyond[beyond < NEGLIGIBLE * unit] = 0.0
+            if beyond.any():
+                k = int(np.argmax(beyond))
+                found.append(Excess(limit, i, low if value[k] < low else high, value, beyond, float(beyond[k] / unit)))
+    return sorted(found, key=lambda e: -e.share)
