@@ -139,8 +139,17 @@ def _bounds_text(unit: str, low: float | None, high: float | None, low_open: boo
     return " and ".join(parts + ([] if high is None else [f"<= {show(high, unit)}"]))
 
 
+def _own_unit(text: object) -> str:
+    """The unit that a number is written in, one that begins at zero. Raises ValueError."""
+    unit = written_unit(str(text))
+    _unit(unit)
+    if to_si(0.0, unit):
+        raise ValueError(f"{text!r} does not count from zero; write it in a unit that does, such as K")
+    return unit
+
+
 def _reader(
-    unit: str, low: float | None, high: float | None, low_open: bool, whole: bool = False
+    wanted: str | None, low: float | None, high: float | None, low_open: bool, whole: bool = False
 ) -> Callable[[Any], Quantity]:
     def read(given: Any) -> Quantity:
         if isinstance(given, Quantity):
@@ -150,7 +159,8 @@ def _reader(
         if unknown:
             raise ValueError(f"unknown key {unknown[0]!r}; a quantity has value, source and sd")
         if "value" not in table:
-            raise ValueError(f'no value; write {{ value = "1 {unit}", source = "..." }}')
+            raise ValueError(f'no value; write {{ value = "1 {wanted or "um"}", source = "..." }}')
+        unit = wanted or _own_unit(table["value"])
         si = parse(table["value"], unit)
         if (low is not None and (si < low or (low_open and si == low))) or (high is not None and si > high):
             raise ValueError(
@@ -197,14 +207,18 @@ def read_quantity(unit: str | None, given: Any) -> Quantity:
     return _reader(unit, None, None, False)(given)
 
 
+ANY_UNIT = "any"  # of a number without a unit of its own, in the JSON schema
+
+
 @dataclass(frozen=True)
 class In(GroupedMetadata):
     """What a number of a file must be: `Annotated[Quantity, In("um", positive=True)]`, with bounds given in SI.
 
-    `positive` means strictly above zero, `whole` a count.
+    `positive` means strictly above zero, `whole` a count. Without a `unit` any is accepted that begins at zero; what reads the
+    number then says which dimension it must have.
     """
 
-    unit: str
+    unit: str | None
     low: float | None = None
     high: float | None = None
     positive: bool = False
@@ -213,8 +227,12 @@ class In(GroupedMetadata):
     def __iter__(self) -> Iterator[object]:
         """Pydantic's annotations: how it is read, written and described in the JSON schema."""
         lowest = 0.0 if self.positive else self.low
-        schema: dict[str, Any] = {"type": ["string", "number", "object"], "title": "quantity", "x-unit": self.unit}
-        bounds = _bounds_text(self.unit, lowest, self.high, self.positive)
+        schema: dict[str, Any] = {
+            "type": ["string", "number", "object"],
+            "title": "quantity",
+            "x-unit": self.unit or ANY_UNIT,
+        }
+        bounds = _bounds_text(self.unit or "1", lowest, self.high, self.positive)
         schema |= {"x-bounds": bounds} if bounds else {}
         schema |= {"x-whole": True} if self.whole else {}
         yield BeforeValidator(_reader(self.unit, lowest, self.high, self.positive, self.whole))

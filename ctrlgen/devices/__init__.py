@@ -11,25 +11,38 @@ import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics, Limit, Signal
+from ctrlgen.devices.python_file import KIND, changed_device, python_device, python_file_of
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")
 
 
 def load_device(path: Path | str) -> Device:
-    """The device described by a TOML file. Raises InputError listing every fault."""
+    """The device described by a TOML file, or made by a Python file (`python_file`). Raises InputError listing every fault."""
+    if Path(path).suffix == ".py":
+        return python_device(Path(path))
     table = read_toml(Path(path) / "scenario.toml" if (Path(path) / "scenario.toml").is_file() else path)
     if "device" in table and "kind" not in table:
         raise InputError(path, [Fault("file", f"is a scenario; name its device, {table['device']}")])
     if "record" in table:
         raise InputError(path, [Fault("file", "describes a recording; name the device file that it was made on")])
     kind = table.get("kind")
+    if kind == KIND:
+        return changed_device(table, Path(path))
     if not isinstance(kind, str) or kind not in Device.library:
-        known = ", ".join(f'"{name}"' for name in sorted(Device.library))
+        known = ", ".join(f'"{name}"' for name in sorted({*Device.library, KIND}))
         raise InputError(
             path, [Fault("kind", f"{reprlib.repr(kind)} is not a kind of device I know; write kind = one of {known}")]
         )
     return validate(Device.library[kind], table, path)
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """The files that describe a device: its own, and the Python file that it names. Raises InputError."""
+    if path.suffix == ".py":
+        return (path,)
+    table = read_toml(path)
+    return (path, python_file_of(table, path)) if table.get("kind") == KIND else (path,)
 
 
 __all__ = [
@@ -40,5 +53,6 @@ __all__ = [
     "InertialPhysics",
     "Limit",
     "Signal",
+    "files_of",
     "load_device",
 ]

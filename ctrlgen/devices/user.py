@@ -101,15 +101,20 @@ class _ArgumentReader:
     def __init__(self, name: str) -> None:
         self.name = name
         self.faults: list[Fault] = []
+        self.ranges: dict[tuple[str, str], tuple[float, float]] = {}
 
-    def ports(self, where: str, given: Mapping[str, str]) -> dict[str, Quantity]:
-        """Largest sizes by name; one that cannot be read is a fault and counts as 1."""
+    def ports(self, where: str, given: Mapping[str, Any]) -> dict[str, Quantity]:
+        """Largest sizes by name; one that cannot be read is a fault and counts as 1. A pair of lowest and highest value also goes into
+        `ranges`."""
         found: dict[str, Quantity] = {}
         if not isinstance(given, Mapping) or not all(isinstance(n, str) and n.isidentifier() for n in given):
             self.faults.append(Fault(where, 'must be names with their largest size, such as {"motor": "10 V"}'))
             return found
         for name, text in given.items():
             try:
+                if isinstance(text, (tuple, list)):
+                    found[name] = self._pair(where, name, text)
+                    continue
                 found[name] = read_quantity(None, text)
                 if found[name].si <= 0 or to_si(0.0, written_unit(found[name].text)):
                     raise ValueError(
@@ -119,6 +124,21 @@ class _ArgumentReader:
                 self.faults.append(Fault(f"{where}.{name}", str(error)))
                 found[name] = PLACEHOLDER
         return found
+
+    def _pair(self, where: str, name: str, given: Sequence[Any]) -> Quantity:
+        """The larger end of a range, which is kept. Raises ValueError."""
+        if len(given) != 2:
+            raise ValueError(f'{list(given)!r} must be the lowest and the highest value, such as ("0 V", "150 V")')
+        low, high = (read_quantity(None, text) for text in given)
+        units = [written_unit(q.text) for q in (low, high)]
+        if not same_dimension(*units):
+            raise ValueError(f"{low.text!r} and {high.text!r} are not of one dimension")
+        if any(to_si(0.0, unit) for unit in units):
+            raise ValueError(f"{high.text!r} does not count from zero; write it in a unit that does, such as K")
+        if not low.si < high.si:
+            raise ValueError(f"{low.text!r} is not below {high.text!r}; write the lowest value first")
+        self.ranges[where, name] = (low.si, high.si)
+        return high if abs(high.si) >= abs(low.si) else Quantity(-low.si, low.text.lstrip("-"))
 
     def parameters(self, given: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], dict[str, str], dict[str, str]]:
         """(tables of value, sd and source; domains; units) of the parameters by name."""
@@ -144,6 +164,20 @@ class _ArgumentReader:
                 table = {"value": PLACEHOLDER.text}
             units[name], tables[name], domains[name] = written_unit(str(table["value"])), table, domain
         return tables, domains, units
+
+    def limits(self, given: Mapping[str, Any]) -> dict[str, tuple[Law, Quantity]]:
+        """The limits on expressions, each a law with the largest magnitude that it may have."""
+        found: dict[str, tuple[Law, Quantity]] = {}
+        for name, stated in given.items():
+            if not (isinstance(stated, (tuple, list)) and len(stated) == 2 and callable(stated[0])):
+                what = 'must be (law, largest value), such as (lambda d, p: p.k * d.x, "300 MPa")'
+                self.faults.append(Fault(f"limits.{name}", what))
+                continue
+            size = self.ports("limits", {name: stated[1]})[name]
+            if ("limits", name) in self.ranges:
+                self.faults.append(Fault(f"limits.{name}", "has two values; a limit is on the magnitude, write one"))
+            found[name] = (stated[0], size)
+        return found
 
     def laws(self, given: dict[str, Law | None], state: Mapping[str, Any], same: bool) -> dict[str, Law]:
         """The laws that are given, checked for what is missing and what excludes what; `same`: the readings are the axes."""
@@ -175,17 +209,18 @@ def user_device(
     name: str,
     *,
     parameters: Mapping[str, Any],
-    drive: Mapping[str, str],
-    axes: Mapping[str, str],
+    drive: Mapping[str, str | tuple[str, str]],
+    axes: Mapping[str, str | tuple[str, str]],
     force: Law | None = None,
     restoring_force: Law | None = None,
     damping_force: Law | None = None,
     mass: Law | None = None,
     acceleration: Law | None = None,
-    state: Mapping[str, str] | None = None,
+    state: Mapping[str, str | tuple[str, str]] | None = None,
     rates: Law | None = None,
     reading: Mapping[str, str] | None = None,
     pose: Law | None = None,
+    limits: Mapping[str, tuple[Law, str]] | None = None,
     force_size: str | None = None,
     title: str = "",
     source: str = "a user's model",
@@ -194,7 +229,9 @@ def user_device(
     """A device from the user's functions.
 
     `drive`, `axes`, `state` and `reading` name the components of a vector with their largest size, {"motor": "24 V"};
-    the readings are the axes unless `pose` is given. `parameters` are "0.5 kg", ("0.5 kg", sd) or
+    the readings are the axes unless `pose` is given. Drives and axes are kept within plus and minus that size, or within a range
+    given as a pair, {"stack": ("0 V", "150 V")}; states only within a range. `limits` are of any expression, {"stress":
+    (lambda d, p: p.k * d.x, "300 MPa")}: its magnitude stays below the value. `parameters` are "0.5 kg", ("0.5 kg", sd) or
     {value, sd, source, domain}: the diagnosis takes a number with an sd as uncertain, one without as exact until the data
     contradict it; its path is 'mechanism.NAME'. A law takes any of u, x, d, v, p as arguments of these names (see the
     module) and returns one number for each axis, state or reading: a vector, a list, or {name: number}. It may be a
@@ -220,11 +257,12 @@ def user_device(
         "force": force, "restoring_force": restoring_force, "damping_force": damping_force, "mass": mass, "acceleration": acceleration,
         "rates": rates, "pose": pose,
     }  # fmt: skip
+    expressions = read.limits({} if limits is None else limits)
     laws = read.laws(given, sizes["state"], reading is None or list(reading) == list(axes))
     size = None if force_size is None else read.ports("force_size", {"force_size": force_size})["force_size"]
     description = UserDescription(
         name, drive=sizes["drive"], axes=sizes["axes"], state=sizes["state"], reading=sizes["reading"], domains=domains, units=units,
-        laws=laws, force=size,
+        laws=laws, force=size, ranges=read.ranges, limits=expressions,
     )  # fmt: skip
     return _validated(
         description, tables, {"name": name, "title": title or name, "source": source, "effect": tuple(effect)}, read

@@ -23,7 +23,8 @@ ARGUMENTS = {  # of each law
 @dataclass(frozen=True, eq=False)
 class UserDescription:
     """What the user gave: components {name: largest size} of each vector, domains and units of the parameters, the laws by
-    name, the typical `force` if any. Faults of the laws are collected as they are evaluated."""
+    name, the typical `force` if any, the `ranges` [SI] of components given by a lowest and a highest value, the `limits` on
+    expressions. Faults of the laws are collected as they are evaluated."""
 
     name: str
     axes: dict[str, Quantity]
@@ -34,6 +35,8 @@ class UserDescription:
     units: dict[str, str]
     laws: dict[str, Law]
     force: Quantity | None = None
+    ranges: dict[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
+    limits: dict[str, tuple[Law, Quantity]] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
 
     def components(self, law: str) -> tuple[str, ...]:
@@ -115,7 +118,9 @@ class PhysicsBuilder:
             force_unit=written_unit(given.force.text) if given.force else "N*m" if same_dimension(unit, "rad") else "N",
             restoring_force=self.restoring_force, limits=self.limits,
             pose=(lambda d: given.evaluate("pose", self.p, d=d)) if "pose" in given.laws else (lambda d: d),
+            bipolar=any(given.ranges.get(("drive", name), (-1.0, 1.0))[0] < 0 for name in given.drive),
         )  # fmt: skip
+        self.limits(SimpleNamespace(drive=u, displacement=d, mechanism_displacement=d))  # collects its faults too
         if not self.inertial:
             return BalancedPhysics(
                 **common, force=lambda u, x, d: self.applied_force(u, x, d, d[:0]),
@@ -128,15 +133,30 @@ class PhysicsBuilder:
         )  # fmt: skip
 
     def limits(self, signal: SimpleNamespace) -> list[Limit]:
-        """Drives and displacements stay within their largest sizes."""
-        found = []
-        for what, ports, expr in (
-            ("drive", self.given.drive, signal.drive),
-            ("travel", self.given.axes, signal.displacement),
+        """Drives and displacements stay within their ranges or largest sizes, states within ranges, expressions below their limits."""
+        given, found = self.given, []
+        for what, label, ports, expr in (
+            ("drive", "drive", given.drive, signal.drive),
+            ("axes", "travel", given.axes, signal.displacement),
+            ("state", "state", given.state, self.x),
         ):
             for i, (name, q) in enumerate(ports.items()):
-                label, unit = f"{what} of {name}", written_unit(q.text)
-                found.append(Limit(f"{what}_{name}", label, (name,), unit, expr[i], -q.si, q.si))
+                if what == "state" and (what, name) not in given.ranges:
+                    continue
+                low, high = given.ranges.get((what, name), (-q.si, q.si))
+                unit = written_unit(q.text)
+                found.append(Limit(f"{label}_{name}", f"{label} of {name}", (name,), unit, expr[i], low, high))
+        names = {"x": given.state, "d": given.axes}
+        vectors = {"x": self.x, "d": signal.mechanism_displacement}
+        for name, (law, q) in given.limits.items():
+            offered = {
+                key: Ports({"x": "the state", "d": "the displacement"}[key], tuple(names[key]), v)
+                for key, v in vectors.items()
+                if v.numel()
+            }
+            value, faults = evaluate_law(f"limits.{name}", law, offered | {"p": self.p}, (name,))
+            given.faults.extend(fault for fault in faults if fault not in given.faults)
+            found.append(Limit(name, name, (name,), written_unit(q.text), value, -q.si, q.si))
         return found
 
 

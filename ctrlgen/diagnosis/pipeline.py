@@ -12,7 +12,7 @@ from typing import Any
 
 from ctrlgen.core.files import read_toml, whole_folder, write_text
 from ctrlgen.core.to_json import plain
-from ctrlgen.devices import Device, load_device
+from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
 from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
@@ -139,7 +139,8 @@ def _digest(path: Path) -> str:
 
 def _files(device: Path, recordings: Sequence[Path | str]) -> Iterator[tuple[str, Path]]:
     """Name and path of every file that was read; recordings' are named from the folder that all of theirs stand in."""
-    yield device.name, device
+    for file in files_of(device):
+        yield file.name, file
     tables = [given / FILE if given.is_dir() else given for given in map(Path, recordings)]
     above = os.path.commonpath([table.resolve().parent.parent for table in tables])
     for table in tables:

@@ -102,7 +102,8 @@ def _said(model: Model, cause: Excess, held: bool) -> str:
         return f"actuator {channel}: needs {amount} ({why})"
     if variable is None:
         return f"{limit.label} at {channel} would be {amount}"
-    own = f"{limit.label} of {channel} would have to be {amount}"
+    whose = limit.label if channel in limit.label.split() else f"{limit.label} of {channel}"
+    own = f"{whose} would have to be {amount}"
     if variable == "u" and not held:
         heated = below and "power" in model.signals
         return f"{own} ({'it cannot cool faster than passively' if heated else 'the path is too fast'})"

@@ -15,11 +15,13 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.errors import Fault
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
-from ctrlgen.model.model import Model
+from ctrlgen.model.model import Model, Signal
 from ctrlgen.trajectory.excess import excesses
 
+HOME_DRIVE = 1e-3  # of the full drive, at which the slopes near home are taken: a heater's power has none at zero volt
 PERIODS = 20  # of a closed path, after which a memory that still changes is left to IPOPT
 JUDGED = 3  # periods after which it is foreseen whether it will settle
 REPEATS = 1e-9  # typical sizes by which a state may differ after a period that repeats
@@ -46,6 +48,47 @@ class Needed:
     def exact(self) -> bool:
         """Whether nothing else follows the command: the equations hold, and a closed path repeats."""
         return self.solved and self.unsettled == 0.0
+
+
+def count_faults(model: Model, follow: str) -> list[Fault]:
+    """What keeps a model from being inverted: it takes one drive and one axis for each channel that is followed."""
+    signal, drives, axes = model.signals[follow], model.u.numel(), len(model.axes)
+    channels = len(signal.channels)
+    if drives > axes:
+        what = f"has {drives} drives for {axes} axes, so that many drives lead to one pose; let one drive act on several actuators"
+        return [Fault("device", f"{model.name} {what}")]
+    if drives < channels:
+        ways = "; ".join(_direction(signal, way) for way in _reached(model, signal).T)
+        what = f"has {drives} drives for {channels} channels of the {follow}; near home it moves only along {ways}"
+        return [Fault("device", f"{model.name} {what}; follow a signal of {drives} channels, or add drives")]
+    if channels != axes:
+        return [
+            Fault(
+                "follow",
+                f"{model.name} has {axes} axes for {channels} channels of the {follow}; follow its displacement",
+            )
+        ]
+    return []
+
+
+def _reached(model: Model, signal: Signal) -> np.ndarray:
+    """(channels, n_u) d signal / d u between equilibria near home, in the signal's typical sizes, each column of length one."""
+    unknown = ca.vertcat(model.x, model.z)
+    rows = ca.vertcat(model.settling, model.balance)
+    at = [unknown, model.u, model.p]
+    slopes = ca.Function(
+        "slopes", at, [ca.jacobian(rows, unknown), ca.jacobian(rows, model.u), ca.jacobian(signal.expr, unknown)]
+    )
+    home = (np.concatenate([model.rest, np.zeros(len(model.axes))]), model.u_scale * HOME_DRIVE, model.p_nominal)
+    K, B, C = (v.full() for v in slopes(*home))
+    moved = C @ -np.linalg.lstsq(K, B, rcond=None)[0] / np.array(signal.scale)[:, None]
+    return moved / np.maximum(np.linalg.norm(moved, axis=0), 1e-300)
+
+
+def _direction(signal: Signal, way: np.ndarray) -> str:
+    """'x + 0.5 y' in typical sizes of the channels; what is below a thousandth is left out."""
+    terms = [(c, v) for c, v in zip(signal.channels, way / way[np.abs(way).argmax()], strict=True) if abs(v) > 1e-3]
+    return " + ".join(c if abs(v - 1) < 1e-3 else f"{v:.3g} {c}" for c, v in terms).replace("+ -", "- ")
 
 
 class PathInverse:

@@ -20,10 +20,10 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
-from ctrlgen.core.units import In, Quantity, parse, read_quantity
+from ctrlgen.core.units import In, Quantity, parse, read_quantity, same_dimension, written_unit
 from ctrlgen.devices.base import Section
 
-Length = Annotated[Quantity, In("um", positive=True)]
+Size = Annotated[Quantity, In(None, positive=True)]  # a length, or an angle, as the channels that it is along
 Point = dict[str, str | int | float]
 
 
@@ -62,7 +62,8 @@ class Frame:
             raise InputError(option, [Fault(f.where.removeprefix("."), f.what) for f in error.faults]) from None
 
     def directions(self, names: Sequence[str], where: str) -> np.ndarray:
-        """Unit vectors of the named channels, (n, channels). Raises InputError for unknown channels and for rotations."""
+        """Unit vectors of the named channels, (n, channels). Raises InputError for unknown channels and for those of different
+        dimensions."""
         for name in names:
             if name not in self.channels:
                 raise InputError(
@@ -70,10 +71,21 @@ class Frame:
                 )
         if len(set(names)) != len(names):
             raise InputError("path", [Fault(where, "names the same channel twice; name two different ones")])
-        rows = np.eye(len(self.channels))[[self.channels.index(name) for name in names]]
-        if any(self.units[self.channels.index(name)] != "um" for name in names):
-            raise InputError("path", [Fault(where, "names a rotation; name two translations")])
-        return rows
+        units = [self.units[self.channels.index(name)] for name in names]
+        if not all(same_dimension(unit, units[0]) for unit in units):
+            what = " and ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
+            raise InputError("path", [Fault(where, f"{what} are not of one dimension; name two lengths or two angles")])
+        return np.eye(len(self.channels))[[self.channels.index(name) for name in names]]
+
+    def size(self, given: Quantity, channel: str, where: str) -> float:
+        """A size along a channel in SI. Raises InputError where its dimension is not that of the channel."""
+        unit = self.units[self.channels.index(channel)]
+        if not same_dimension(written_unit(given.text), unit):
+            what = (
+                f'{given.text!r} is not of the dimension of {channel}; write a number with a unit, such as "1 {unit}"'
+            )
+            raise InputError("path", [Fault(where, what)])
+        return given.si
 
 
 def minimum_jerk(s: np.ndarray) -> np.ndarray:
@@ -96,19 +108,19 @@ class Circle(Path_):
     closed: ClassVar[bool] = True
     kind: Literal["circle"]
     """A circle."""
-    diameter: Length
+    diameter: Size
     """Diameter."""
     centre: Point = {}
     """Its centre, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
-    """Two translations that span the plane of the path, first and second."""
+    """Two channels of one dimension that span the plane of the path, first and second."""
     turns: Annotated[int, Field(ge=1, le=1000)] = 1
     """Whole turns in the duration."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         angle = 2 * np.pi * self.turns * np.arange(n) / n
         first, second = frame.directions(self.plane, "plane")
-        radius = self.diameter.si / 2
+        radius = frame.size(self.diameter, self.plane[0], "diameter") / 2
         return frame.point(self.centre, "centre") + radius * (
             np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second)
         )
@@ -141,27 +153,29 @@ class Raster(Path_):
 
     kind: Literal["raster"]
     """Parallel lines, back and forth."""
-    length: Length
+    length: Size
     """Length of a line, along the first channel of `plane`."""
-    spacing: Length
+    spacing: Size
     """Distance between lines, along the second channel of `plane`."""
     lines: Annotated[int, Field(ge=1, le=10000)]
     """Number of lines."""
     centre: Point = {}
     """Middle of the raster, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
-    """Two translations that span the plane of the path, first and second."""
+    """Two channels of one dimension that span the plane of the path, first and second."""
     step_share: Annotated[float, Field(gt=0, le=1)] = 0.2
     """Time of a step to the next line as a share of the time of a line."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         fast, slow = frame.directions(self.plane, "plane")
+        length = frame.size(self.length, self.plane[0], "length")
+        spacing = frame.size(self.spacing, self.plane[1], "spacing")
         corners, times = [], [0.0]
         for line in range(self.lines):
             ends = (-0.5, 0.5) if line % 2 == 0 else (0.5, -0.5)
-            level = (line - (self.lines - 1) / 2) * self.spacing.si
+            level = (line - (self.lines - 1) / 2) * spacing
             for side in ends:
-                corners.append(side * self.length.si * fast + level * slow)
+                corners.append(side * length * fast + level * slow)
             times += [times[-1] + 1.0, times[-1] + 1.0 + self.step_share]
         return frame.point(self.centre, "centre") + _through(np.array(corners), np.array(times[:-1]), n)
 
@@ -171,19 +185,19 @@ class Spiral(Path_):
 
     kind: Literal["spiral"]
     """An Archimedean spiral."""
-    diameter: Length
+    diameter: Size
     """Diameter of the last turn."""
     turns: Annotated[float, Field(gt=0, le=1000)]
     """Number of turns, not necessarily whole."""
     centre: Point = {}
     """Its centre, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
-    """Two translations that span the plane of the path, first and second."""
+    """Two channels of one dimension that span the plane of the path, first and second."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         s = minimum_jerk(np.linspace(0, 1, n))
         first, second = frame.directions(self.plane, "plane")
-        radius, angle = self.diameter.si / 2 * s, 2 * np.pi * self.turns * s
+        radius, angle = frame.size(self.diameter, self.plane[0], "diameter") / 2 * s, 2 * np.pi * self.turns * s
         return (
             frame.point(self.centre, "centre")
             + np.outer(radius * np.cos(angle), first)
@@ -197,7 +211,7 @@ class Lissajous(Path_):
     closed: ClassVar[bool] = True
     kind: Literal["lissajous"]
     """A Lissajous figure."""
-    amplitudes: tuple[Length, Length]
+    amplitudes: tuple[Size, Size]
     """a_1 and a_2: amplitudes along the two channels of `plane`."""
     periods: tuple[Annotated[int, Field(ge=1, le=1000)], Annotated[int, Field(ge=1, le=1000)]]
     """f_1 and f_2: whole periods in the duration."""
@@ -206,13 +220,14 @@ class Lissajous(Path_):
     centre: Point = {}
     """Its centre, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
-    """Two translations that span the plane of the path, first and second."""
+    """Two channels of one dimension that span the plane of the path, first and second."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         t = np.arange(n) / n
         rows = frame.directions(self.plane, "plane")
-        first = self.amplitudes[0].si * np.sin(2 * np.pi * self.periods[0] * t + self.phase.si)
-        second = self.amplitudes[1].si * np.sin(2 * np.pi * self.periods[1] * t)
+        a_1, a_2 = (frame.size(a, at, "amplitudes") for a, at in zip(self.amplitudes, self.plane, strict=True))
+        first = a_1 * np.sin(2 * np.pi * self.periods[0] * t + self.phase.si)
+        second = a_2 * np.sin(2 * np.pi * self.periods[1] * t)
         return frame.point(self.centre, "centre") + np.outer(first, rows[0]) + np.outer(second, rows[1])
 
 

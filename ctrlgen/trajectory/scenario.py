@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.units import In, Quantity, read_quantity, show, written_unit
-from ctrlgen.devices import Device, load_device
+from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.paths import Frame, PathKind, Poses
@@ -98,7 +98,8 @@ class Input:
 class Scenario:
     """A scenario ready to be solved. `file` is what scenario.toml says; `name` the folder's name as a C identifier.
 
-    `inputs`: the "scenario" itself, its "device" and, where a path is read from a file, its "poses".
+    `inputs`: the "scenario" itself, its "device" (with "device_code" where that names a Python file) and, where a path is read from
+    a file, its "poses".
     """
 
     name: str
@@ -178,10 +179,11 @@ class Scenario:
         return n
 
 
-def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:
+def load_scenario(path: Path | str, device: Device | Path | str | None = None) -> Scenario:
     """The scenario in a folder (its scenario.toml) or in a TOML file, with its device. Raises InputError.
 
-    A `device` made in Python is used instead of a file; the scenario's `device` is then its name.
+    Another `device` is used instead of the one that the scenario names: a device file, or one made in Python, whose name the
+    scenario's `device` then is.
     """
     path = Path(path)
     file_path = path / FILE if path.is_dir() else path
@@ -192,17 +194,19 @@ def load_scenario(path: Path | str, device: Device | None = None) -> Scenario:
         what = 'describes a device; name a scenario, or write one that has device = "..." with this file\'s path'
         raise InputError(file_path, [Fault("file", what)])
     file = validate(ScenarioFile, table, file_path)
-    if device is None:
-        device_path = file_path.parent / file.device
-        device, described = load_device(device_path), Input(device_path, read_text(device_path))
+    inputs = {"scenario": Input(file_path, read_text(file_path))}
+    if not isinstance(device, Device):
+        device_path = file_path.parent / file.device if device is None else Path(device)
+        device = load_device(device_path)
+        names = ("device", "device_code")  # the second where a file names another one
+        inputs |= {n: Input(p, read_text(p)) for n, p in zip(names, files_of(device_path), strict=False)}
     elif file.device != device.name:
         raise InputError(
             file_path, [Fault("device", f"{file.device!r} is not {device.name!r}, the device given; write its name")]
         )
     else:
         numbers = "\n".join(f"{path} = {number.text}" for path, number in device.quantities())
-        described = Input(file_path.parent / f"{_identifier(device.name)}.txt", numbers)
-    inputs = {"scenario": Input(file_path, read_text(file_path)), "device": described}
+        inputs["device"] = Input(file_path.parent / f"{_identifier(device.name)}.txt", numbers)
     if isinstance(file.path, Poses) and file.path.file:
         poses = file_path.parent / file.path.file
         inputs["poses"] = Input(poses, read_text(poses))

@@ -12,7 +12,7 @@ from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
-from ctrlgen.trajectory.path_inverse import Needed, PathInverse
+from ctrlgen.trajectory.path_inverse import Needed, PathInverse, count_faults
 from ctrlgen.trajectory.scenario import Scenario
 
 INERTIA = "has inertia: it can be simulated, diagnosed and exported as a plant, but not be led along a path yet"
@@ -56,13 +56,16 @@ class Solution:
 
 def foresee(scenario: Scenario, model: Model, command: np.ndarray) -> tuple[PathInverse, Needed]:
     """The inverse of `command` (n, channels) [SI] and what it needs, without IPOPT. Raises Unreachable where that breaks a limit, and
-    InputError for a device with inertia or a closed path of one that changes with time."""
+    InputError for a device that cannot be inverted, with inertia or too many or few drives, or a closed path of one that changes with
+    time."""
     if model.inertial:
         what = f"{model.name} {INERTIA}; name a device that is in balance at every moment"
         raise InputError(scenario.path, [Fault("device", what)])
     if model.clocks and scenario.closed:
         what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
         raise InputError(scenario.path, [Fault("path", what)])
+    if faults := count_faults(model, scenario.file.follow):
+        raise InputError(scenario.path, faults)
     inverse = PathInverse(model, scenario.file.follow, scenario.sample_time)
     needed = inverse.needed(command, scenario.closed)
     if (error := unreachable(scenario, inverse, command, needed)) is not None:

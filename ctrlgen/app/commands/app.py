@@ -36,7 +36,17 @@ def options(
 ScenarioPath = Annotated[
     Path, typer.Argument(help="A scenario folder (with scenario.toml) or a scenario file.", show_default=False)
 ]
-DevicePath = Annotated[Path, typer.Argument(help="A device file (device.toml).", show_default=False)]
+DevicePath = Annotated[
+    Path, typer.Argument(help="A device file (device.toml, or stage.py that makes one).", show_default=False)
+]
+OtherDevice = Annotated[
+    Path | None,
+    typer.Option(
+        "--device",
+        help="Another device file than the scenario names, such as device.next.toml or stage.py.",
+        show_default=False,
+    ),
+]
 OutFolder = Annotated[
     Path,
     typer.Option(

@@ -8,13 +8,13 @@ import typer
 from rich.markup import escape
 
 from ctrlgen.app import pipeline
-from ctrlgen.app.commands.app import OutFolder, ScenarioPath, app
+from ctrlgen.app.commands.app import OtherDevice, OutFolder, ScenarioPath, app
 from ctrlgen.app.console import out, print_build, print_comparison, print_solution, progress
 from ctrlgen.trajectory.scenario import load_scenario
 
 
 @app.command()
-def run(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
     """Solve a scenario, generate its C, compare the C with the model, and report.
 
     Leaves in --out: report.html (open this first), summary.json, trajectory.csv, figures/, and c/ with its
@@ -23,7 +23,7 @@ def run(scenario: ScenarioPath, out_folder: OutFolder) -> None:
     Example:  ctrlgen run scenarios/circle20 --out out/circle20
     """
     with progress(pipeline.STEPS) as advance:
-        outcome = pipeline.run(scenario, out_folder, advance)
+        outcome = pipeline.run(load_scenario(scenario, device), out_folder, advance)
     print_solution(outcome)
     print_comparison(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
@@ -31,20 +31,20 @@ def run(scenario: ScenarioPath, out_folder: OutFolder) -> None:
 
 
 @app.command()
-def solve(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
     """Solve a scenario for its drives (IPOPT) and report the margin to every limit; no C.
 
     Example:  ctrlgen solve scenarios/raster --out out/raster
     """
     with progress(2) as advance:
-        outcome = pipeline.solve_into(scenario, out_folder, advance)
+        outcome = pipeline.solve_into(load_scenario(scenario, device), out_folder, advance)
     print_solution(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
 
 @app.command()
-def generate(scenario: ScenarioPath, out_folder: OutFolder) -> None:
+def generate(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
     """Write the C of a scenario: online controller and player, double and float; needs no compiler.
 
     Leaves in --out a folder that drops into a firmware project as it is; its README.md says how.
@@ -52,20 +52,20 @@ def generate(scenario: ScenarioPath, out_folder: OutFolder) -> None:
     Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
     """
     with progress(2) as advance:
-        c = pipeline.generate_into(scenario, out_folder, advance)
+        c = pipeline.generate_into(load_scenario(scenario, device), out_folder, advance)
     for name in [*c.online.values(), *c.player.values()]:
         out.print(f"{out_folder / name}.c", soft_wrap=True, markup=False)
     out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
 
 
 @app.command()
-def compare(scenario: ScenarioPath) -> None:
+def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
     """Generate the C, build it with every compiler present, and compare it with the model; keeps nothing.
 
     Example:  ctrlgen compare scenarios/circle20
     """
     with progress(pipeline.STEPS - 1) as advance:
-        outcome = pipeline.compare_only(scenario, advance)
+        outcome = pipeline.compare_only(load_scenario(scenario, device), advance)
     print_comparison(outcome)
     _exit(outcome)
 
@@ -81,6 +81,7 @@ def verify(
             help="Leave out cppcheck and the fuzzer, which take over half of the time; both are then listed as not run.",
         ),
     ] = False,
+    device: OtherDevice = None,
 ) -> None:
     """Check a scenario's C in every way and report on one page: limits, cost on each target, equivalence, rules, origin.
 
@@ -92,7 +93,7 @@ def verify(
     Example:  ctrlgen verify scenarios/circle20 --out out/verify
     """
     with progress(pipeline.VERIFY_STEPS) as advance:
-        build = pipeline.verify(scenario, out_folder, advance, quick)
+        build = pipeline.verify(load_scenario(scenario, device), out_folder, advance, quick)
     print_build(build)
     out.print(f"[bold]page[/bold]  {escape(str(out_folder / 'build.html'))}", soft_wrap=True)
     if not build.passed:
@@ -104,6 +105,7 @@ def fmu(
     scenario: ScenarioPath,
     out_folder: OutFolder,
     fmi: Annotated[int, typer.Option(help="Version of the FMI standard, 3 or 2.")] = 3,
+    device: OtherDevice = None,
 ) -> None:
     """Write controller and plant as FMI co-simulation units, for Simulink, Dymola, OpenModelica, FMPy and others.
 
@@ -116,7 +118,7 @@ def fmu(
     """
     from ctrlgen.firmware.fmu import write_fmus
 
-    made = write_fmus(load_scenario(scenario), out_folder, fmi)
+    made = write_fmus(load_scenario(scenario, device), out_folder, fmi)
     for path in made.paths:
         out.print(str(path), soft_wrap=True, markup=False)
     out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)

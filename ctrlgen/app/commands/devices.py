@@ -55,7 +55,7 @@ def check(
             raise InputError(file, faults)
         out.print(f"{file}: every file is as it was generated", markup=False)
         return
-    if file.is_dir() or "kind" not in read_toml(file):
+    if file.is_dir() or (file.suffix != ".py" and "kind" not in read_toml(file)):
         scenario = load_scenario(file)
         model = build_model(scenario.device)
         command = scenario.command(model)

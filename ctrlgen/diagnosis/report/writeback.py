@@ -7,6 +7,7 @@ fit predicts with.
 
 from __future__ import annotations
 
+import os
 import re
 import textwrap
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from tomlkit.items import AoT, Item, Table
 
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
+from ctrlgen.devices.python_file import as_toml
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.structure import FreeParameter
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
@@ -42,8 +44,13 @@ MOVED = 1e-12  # relative change below which a parameter is left as it is
 
 
 def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
-    """Writes `target`, as a whole or not at all, from the device file `original`. Raises InputError where that cannot be read."""
-    write_text(target, next_text(diagnosis, read_text(original)))
+    """Writes `target`, as a whole or not at all, from the device file `original`. Raises InputError where that cannot be read.
+
+    Of a device made by a Python file the target names that file and states all its numbers.
+    """
+    python = original.suffix == ".py"
+    text = as_toml(diagnosis.device, os.path.relpath(original, target.parent)) if python else read_text(original)
+    write_text(target, next_text(diagnosis, text))
 
 
 def next_text(diagnosis: Diagnosis, original: str) -> str:
