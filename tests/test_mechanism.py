@@ -5,12 +5,14 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from command_line import ctrlgen as run_command
 from conftest import DEVICE
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
-from ctrlgen.devices.mechanism import Condensed
+from ctrlgen.devices.mechanism_model import Condensed, natural_frequencies
 from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.rrr_stage import hinge_compliance, stage
+from ctrlgen.model.assembly import movable
 from ctrlgen.physics import hexapod, xy_stage
 
 HEAD = 'kind = "mechanism"\nname = "m"\ntitle = "t"\nsource = "a test"\n'
@@ -190,9 +192,10 @@ def test_a_parallelogram_has_the_stiffness_and_stress_of_the_textbook(tmp_path):
     I = w * t**3 / 12
     assert dm(c.stiffness)[0, 0] == pytest.approx(24 * E * I / l**3, rel=1e-9)
     assert dm(c.jacobian)[0, 0] == pytest.approx(1.0, rel=1e-9)
-    for _, _, about_z, about_y, tension in c.stresses():
-        assert np.abs(dm(about_z)).ravel() == pytest.approx(np.full(2, 6 * E * I / l**2 / (w * t**2 / 6)), rel=1e-9)
-        assert np.abs(dm(about_y)).max() < 1e-6 * np.abs(dm(about_z)).max() > np.abs(dm(tension)).max()
+    names, about_z, about_y, tension = c.section_stresses("silicon")
+    assert names == ("left_free_end", "left_fixed_end", "right_free_end", "right_fixed_end")
+    assert np.abs(dm(about_z)).ravel() == pytest.approx(np.full(4, 6 * E * I / l**2 / (w * t**2 / 6)), rel=1e-9)
+    assert np.abs(dm(about_y)).max() < 1e-6 * np.abs(dm(about_z)).max() > np.abs(dm(tension)).max()
 
 
 def test_a_mechanism_is_solved_and_its_stress_limit_kept(tmp_path):
@@ -205,7 +208,7 @@ def test_a_mechanism_is_solved_and_its_stress_limit_kept(tmp_path):
     solution = solve(load_scenario(tmp_path), model)
     K = 24 * 130e9 * 8e-3 * 0.2e-3**3 / 12 / 20e-3**3
     assert solution.drive[-1, 0] == pytest.approx(K * 80e-6 / 2, rel=1e-9)
-    stress = {m.limit.name: m.value for m in solution.margins}["stress_left"]
+    stress = {m.limit.name: m.value for m in solution.margins}["stress_silicon"]
     assert stress == pytest.approx(3 * 130e9 * 0.2e-3 / (20e-3) ** 2 * 80e-6, rel=1e-6)
 
 
@@ -229,3 +232,97 @@ def test_what_does_not_fit_together_is_said(tmp_path, old, new, says):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, PARALLELOGRAM.replace(old, new))
     assert says in str(caught.value)
+
+
+def test_the_first_natural_frequency_of_a_parallelogram_is_that_of_its_mass_on_its_blades(tmp_path):
+    """sqrt(K/m)/(2 pi) of a mass that does not turn, pushed at the middle height of the blades."""
+    text = PARALLELOGRAM.replace(
+        '[[body]]\nname = "stage"',
+        '[[body]]\nname = "stage"\nmass = "50 g"\ncentre = ["0 mm", "-10 mm", "0 mm"]\ninertia = ["9 kg*mm^2", "9 kg*mm^2", "9 kg*mm^2"]',
+    )
+    K = 24 * 130e9 * 8e-3 * 0.2e-3**3 / 12 / 20e-3**3
+    modes = natural_frequencies(loaded(tmp_path, text))
+    assert len(modes) == 6 and modes[0] == pytest.approx(np.sqrt(K / 0.05) / (2 * np.pi), rel=1e-9)
+    assert modes[1] > 4 * modes[0]
+
+
+def test_bodies_without_mass_change_no_natural_frequency(tmp_path):
+    """The levers' wires made of two halves with a body between: series of both is the whole wire."""
+    whole = (DEVICE.parent / "xy_lever_stage.toml").read_text()
+    old = 'name = "push_x"\nfrom = "lever_x"\nto = "block_1"\nat = ["65 mm", "0 mm", "0 mm"]\nalong = [-1, 0, 0]\nlength = "15 mm"'
+    assert old in whole
+    section = 'diameter = "1.2 mm"\nmaterial = "steel"\n'
+    first = 'name = "push_x"\nfrom = "lever_x"\nto = "joint"\nat = ["72.5 mm", "0 mm", "0 mm"]\nalong = [-1, 0, 0]\nlength = "7.5 mm"\n'
+    second = first.replace("push_x", "push_x2").replace("lever_x", "joint", 1).replace('to = "joint"', 'to = "block_1"')
+    second = second.replace("72.5 mm", "65 mm")
+    halves = (
+        whole.replace(old, f'{first}{section}\n[[element]]\nkind = "wire"\n{second.rstrip()}')
+        + '\n[[body]]\nname = "joint"\n'
+    )
+    modes = [natural_frequencies(loaded(tmp_path, text)) for text in (whole, halves)]
+    assert modes[1] == pytest.approx(modes[0], rel=1e-7)
+    c = [Condensed(*with_values(loaded(tmp_path, text))) for text in (whole, halves)]
+    assert np.abs(dm(c[1].jacobian) - dm(c[0].jacobian)).max() < 1e-9 * np.abs(dm(c[0].jacobian)).max()
+
+
+def test_a_pattern_is_the_same_as_the_copies_written_out(tmp_path):
+    text = (DEVICE.parent / "tip_tilt_mirror.toml").read_text()
+    device = loaded(tmp_path, text)
+    assert device.bodies == ("mirror", "head_1", "head_2", "head_3")
+    C = dm(Condensed(*with_values(device)).output_compliance)
+    T = np.array(
+        [
+            [np.cos(2 * np.pi / 3), -np.sin(2 * np.pi / 3), 0],
+            [np.sin(2 * np.pi / 3), np.cos(2 * np.pi / 3), 0],
+            [0, 0, 1],
+        ]
+    )
+    turned = np.kron(np.eye(2), T)
+    assert (
+        np.abs(turned @ C @ turned.T - C).max() < 1e-9 * np.abs(C).max()
+    )  # three legs: the same after a third of a turn
+    angles = 'name = "leg"\ntimes = 3\nangles = ["0 deg", "120 deg", "240 deg"]'
+    same = loaded(tmp_path, text.replace('name = "leg"\ntimes = 3', angles, 1))
+    assert np.abs(dm(Condensed(*with_values(same)).output_compliance) - C).max() < 1e-12 * np.abs(C).max()
+    with pytest.raises(InputError) as caught:
+        loaded(tmp_path, text.replace('name = "leg"\ntimes = 3', angles.replace("3", "4", 1), 1))
+    assert "has 3 for 4 copies" in str(caught.value)
+
+
+def test_every_number_of_a_mechanism_may_be_free(tmp_path):
+    """The model with all its numbers as symbols is that with their values, and its slope by one is a difference of two."""
+    device = loaded(tmp_path, (DEVICE.parent / "xy_lever_stage.toml").read_text())
+    free = movable(device)
+    thickness = next(path for path in free if path.endswith("thickness"))
+    model = build_model(device, free=free)
+    pose = ca.Function(
+        "pose", [model.z, model.p], [model.signals["pose"].expr, ca.jacobian(model.signals["pose"].expr, model.p)]
+    )
+    z, k = np.array([1e-5, 2e-5]), free.index(thickness)
+    fixed = build_model(device)
+    fixed_pose = ca.Function("pose", [fixed.z], [fixed.signals["pose"].expr])
+    assert (
+        np.abs((pose(z, model.p_nominal)[0] - fixed_pose(z)).full()).max() < 1e-16
+    )  # of 70 um: rounding, another order of sums
+    step = 1e-6 * model.p_nominal[k]
+    ends = []
+    for side in (-1, 1):
+        p = model.p_nominal.copy()
+        p[k] += side * step
+        ends.append(pose(z, p)[0].full())
+    slope = pose(z, model.p_nominal)[1].full()[:, [k]]
+    assert np.abs((ends[1] - ends[0]) / (2 * step) - slope).max() < 1e-4 * np.abs(slope).max()
+
+
+def test_check_describes_and_draws_a_mechanism(tmp_path):
+    said = run_command("check", DEVICE.parent / "tip_tilt_mirror.toml", "--figure", tmp_path / "mirror.svg")
+    assert (
+        said.returncode == 0
+        and "4 bodies, 6 flexures, 3 actuators" in said.stdout
+        and "natural frequencies" in said.stdout
+    )
+    drawn = (tmp_path / "mirror.svg").read_text()
+    assert all(name in drawn for name in ("wire_2", "stack_3", "head_1", "leg_3", "output point"))
+    refused = run_command("check", DEVICE, "--figure", tmp_path / "hexapod.svg")
+    assert refused.returncode == 1 and 'only kind = "mechanism" is drawn' in refused.stderr
+    assert not (tmp_path / "hexapod.svg").exists()

@@ -240,7 +240,8 @@ def _equilibria(ref: ReferenceAnswers, answers: np.ndarray) -> np.ndarray:
     scale = np.concatenate([m.x_scale, m.z_scale])
     scaled = ca.vertcat(dynamics[0] / m.x_scale, dynamics[1] / m.force_scale)
     w = ca.MX.sym("w", len(scale))
-    at = ca.substitute([scaled], [x, z], [w[: len(m.rest)] * m.x_scale + m.rest, w[len(m.rest) :] * m.z_scale])[0]
+    states, places = ca.vertsplit(w, [0, len(m.rest), len(scale)])
+    at = ca.substitute([scaled], [x, z], [states * m.x_scale + m.rest, places * m.z_scale])[0]
     newton = newton_solver("rest", at, w, u, step_below=1e-12, most_steps=60)
     roots = newton.map(len(drives))(np.ones((len(scale), len(drives))), drives.T).full().T
     states, displacements = roots[:, : len(m.rest)] * m.x_scale + m.rest, roots[:, len(m.rest) :] * m.z_scale

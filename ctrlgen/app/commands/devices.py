@@ -15,6 +15,8 @@ from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show
 from ctrlgen.devices import load_device
+from ctrlgen.devices.mechanism import Mechanism
+from ctrlgen.devices.mechanism_model import summary
 from ctrlgen.devices.sensor import describe
 from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model
@@ -37,11 +39,15 @@ def check(
     device_path: Annotated[
         Path | None, typer.Option("--device", help="The device that a recording was made on.", show_default=False)
     ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option("--figure", help="Also draw a mechanism into this file, .svg or .png.", show_default=False),
+    ] = None,
 ) -> None:
     """Read a device, scenario or recording and list every fault, or summarise what it describes.
 
     Of a scenario it says whether its path can be followed, and where not, why and what could be followed instead; of a
-    generated folder which files were changed.
+    generated folder which files were changed; of a mechanism its stiffness, natural frequencies and Jacobian.
 
     Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
     """
@@ -79,12 +85,20 @@ def check(
         return
     device = load_device(file)
     model = build_model(device)
+    if figure is not None:
+        from ctrlgen.reporting.mechanism_figure import draw_mechanism  # matplotlib takes a second to import
+
+        if not isinstance(device, Mechanism):
+            raise InputError("--figure", [Fault(device.name, 'is no mechanism; only kind = "mechanism" is drawn')])
+        draw_mechanism(device, _picture("--figure", figure))
     numbers = list(device.quantities())
     unsourced = [path for path, q in numbers if q.source is None]
     out.print(
         f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators",
         markup=False,
     )
+    for line in summary(device) if isinstance(device, Mechanism) else ():
+        out.print(f"  {line}", markup=False, soft_wrap=True)
     for limit in model.limits:
         low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
         out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
@@ -93,6 +107,13 @@ def check(
         out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
     for remark in device.remarks():
         out.print(f"  note: {remark}", markup=False, soft_wrap=True)
+
+
+def _picture(option: str, path: Path) -> Path:
+    """`path`, if it is one of a picture."""
+    if path.suffix not in (".svg", ".png"):
+        raise InputError(option, [Fault(str(path), "must end in .svg or .png")])
+    return path
 
 
 @app.command()
@@ -110,9 +131,7 @@ def bode(
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
     pose = Frame(signal_.channels, signal_.units).pose(at, "--at")
-    if picture.suffix not in (".svg", ".png"):
-        raise InputError("--out", [Fault(str(picture), "must end in .svg or .png")])
-    draw_bode(model, pose, picture)
+    draw_bode(model, pose, _picture("--out", picture))
     out.print(str(picture), soft_wrap=True, markup=False)
 
 

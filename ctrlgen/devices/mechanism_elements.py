@@ -1,0 +1,229 @@
+"""The flexures of a mechanism: what each joins, where, and how compliant it is about its free end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Annotated, Any, Literal
+
+import casadi as ca
+import numpy as np
+from pydantic import Field, model_validator
+
+from ctrlgen.core.units import In, Quantity
+from ctrlgen.devices.section import Section
+from ctrlgen.physics import flexure, mechanism
+from ctrlgen.physics.screw import Matrix, move, series
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+Length = Annotated[Quantity, In("mm", positive=True)]
+Coordinate = Annotated[Quantity, In("mm")]
+Place = tuple[Coordinate, Coordinate, Coordinate]
+Direction = tuple[float, float, float]
+
+
+class Joining(Section):
+    """What all elements have: whom they join, and where."""
+
+    name: Name
+    """In messages and reports."""
+    from_: str = Field(alias="from")
+    """The body at its fixed end, or "ground"."""
+    to: str
+    """The body at its free end."""
+    at: Place
+    """Its free end in the global frame."""
+    along: Direction = (1.0, 0.0, 0.0)
+    """Direction from its fixed to its free end, its x axis; of any length."""
+    across: Direction | None = None
+    """A direction that fixes its y axis, along which a blade is thin; not parallel to `along`. Left out: y, or z where `along` is y."""
+    pattern: str = ""
+    """The pattern by which it is copied."""
+
+    @model_validator(mode="after")
+    def _has_a_frame(self) -> Joining:
+        if np.linalg.norm(np.cross(self.along, self.thin)) < 1e-6 * np.linalg.norm(self.along) * np.linalg.norm(
+            self.thin
+        ):
+            raise ValueError("across: is parallel to along, or one of them is zero; give two directions")
+        return self
+
+    @property
+    def thin(self) -> Direction:
+        """`across`, or what stands for it."""
+        if self.across is not None:
+            return self.across
+        return (0.0, 0.0, 1.0) if abs(self.along[1]) > 0.9 * np.linalg.norm(self.along) else (0.0, 1.0, 0.0)
+
+    @property
+    def frame(self) -> Matrix:
+        """R (3, 3) from its own frame to the global one."""
+        return mechanism.frame(ca.DM(self.along), ca.DM(self.thin))
+
+
+class Flexible(Joining):
+    """A flexure made of a material."""
+
+    length: Length
+    """Length between its ends."""
+    material: str
+    """Name of its material."""
+
+
+class Blade(Flexible):
+    """A leaf spring."""
+
+    kind: Literal["blade"]
+    """A blade: thin along its y axis."""
+    thickness: Length
+    """Along y."""
+    width: Length
+    """Along z, not below the thickness."""
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
+        """[C] about the free end (6, 6). Source: S1 eq. (21)-(23)."""
+        return flexure.blade_compliance(p.length, p.thickness, p.width, m.young, m.poisson)
+
+    def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
+        """Bending about z and y and tension [Pa] of section loads (6, n) in its frame."""
+        area = p.thickness * p.width
+        return load[5, :] * 6 / (area * p.thickness), load[4, :] * 6 / (area * p.width), load[0, :] / area
+
+
+class Wire(Flexible):
+    """A round wire or rod."""
+
+    kind: Literal["wire"]
+    """A wire or rod of round section."""
+    diameter: Length
+    """Of the section."""
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
+        """[C] about the free end (6, 6). Source: S1 eq. (24)."""
+        return flexure.wire_compliance(p.length, p.diameter, m.young, m.poisson)
+
+    def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
+        """Bending about z and y and tension [Pa] of section loads (6, n) in its frame."""
+        bending = 32 / (ca.pi * p.diameter**3)
+        return load[5, :] * bending, load[4, :] * bending, load[0, :] / (ca.pi * p.diameter**2 / 4)
+
+
+class Strut(Flexible):
+    """Wire, rod and wire in line, as of a hexapod."""
+
+    kind: Literal["strut"]
+    """A rod between two equal wires; both wires are part of `length`."""
+    wire_length: Length
+    """Of each wire."""
+    wire_diameter: Length
+    """Of each wire."""
+    rod_diameter: Length
+    """Of the rod between them."""
+
+    @model_validator(mode="after")
+    def _wires_fit(self) -> Strut:
+        if 2 * self.wire_length.si >= self.length.si:
+            raise ValueError("wire_length: two wires must fit in the length of the strut")
+        return self
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
+        """[C] about the free end (6, 6). Source: S1 section 5.2."""
+        wire = flexure.wire_compliance(p.wire_length, p.wire_diameter, m.young, m.poisson)
+        rod = flexure.wire_compliance(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson)
+        lower = move(wire, None, (p.wire_length - p.length, 0, 0))
+        return series((lower, move(rod, None, (-p.wire_length, 0, 0)), wire))
+
+    def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
+        """Bending about z and y and tension [Pa] of the wires at the strut's ends."""
+        bending = 32 / (ca.pi * p.wire_diameter**3)
+        return load[5, :] * bending, load[4, :] * bending, load[0, :] / (ca.pi * p.wire_diameter**2 / 4)
+
+
+class Compliance(Joining):
+    """A flexure by its compliance about its free end, such as one from finite elements or a notch by its equations."""
+
+    kind: Literal["compliance"]
+    """A compliance matrix of one's own; what is left out is zero, and by reciprocity given once."""
+    theta_x_per_M_x: Annotated[Quantity, In("rad/(N*m)", positive=True)]
+    """Torsion."""
+    theta_y_per_M_y: Annotated[Quantity, In("rad/(N*m)", positive=True)]
+    """Rotation about y."""
+    theta_z_per_M_z: Annotated[Quantity, In("rad/(N*m)", positive=True)]
+    """Rotation about z."""
+    delta_x_per_F_x: Annotated[Quantity, In("m/N", positive=True)]
+    """Extension."""
+    delta_y_per_F_y: Annotated[Quantity, In("m/N", positive=True)]
+    """Deflection along y."""
+    delta_z_per_F_z: Annotated[Quantity, In("m/N", positive=True)]
+    """Deflection along z."""
+    theta_z_per_F_y: Annotated[Quantity, In("rad/N")] = Quantity(0.0, "0 rad/N")
+    """Rotation about z per force along y, which is delta_y per M_z."""
+    theta_y_per_F_z: Annotated[Quantity, In("rad/N")] = Quantity(0.0, "0 rad/N")
+    """Rotation about y per force along z, which is delta_z per M_y."""
+    theta_x_per_F_z: Annotated[Quantity, In("rad/N")] = Quantity(0.0, "0 rad/N")
+    """Torsion per force along z, which is delta_z per M_x."""
+
+    @model_validator(mode="after")
+    def _stores_energy(self) -> Compliance:
+        p = SimpleNamespace(**{k: v.si for k in type(self).model_fields if isinstance(v := getattr(self, k), Quantity)})
+        C = ca.DM(self.compliance(p, SimpleNamespace())).full()[
+            [3, 4, 5, 0, 1, 2]
+        ]  # deflection per load, now symmetric
+        if np.linalg.eigvalsh(C / np.sqrt(np.outer(np.diag(C), np.diag(C)))).min() <= 0:
+            raise ValueError(
+                "the compliance is not positive definite: a load would gain energy from it; check the couplings"
+            )
+        return self
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
+        """[C] about the free end (6, 6), twist per wrench."""
+        z, y, x = p.theta_z_per_F_y, p.theta_y_per_F_z, p.theta_x_per_F_z
+        rows = [
+            [0, 0, x, p.theta_x_per_M_x, 0, 0],
+            [0, 0, y, 0, p.theta_y_per_M_y, 0],
+            [0, z, 0, 0, 0, p.theta_z_per_M_z],
+            [p.delta_x_per_F_x, 0, 0, 0, 0, 0],
+            [0, p.delta_y_per_F_y, 0, 0, 0, z],
+            [0, 0, p.delta_z_per_F_z, x, y, 0],
+        ]
+        return ca.vertcat(*(ca.horzcat(*row) for row in rows))
+
+
+class ComplianceMatrix(Joining):
+    """A flexure by its whole compliance matrix about its free end, in its own frame."""
+
+    kind: Literal["matrix"]
+    """A compliance matrix of one's own, by all its entries."""
+    compliance_si: tuple[tuple[float, float, float, float, float, float], ...] = Field(min_length=6, max_length=6)
+    """Twist (theta_x, theta_y, theta_z, delta_x, delta_y, delta_z) per wrench (F_x, F_y, F_z, M_x, M_y, M_z), in rad, m, N, N m."""
+
+    @model_validator(mode="after")
+    def _stores_energy(self) -> ComplianceMatrix:
+        C = np.array(self.compliance_si)[[3, 4, 5, 0, 1, 2]]  # deflection per load, symmetric by reciprocity
+        size = np.sqrt(np.abs(np.outer(np.diag(C), np.diag(C))))
+        if (
+            np.any(np.diag(C) <= 0)
+            or np.abs((C - C.T) / size).max() > 1e-6
+            or np.linalg.eigvalsh((C + C.T) / size).min() <= 0
+        ):
+            raise ValueError("compliance_si: is not symmetric and positive: a load would gain energy from it")
+        return self
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
+        """[C] about the free end (6, 6)."""
+        return ca.DM(np.array(self.compliance_si))
+
+
+AnyElement = Annotated[Blade | Wire | Strut | Compliance | ComplianceMatrix, Field(discriminator="kind")]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One copy of an element or actuator: its section, its number `p` in it, and by which angle it is turned."""
+
+    section: Any
+    index: int  # in the file
+    name: str
+    first: int
+    second: int
+    turn: Matrix
