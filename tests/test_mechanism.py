@@ -13,7 +13,7 @@ from ctrlgen.devices.mechanism_model import Condensed, natural_frequencies
 from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.rrr_stage import hinge_compliance, stage
 from ctrlgen.model.assembly import movable
-from ctrlgen.physics import hexapod, xy_stage
+from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 
 HEAD = 'kind = "mechanism"\nname = "m"\ntitle = "t"\nsource = "a test"\n'
 SILICON = '[[material]]\nname = "silicon"\nyoung = "130 GPa"\npoisson = "0.28"\n'
@@ -138,6 +138,56 @@ def test_the_3_rrr_stage_as_a_mechanism_has_the_papers_matrices(tmp_path, case):
     C_o = dm(c.output_compliance)[np.ix_([3, 4, 2], [0, 1, 5])]  # (dx, dy, dalpha) per (F_x, F_y, M_z)
     paper = dm(k.C_oFo)
     assert np.abs(T @ C_o @ T.T - paper).max() < 1e-9 * np.abs(paper).max()
+
+
+def xy_axis_text(s, a) -> str:
+    """One axis of S1's X-Y stage: two driven arms with half an actuator each, two guides; notch, lever and notch in each arm."""
+    notch = ca.DM(xy_stage.notch_compliance(s)).full()
+    lever = ca.DM(xy_stage._lever_compliance(s, a)).full()
+    half = 2 * np.linalg.inv(ca.DM(thermal_actuator.stiffness(a)).full())
+    lines, r = [HEAD, '[[body]]\nname = "plate"\n'], s.notch_radius
+
+    def element(name, first, second, at, along, C) -> None:
+        across = np.cross([0, 0, 1], along)
+        rows = ", ".join(vector(row) for row in C)
+        lines.append(
+            f'[[element]]\nkind = "matrix"\nname = "{name}"\nfrom = "{first}"\nto = "{second}"\nat = {place(at)}\n'
+            f"along = {vector(along)}\nacross = {vector(across)}\ncompliance_si = [{rows}]\n"
+        )
+
+    for side in (1, -1):
+        along, push = np.array([0.0, -side, 0.0]), np.array([1.0, 0.0, 0.0])  # toward the plate; as the bar pushes
+        for x, driven in ((-s.plate_half_length, True), (s.plate_half_length, False)):
+            k = f"{'drive' if driven else 'guide'}_{'plus' if side > 0 else 'minus'}"
+            end = np.array([x, side * s.plate_half_width, 0.0])
+            root = end - s.lever_long * along
+            lines += [f'[[body]]\nname = "{k}_{part}"\n' for part in ("foot", "far", *(["bar"] if driven else []))]
+            element(f"{k}_root", "ground", f"{k}_foot", root + r * along, along, notch)
+            element(f"{k}_lever", f"{k}_foot", f"{k}_far", end - r * along, along, lever)
+            element(f"{k}_end", f"{k}_far", "plate", end + r * along, along, notch)
+            if driven:
+                bar = root + s.lever_short * along
+                element(f"{k}_half", "ground", f"{k}_bar", bar, push, half)
+                element(f"{k}_notch", f"{k}_bar", f"{k}_foot", bar + r * push, push, notch)
+    lines.append(
+        '[[actuator]]\nname = "probe"\nkind = "force"\non = "plate"\nat = ["0 m", "0 m", "0 m"]\nalong = [1, 0, 0]\ngain = "1 N/V"\n'
+        'low = "0 V"\nhigh = "1 V"\ntravel = "50 um"\n[output]\nbody = "plate"\nat = ["0 m", "0 m", "0 m"]\nchannels = ["delta_x"]\n'
+    )
+    return "\n".join(lines)
+
+
+def test_an_axis_of_the_xy_stage_as_a_mechanism_has_the_papers_stiffness(tmp_path):
+    p = load_device(DEVICE).values()
+    device = loaded(tmp_path, xy_axis_text(p.stage, p.actuator))
+    assert len(device.bodies) == 11 and len(device.placed_elements) == 16
+    mine = dm(Condensed(*with_values(device)).output_compliance)
+    paper = np.linalg.inv(ca.DM(xy_stage.axis_stiffness(p.stage, p.actuator)).full())
+    size = np.sqrt(np.abs(np.outer(paper[range(6), [3, 4, 5, 0, 1, 2]], paper[range(6), [3, 4, 5, 0, 1, 2]])))[
+        :, [3, 4, 5, 0, 1, 2]
+    ]
+    assert (
+        np.abs((mine - paper) / size).max() < 1e-9
+    )  # of each entry's own size: turns and displacements differ by thousands
 
 
 PARALLELOGRAM = f"""{HEAD}{SILICON.replace('poisson = "0.28"', 'poisson = "0.28"' + chr(10) + 'stress_limit = "300 MPa"')}

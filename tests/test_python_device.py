@@ -91,6 +91,7 @@ def test_a_toml_file_changes_numbers_of_a_python_file_and_adds_effects(folder):
         (STAGE.replace('("0 V", "150 V")', '("0 V", "150 um")'), "are not of one dimension"),
         (STAGE.replace('("0 V", "150 V")', '("0 V",)'), "must be the lowest and the highest value"),
         (STAGE.replace('"250 MPa")},', '"250 MPa"), "other": 3},'), "limits.other: must be (law, largest value)"),
+        (STAGE.replace("1e13 * d.x", "1e7 + 1e13 * d.x"), "limits.stress: is 1e+07 at home"),
         (STAGE.replace("1e13 * d.x", "1e13 * d.z"), "limits.stress: raised AttributeError: the displacement has no 'z'"),
     ],
 )  # fmt: skip

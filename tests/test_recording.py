@@ -392,3 +392,23 @@ def test_real_files_are_read_and_nothing_in_them_is_marked(name):
     table = read_table(path)
     u, y = (table.numbers(table.find(column)) for column in (drive, read))
     assert len(u) > 3000 and not outliers(y, u[:, None]).any() and not stuck_samples(y, u[:, None]).any()
+
+
+def test_two_signals_are_not_read_from_one_column_but_one_amplifier_may_drive_two_with_a_scale(tmp_path, model):
+    two(tmp_path, samples())
+    records = [{"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}]
+    alike = COLUMNS | {"drive.1Y": COLUMNS["drive.1X"]}
+    found = refused([described(tmp_path, *records, columns=alike)], model)
+    assert found["columns.'drive.1Y'"].startswith("is read from column 'u1X', as drive.1X is")
+    scaled = COLUMNS | {"drive.1Y": COLUMNS["drive.1X"] | {"scale": 0.5}}
+    recording = load_recordings([described(tmp_path, *records, columns=scaled)], model)
+    assert np.allclose(recording.records[0].drive[:, 1], 0.5 * recording.records[0].drive[:, 0])
+
+
+def test_a_dwell_of_a_stage_with_inertia_is_refused(tmp_path):
+    axis = build_model(load_device(SCENARIOS / "devices" / "flexure_axis.toml"))
+    (tmp_path / "poses.csv").write_text("u,y\n" + "\n".join(f"{0.1 * k},{5.0 * k}" for k in range(8)) + "\n")
+    columns = {"drive.axis": {"column": "u", "unit": "V"}, "reading.axis": {"column": "y", "unit": "um"}}
+    record = {"file": "poses.csv", "role": "fit", "dwell": "1 s"}
+    found = refused([described(tmp_path, record, columns=columns, device="flexure_axis", kind="poses")], axis)
+    assert "this one has inertia" in found["record[0].dwell"]

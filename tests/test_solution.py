@@ -155,7 +155,7 @@ def test_a_bad_scenario_is_refused_with_the_remedy(scenario, text, says):
     [
         ('kind = "circle"\ndiameter = "20 um"\nplane = ["delta_x", "delta_q"]', "'delta_q' is not a channel"),
         ('kind = "circle"\ndiameter = "20 um"\nplane = ["delta_x", "delta_x"]', "twice"),
-        ('kind = "circle"\ndiameter = "20 um"\nplane = ["delta_x", "theta_x"]', "name two translations"),
+        ('kind = "circle"\ndiameter = "20 um"\nplane = ["delta_x", "theta_x"]', "name two lengths or two angles"),
         ('kind = "circle"\ndiameter = "20 um"\ncentre = { delta_z = "20 V", up = "1 um" }', "path.centre.up"),
     ],
 )

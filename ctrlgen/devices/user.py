@@ -289,11 +289,12 @@ def _validated(
     return device
 
 
-def _check_at_home(device: Device, read: _ArgumentReader) -> None:
+def _check_at_home(device: UserDevice, read: _ArgumentReader) -> None:
     """Collects the laws that are not finite at home and at rest, and masses that are not above zero."""
     physics = device.physics(device.values())
     n = len(physics.axes)
-    d, v, x, u = ca.SX.sym("d", n), ca.SX.sym("v", n), ca.SX.sym("x", len(physics.rest)), physics.drive.expr
+    d, v, u = ca.SX.sym("d", n), ca.SX.sym("v", n), physics.drive.expr
+    x = ca.SX(0, 1) if physics.state is None else physics.state.expr
     if isinstance(physics, InertialPhysics):
         force, rates = physics.dynamics(u, x, d, v)
     else:
@@ -303,11 +304,19 @@ def _check_at_home(device: Device, read: _ArgumentReader) -> None:
     if isinstance(physics, InertialPhysics):
         laws |= {"damping_force": physics.damping_force(v)} if physics.damping_force else {}
         laws["mass"] = ca.vertcat(*physics.mass)
-    home = ca.Function("home", [u, x, d, v], list(laws.values()))(0, 0, 0, 0)
-    for law, value in zip(laws, home, strict=True):
+    named = {  # kept online by scaling the displacement toward home
+        f"limits.{limit.name}": limit.expr
+        for limit in physics.limits(SimpleNamespace(drive=u, displacement=d, mechanism_displacement=d))
+        if limit.name in device.description.limits
+    }
+    home = ca.Function("home", [u, x, d, v], [*laws.values(), *named.values()])(0, 0, 0, 0)
+    for law, value in zip([*laws, *named], home, strict=True):
         numbers = np.array(value).ravel()
         if not np.all(np.isfinite(numbers)):
             read.faults.append(Fault(law, f"is {numbers} at home (all arguments zero); it must be finite there"))
+        elif law in named and np.any(numbers != 0):
+            what = f"is {numbers[0]:g} at home, from where the controller keeps it; write it so that it is zero there"
+            read.faults.append(Fault(law, what))
         elif law == "mass" and np.any(numbers <= 0):
             read.faults.append(Fault(law, f"is {numbers}; it must be above zero"))
 

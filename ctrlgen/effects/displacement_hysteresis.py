@@ -9,8 +9,8 @@ class DisplacementHysteresis(Effect):
 
     Prandtl-Ishlinskii with play operators, rate-independent; in a set of poses the memory goes from pose to pose in their
     order. The operator's own reversible part k decides where the loop leaves the gain as it is: k = 0 where all plays follow, 1
-    at small motions, where none does. g < 0 leads, as behind a controller that overcompensates. Holds for congruent loops,
-    behind the stage: what lags in its guide is the force `hysteresis`.
+    at small motions, where none does; far beyond, the law would be a gain with a little lag. g < 0 leads, as behind a controller
+    that overcompensates. Holds for congruent loops, behind the stage: what lags in its guide is the force `hysteresis`.
     """
 
     place = Place.DISPLACEMENT
@@ -21,7 +21,7 @@ class DisplacementHysteresis(Effect):
         Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0),
         Param("reach", "travel", (1e-4, 10.0), "r: travel after which all plays follow"),
         Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
-        Param("reversible", "1", (-3.0, 3.0), "k: reversible displacement over the share that lags"),
+        Param("reversible", "1", (-0.5, 1.5), "k: reversible displacement over the share that lags"),
     )
     states = play_states("travel")
 

@@ -200,6 +200,9 @@ class _Check:
             self._fault(
                 f"{where}.time", 'poses have no clock; leave it out and give dwell = "2 s" if they did not settle'
             )
+        elif record.dwell is not None and self.model.inertial:
+            what = "is for stages in balance; this one has inertia: leave it out if the poses settled, else record a series"
+            self._fault(f"{where}.dwell", what)
         if record.time is not None:
             self._check_unit(f"{where}.time", record.time, "s")
         ambient = record.conditions.ambient
@@ -213,6 +216,12 @@ class _Check:
 
     def _check_channels(self, where: str, columns: dict[str, Column]) -> None:
         """Every drive has a column, a reading is observed, names are signals of the model, units of their dimension."""
+        taken: dict[tuple[object, ...], str] = {}
+        for name, column in columns.items():
+            same = taken.setdefault((column.column, column.file, column.scale, column.later), name)
+            if same != name:
+                what = f"is read from column {column.column!r}, as {same} is; name its own, or give a scale if one signal drives both"
+                self._fault(f"columns.{name!r}", what)
         units = signal_units(self.model)
         for name, column in columns.items():
             place = "columns" if column is self.written.columns.get(name) else f"{where}.columns"

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field
 from pydantic.json_schema import SkipJsonSchema
 
 from ctrlgen.core.errors import Fault, InputError
@@ -23,7 +23,16 @@ from ctrlgen.core.files import read_text
 from ctrlgen.core.units import In, Quantity, parse, read_quantity, same_dimension, written_unit
 from ctrlgen.devices.base import Section
 
-Size = Annotated[Quantity, In(None, positive=True)]  # a length, or an angle, as the channels that it is along
+
+def _length_or_angle(given: Quantity) -> Quantity:
+    if not any(same_dimension(written_unit(given.text), unit) for unit in ("m", "rad")):
+        raise ValueError(f'{given.text!r} has the wrong unit; write a length or an angle, such as "20 um" or "1 mrad"')
+    return given
+
+
+Size = Annotated[
+    Quantity, In(None, positive=True), AfterValidator(_length_or_angle)
+]  # as the channels that it is along
 Point = dict[str, str | int | float]
 
 
