@@ -9,7 +9,7 @@ from command_line import ctrlgen as run_command
 from conftest import DEVICE
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
-from ctrlgen.devices.mechanism_model import Condensed, natural_frequencies
+from ctrlgen.devices.mechanism_model import Condensed, freedoms, natural_frequencies
 from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.rrr_stage import hinge_compliance, stage
 from ctrlgen.model.assembly import movable
@@ -274,6 +274,8 @@ def test_a_mechanism_is_solved_and_its_stress_limit_kept(tmp_path):
         ('channels = ["delta_x"]', 'channels = ["delta_x", "theta_z"]', "2 channels, 1 actuators"),
         ('body = "stage"', 'body = "table"', "output.body: 'table' is no body"),
         ('[[body]]\nname = "stage"', '[[body]]\nname = "stage"\n[[body]]\nname = "free"', "nothing joins free to the ground"),
+        ('width = "8 mm"', 'width = "0.1 mm"', "thickness = '0.2 mm' is above width = '0.1 mm'"),
+        ('channels = ["delta_x"]', 'channels = ["delta_z"]', "no actuator moves delta_z"),
         ('name = "coil"', 'name = "coil"\npattern = "arm"', "actuator[0].pattern: 'arm' is no pattern"),
     ],
 )  # fmt: skip
@@ -294,6 +296,61 @@ def test_the_first_natural_frequency_of_a_parallelogram_is_that_of_its_mass_on_i
     modes = natural_frequencies(loaded(tmp_path, text))
     assert len(modes) == 6 and modes[0] == pytest.approx(np.sqrt(K / 0.05) / (2 * np.pi), rel=1e-9)
     assert modes[1] > 4 * modes[0]
+
+
+def test_a_mechanism_without_an_actuator_is_refused(tmp_path):
+    pushed = PARALLELOGRAM[PARALLELOGRAM.index("[[actuator]]") : PARALLELOGRAM.index("[output]")]
+    text = PARALLELOGRAM.replace(pushed, "").replace('name = "m"', 'name = "m"\nactuator = []')
+    with pytest.raises(InputError) as caught:
+        loaded(tmp_path, text)
+    assert "actuator: there is none; add a [[actuator]] table" in str(caught.value)
+
+
+WIRE = (
+    '[[element]]\nkind = "wire"\nname = "{name}"\nfrom = "ground"\nto = "plate"\nat = ["{x} mm", "{y} mm", "{z} mm"]\n'
+)
+WIRE += 'along = [{along}]\nlength = "10 mm"\ndiameter = "0.2 mm"\nmaterial = "silicon"\n'
+REST = """[[actuator]]
+name = "push"
+kind = "force"
+on = "plate"
+at = ["0 mm", "0 mm", "0 mm"]
+along = [1, 0, 0]
+gain = "1 N/V"
+low = "0 V"
+high = "1 V"
+travel = "50 um"
+[output]
+body = "plate"
+at = ["0 mm", "0 mm", "0 mm"]
+channels = ["delta_x"]
+"""
+SIX = [
+    (0, 0, 0, "1, 0, 0"),
+    (0, 20, 0, "1, 0, 0"),
+    (0, 0, 20, "0, 1, 0"),
+    (20, 0, 0, "0, 0, 1"),
+    (0, 20, 0, "0, 0, 1"),
+    (0, 0, 20, "1, 0, 0"),
+]
+
+
+@pytest.mark.parametrize(("wires", "free", "over"), [(1, 5, 0), (3, 3, 0), (6, 0, 0), (7, 0, 1)])
+def test_degrees_of_freedom_are_those_of_exact_constraint(tmp_path, wires, free, over):
+    """Each wire that is independent of the others takes one freedom; a seventh over-constrains."""
+    text = HEAD + SILICON + '[[body]]\nname = "plate"\n'
+    for k, (x, y, z, along) in enumerate([*SIX, (20, 20, 0, "0, 0, 1")][:wires]):
+        text += WIRE.format(name=f"w{k}", x=x, y=y, z=z, along=along)
+    assert freedoms(loaded(tmp_path, text + REST)) == (free, over)
+
+
+def test_freedoms_of_known_guides(tmp_path):
+    assert freedoms(loaded(tmp_path, PARALLELOGRAM)) == (1, 1)  # two leaf springs: one motion, over-constrained once
+    one = PARALLELOGRAM.replace('name = "right"', 'name = "right"', 1)
+    a, b = one.index('[[element]]\nkind = "blade"\nname = "right"'), one.index("[[actuator]]")
+    assert freedoms(loaded(tmp_path, one[:a] + one[b:])) == (3, 0)  # one leaf spring
+    mirror = (DEVICE.parent / "tip_tilt_mirror.toml").read_text()
+    assert freedoms(loaded(tmp_path, mirror)) == (3, 0)  # x, y and the turn about z: the wires are soft across
 
 
 def test_bodies_without_mass_change_no_natural_frequency(tmp_path):

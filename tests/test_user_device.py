@@ -280,3 +280,70 @@ def test_a_mirror_that_tilts_is_led_along_a_path_and_drawn_in_its_own_unit(tmp_p
     left, right = draw_path(solution).axes
     assert [left.get_xlabel(), left.get_ylabel()] == labels and right.get_ylabel() == "modelled - commanded [urad]"
     assert left.lines[0].get_ydata()[-1] == pytest.approx(15.0 * len(axes), rel=1e-6)
+
+
+def gantry(**other):
+    """Two axes that share a mass, moved as told; the forces are read."""
+    words = dict(
+        parameters={"m": ("8 kg", "0.2 kg"), "shared": "1.5 kg", "c": ("20 N*s/m", "2 N*s/m"), "k": "300 N/m"},
+        axes={"x": "200 mm", "y": "150 mm"},
+        speed={"x": "1 m/s", "y": "1 m/s"},
+        needed_force=lambda d, v, a, p: [
+            p.m * a.x + p.shared * a.y + p.c * v.x + p.k * d.x,
+            p.m * a.y + p.shared * a.x + p.c * v.y,
+        ],
+    )
+    return ctrlgen.user_device("gantry", **(words | other))
+
+
+def test_an_imposed_motion_gives_the_force_that_its_user_wrote():
+    model = ctrlgen.build_model(gantry())
+    assert model.signals["reading"].channels == ("x", "y") and model.signals["drive"].channels[0] == "x_position"
+    d, v, a = np.array([0.1, -0.05]), np.array([0.3, 0.2]), np.array([2.0, -1.0])
+    reading = ca.Function("reading", [model.x, model.z, model.u], [model.signals["reading"].expr])
+    force = reading(np.zeros(0), d, np.concatenate([d, v, a])).full().ravel()
+    assert force == pytest.approx([8 * 2.0 - 1.5 + 20 * 0.3 + 300 * 0.1, -8.0 + 1.5 * 2.0 + 20 * 0.2], rel=1e-12)
+
+
+def test_a_diagnosis_names_the_friction_of_an_imposed_motion_written_in_python(tmp_path):
+    rng = np.random.default_rng(5)
+    names = [f"{axis}_{kind}" for kind in ("position", "velocity", "acceleration") for axis in "xy"]
+    units = ["m", "m", "m/s", "m/s", "m/s^2", "m/s^2"]
+    lines = ['title = "gantry"', 'device = "gantry"', 'kind = "series"', "[columns]"]
+    lines += [f'"drive.{n}" = {{ column = "{n}", unit = "{u}" }}' for n, u in zip(names, units, strict=True)]
+    lines += [f'"reading.{axis}" = {{ column = "f{axis}", unit = "N" }}' for axis in "xy"]
+    for role, n in (("fit", 1200), ("hold_out", 800)):
+        t = 2e-3 * np.arange(n)
+        w, phase = 2 * np.pi * np.array([1.3, 0.9]), rng.uniform(0, 6, 2)
+        d = 0.08 * np.sin(np.outer(t, w) + phase)
+        v, a = 0.08 * w * np.cos(np.outer(t, w) + phase), -(w**2) * d
+        f = np.column_stack(
+            [8 * a[:, 0] + 1.5 * a[:, 1] + 20 * v[:, 0] + 300 * d[:, 0], 8 * a[:, 1] + 1.5 * a[:, 0] + 20 * v[:, 1]]
+        )
+        f[:, 1] += 6.0 * np.sign(v[:, 1])
+        f += 0.1 * rng.standard_normal(f.shape)
+        header = ",".join([*names, "fx", "fy"])
+        np.savetxt(tmp_path / f"{role}.csv", np.column_stack([d, v, a, f]), delimiter=",", header=header, comments="")
+        lines += ["[[record]]", f'file = "{role}.csv"', f'role = "{role}"', 'sample_rate = "500 Hz"']
+    (tmp_path / "recording.toml").write_text("\n".join(lines) + "\n")
+    found = ctrlgen.diagnose(gantry(), tmp_path, laws=("coulomb", "stiffening", "sensor_gain"))
+    first = found.findings[0]
+    assert (first.effect, first.location) == ("coulomb", "stage:y") and first.share.value > 0.95
+    assert first.parameters["force"].value == pytest.approx(6.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("other", "says"),
+    [
+        ({"drive": {"motor": "1 V"}}, "drive: and needed_force are both given"),
+        ({"force": lambda u: u.motor}, "force: and needed_force are both given"),
+        ({"speed": {"x": "1 m/s"}}, "speed: must be given of each axis: x, y"),
+        ({"speed": {"x": "1 m/s", "y": "1 m"}}, "speed.y: '1 m' is no speed"),
+        ({"needed_force": lambda d: [1 / d.x, 0]}, "needed_force: is [inf"),
+        ({"needed_force": lambda d, q: [0, 0]}, "needed_force"),
+    ],
+)
+def test_an_imposed_motion_that_does_not_fit_is_refused(other, says):
+    with pytest.raises(InputError) as caught:
+        gantry(**other)
+    assert says in str(caught.value)

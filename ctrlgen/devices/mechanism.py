@@ -19,7 +19,7 @@ from pydantic import Field, model_validator
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 from ctrlgen.devices.base import BalancedPhysics, Device, Section
 from ctrlgen.devices.mechanism_elements import AnyElement, Direction, Flexible, Name, Place, Placed
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism_model import TWIST, Condensed
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
 from ctrlgen.physics.screw import rotation_z
@@ -27,7 +27,7 @@ from ctrlgen.physics.screw import rotation_z
 PerDrive = Annotated[Quantity, In(None)]
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
 GROUND_NAME = "ground"
-_ORIGIN = Quantity(0.0, "0 mm")
+MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
 
 
 class Material(Section):
@@ -69,8 +69,8 @@ class Body(Section):
     """The pattern by which it is copied."""
     mass: Annotated[Quantity, In("g", positive=True)] | None = None
     """For the natural frequencies; a body without mass follows the others."""
-    centre: Place = (_ORIGIN, _ORIGIN, _ORIGIN)
-    """Centre of mass in the global frame."""
+    centre: Place | None = None
+    """Centre of mass in the global frame. Left out: the origin."""
     inertia: tuple[Inertia, Inertia, Inertia] | None = None
     """Moments of inertia about axes through the centre of mass that are parallel to x, y and z as it is drawn."""
 
@@ -160,17 +160,20 @@ class Mechanism(Device):
     """`[[material]]` tables."""
     pattern: tuple[Pattern, ...] = ()
     """`[[pattern]]` tables."""
-    body: tuple[Body, ...] = Field(min_length=1)
+    body: tuple[Body, ...]
     """`[[body]]` tables."""
-    element: tuple[AnyElement, ...] = Field(min_length=1)
+    element: tuple[AnyElement, ...]
     """`[[element]]` tables."""
-    actuator: tuple[Actuator, ...] = Field(min_length=1)
+    actuator: tuple[Actuator, ...]
     """`[[actuator]]` tables: all push, or all prescribe displacements."""
     output: Output
     """`[output]`: what is followed."""
 
     @model_validator(mode="after")
     def _refers_to_what_there_is(self) -> Mechanism:
+        empty = [key for key in ("body", "element", "actuator") if not getattr(self, key)]
+        if empty:
+            raise ValueError("; ".join(f"{key}: there is none; add a [[{key}]] table" for key in empty))
         faults: list[str] = []
         for what, names in {
             "material": [m.name for m in self.material], "pattern": [q.name for q in self.pattern], "body": list(self.bodies),
@@ -195,9 +198,27 @@ class Mechanism(Device):
             faults.append(f"output.channels: {counts}; follow as many channels as there are actuators")
         if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):
             faults.append(f"body: nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground")
+        if not faults:
+            faults += self._unmoved()
         if faults:
             raise ValueError("; ".join(faults))
         return self
+
+    def _unmoved(self) -> list[str]:
+        """Channels that no actuator moves, or that move only together."""
+        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
+        moved *= np.array([self.size] * 3 + [1.0] * 3)[:, None]  # turns as displacements
+        rows, channels = moved[[TWIST.index(c) for c in self.output.channels]], self.output.channels
+        still = [c for c, row in zip(channels, rows, strict=True) if np.abs(row).max() <= MOVED * np.abs(moved).max()]
+        if still:
+            return [
+                f"output.channels: no actuator moves {', '.join(still)}; follow others, or push in another direction"
+            ]
+        if np.linalg.cond(rows / np.abs(rows).max(axis=1, keepdims=True)) > 1 / MOVED:
+            return [
+                f"output.channels: {', '.join(channels)} move only together; follow others, or place the actuators otherwise"
+            ]
+        return []
 
     def _unknown_names(self) -> list[str]:
         faults = []

@@ -20,6 +20,7 @@ Length = Annotated[Quantity, In("mm", positive=True)]
 Coordinate = Annotated[Quantity, In("mm")]
 Place = tuple[Coordinate, Coordinate, Coordinate]
 Direction = tuple[float, float, float]
+STIFF = 0.01  # of the largest compliance of a mechanism's flexures, below which a direction counts as held
 
 
 class Joining(Section):
@@ -60,6 +61,12 @@ class Joining(Section):
         """R (3, 3) from its own frame to the global one."""
         return mechanism.frame(ca.DM(self.along), ca.DM(self.thin))
 
+    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
+        """(m, 6): the directions of relative twist at its free end, in its frame, that count as held: those in which its compliance
+        C (6, 6), turns counted as displacements, is below a share `STIFF` of what flexures of the mechanism yield at most."""
+        values, directions = np.linalg.eigh((C + C.T) / 2)
+        return directions[:, values < STIFF * yields].T
+
 
 class Flexible(Joining):
     """A flexure made of a material."""
@@ -80,9 +87,21 @@ class Blade(Flexible):
     width: Length
     """Along z, not below the thickness."""
 
+    @model_validator(mode="after")
+    def _is_thin(self) -> Blade:
+        if self.thickness.si > self.width.si:
+            raise ValueError(
+                f"thickness = {self.thickness.text!r} is above width = {self.width.text!r}; turn the blade by across"
+            )
+        return self
+
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6). Source: S1 eq. (21)-(23)."""
         return flexure.blade_compliance(p.length, p.thickness, p.width, m.young, m.poisson)
+
+    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
+        """An ideal blade holds extension, deflection along its width and rotation about its thickness."""
+        return np.eye(6)[[3, 5, 1]]
 
     def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
         """Bending about z and y and tension [Pa] of section loads (6, n) in its frame."""
@@ -101,6 +120,10 @@ class Wire(Flexible):
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6). Source: S1 eq. (24)."""
         return flexure.wire_compliance(p.length, p.diameter, m.young, m.poisson)
+
+    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
+        """An ideal wire holds its length alone."""
+        return np.eye(6)[[3]]
 
     def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
         """Bending about z and y and tension [Pa] of section loads (6, n) in its frame."""
@@ -133,6 +156,10 @@ class Strut(Flexible):
         lower = move(wire, None, (p.wire_length - p.length, 0, 0))
         return series((lower, move(rod, None, (-p.wire_length, 0, 0)), wire))
 
+    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
+        """An ideal strut holds its length alone."""
+        return np.eye(6)[[3]]
+
     def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
         """Bending about z and y and tension [Pa] of the wires at the strut's ends."""
         bending = 32 / (ca.pi * p.wire_diameter**3)
@@ -156,16 +183,17 @@ class Compliance(Joining):
     """Deflection along y."""
     delta_z_per_F_z: Annotated[Quantity, In("m/N", positive=True)]
     """Deflection along z."""
-    theta_z_per_F_y: Annotated[Quantity, In("rad/N")] = Quantity(0.0, "0 rad/N")
-    """Rotation about z per force along y, which is delta_y per M_z."""
-    theta_y_per_F_z: Annotated[Quantity, In("rad/N")] = Quantity(0.0, "0 rad/N")
-    """Rotation about y per force along z, which is delta_z per M_y."""
-    theta_x_per_F_z: Annotated[Quantity, In("rad/N")] = Quantity(0.0, "0 rad/N")
-    """Torsion per force along z, which is delta_z per M_x."""
+    theta_z_per_F_y: Annotated[Quantity, In("rad/N")] | None = None
+    """Rotation about z per force along y, which is delta_y per M_z. Left out: none."""
+    theta_y_per_F_z: Annotated[Quantity, In("rad/N")] | None = None
+    """Rotation about y per force along z, which is delta_z per M_y. Left out: none."""
+    theta_x_per_F_z: Annotated[Quantity, In("rad/N")] | None = None
+    """Torsion per force along z, which is delta_z per M_x. Left out: none."""
 
     @model_validator(mode="after")
     def _stores_energy(self) -> Compliance:
-        p = SimpleNamespace(**{k: v.si for k in type(self).model_fields if isinstance(v := getattr(self, k), Quantity)})
+        given = ((key, getattr(self, key)) for key in type(self).model_fields)
+        p = SimpleNamespace(**{key: value.si if isinstance(value, Quantity) else None for key, value in given})
         C = ca.DM(self.compliance(p, SimpleNamespace())).full()[
             [3, 4, 5, 0, 1, 2]
         ]  # deflection per load, now symmetric
@@ -177,7 +205,7 @@ class Compliance(Joining):
 
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6), twist per wrench."""
-        z, y, x = p.theta_z_per_F_y, p.theta_y_per_F_z, p.theta_x_per_F_z
+        z, y, x = (0.0 if c is None else c for c in (p.theta_z_per_F_y, p.theta_y_per_F_z, p.theta_x_per_F_z))
         rows = [
             [0, 0, x, p.theta_x_per_M_x, 0, 0],
             [0, 0, y, 0, p.theta_y_per_M_y, 0],

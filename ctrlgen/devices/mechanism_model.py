@@ -16,6 +16,9 @@ from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
 from ctrlgen.physics.screw import Matrix, inverse, inverse_adjoint, move
 
+INDEPENDENT = (
+    1e-3  # singular value of unit rows below which a constraint adds nothing: flexures are not drawn more exactly
+)
 TWIST = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 
 
@@ -66,10 +69,11 @@ class Condensed:
         materials = {m.name: q for m, q in zip(device.material, p.material, strict=True)}
         self.frames = [ca.mtimes(e.turn, e.section.frame) for e in device.placed_elements]
         self.ends = [ca.mtimes(e.turn, ca.vertcat(*p.element[e.index].at)) for e in device.placed_elements]
-        stiffness = []
+        stiffness, self.compliances = [], []
         for e, R, end in zip(device.placed_elements, self.frames, self.ends, strict=True):
             own = p.element[e.index]
             C = e.section.compliance(own, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
+            self.compliances.append(C)
             stiffness.append(move(inverse(C), R, end))
         self.elements = [Element(e.first, e.second, K) for e, K in zip(device.placed_elements, stiffness, strict=True)]
         self.directions = [ca.mtimes(a.turn, _unit(a.section.along)) for a in device.placed_actuators]
@@ -119,12 +123,15 @@ class Condensed:
         return ends[0] - ends[1]
 
     @property
+    def output_motion(self) -> Matrix:
+        """(6, n): rotation and displacement of the output point per displacement of the actuated axes."""
+        T = self.twists[self.device.bodies.index(self.device.output.body)]
+        return ca.mtimes(_at(ca.vertcat(*self.p.output.at)), T)
+
+    @property
     def jacobian(self) -> Matrix:
-        """(channels, n): motion of the output point per displacement of the actuated axes."""
-        output = self.device.output
-        T = self.twists[self.device.bodies.index(output.body)]
-        moved = ca.mtimes(_at(ca.vertcat(*self.p.output.at)), T)
-        return moved[[TWIST.index(c) for c in output.channels], :]
+        """(channels, n): the components of `output_motion` that are followed."""
+        return self.output_motion[[TWIST.index(c) for c in self.device.output.channels], :]
 
     @property
     def output_compliance(self) -> Matrix:
@@ -255,6 +262,33 @@ def inverse_at(point: Matrix) -> Matrix:
     return ca.vertcat(ca.horzcat(ca.DM.eye(3), ca.DM.zeros(3, 3)), ca.horzcat(ca.skew(point), ca.DM.eye(3)))
 
 
+def freedoms(device: Drawing) -> tuple[int, int]:
+    """(degrees of freedom, times over-constrained) of the mechanism without its actuators.
+
+    Each flexure holds its stiff directions ideally, a blade three and a wire one: c rows A of relative twists of all bodies,
+    6 n - rank(A) and c - rank(A). Source: J. B. Hopkins, M. L. Culpepper, Precis. Eng. 34 (2010) 259 (ideal constraints).
+    """
+    c = Condensed(device, device.values())
+    count, rows = len(device.bodies), []
+    turn = np.array([device.size] * 3 + [1.0] * 3)  # twists (theta; delta) as displacements, wrenches (M; F) as forces
+    swap = [3, 4, 5, 0, 1, 2]
+    yields = [turn[:, None] * ca.DM(ca.evalf(ca.SX(C))).full()[:, swap] * turn for C in c.compliances]
+    largest = max(float(np.linalg.eigvalsh((C + C.T) / 2).max()) for C in yields)
+    for k, e in enumerate(device.placed_elements):
+        local = inverse_adjoint(c.frames[k], c.ends[k])  # twist in the element's frame, at its free end
+        own = e.section.constrained(yields[k], largest) * turn
+        A = np.zeros((len(own), 6 * count))
+        held = own @ ca.DM(ca.evalf(ca.SX(local))).full()
+        for body, sign in ((e.second, 1), (e.first, -1)):
+            if body != GROUND:
+                A[:, 6 * body : 6 * body + 6] = sign * held
+        rows.append(A)
+    A = np.vstack(rows) * np.tile([1 / device.size] * 3 + [1.0] * 3, count)
+    A /= np.linalg.norm(A, axis=1, keepdims=True)
+    rank = int(np.linalg.matrix_rank(A, tol=INDEPENDENT))
+    return 6 * count - rank, len(A) - rank
+
+
 def natural_frequencies(device: Drawing) -> np.ndarray:
     """The natural frequencies [Hz] with the drives held, ascending; empty where no body has a mass.
 
@@ -281,7 +315,7 @@ def natural_frequencies(device: Drawing) -> np.ndarray:
         if own.mass is None:
             continue
         R = np.array(placed.turn)
-        r = R @ np.array(own.centre)
+        r = R @ np.array((0.0, 0.0, 0.0) if own.centre is None else own.centre)
         S = np.array(ca.DM(ca.skew(ca.DM(r))))
         about = R @ np.diag(own.inertia) @ R.T - own.mass * S @ S
         at = slice(6 * placed.second, 6 * placed.second + 6)
@@ -306,6 +340,8 @@ def summary(device: Drawing) -> list[str]:
     lines = [
         f"{len(device.bodies)} bodies, {len(device.placed_elements)} flexures, {len(device.placed_actuators)} actuators"
     ]
+    free, over = freedoms(device)
+    lines.append(f"without its actuators {free} degrees of freedom, over-constrained {over} times")
     forces = ", ".join(f"{name} {show(1 / C[3 + i, i], 'N/um')}" for i, name in enumerate("xyz"))
     moments = ", ".join(f"{name} {show(1 / C[i, 3 + i], 'N*m/rad')}" for i, name in enumerate("xyz"))
     lines.append(f"stiffness at the output point: {forces}; about {moments}")

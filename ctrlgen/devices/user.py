@@ -3,7 +3,9 @@
     mass q'' = force(u, x, d, v) - restoring_force(d) - damping_force(v)   or   q'' = acceleration(u, x, d, v);   x' = rates(u, x, d, v)
     reading = pose(d)
 
-u drives, x the user's states, d displacements of the axes, v their velocities, p parameters; all SI.
+or, where the motion is imposed and the force read,   reading = needed_force(d, v, a)
+
+u drives, x the user's states, d displacements of the axes, v their velocities, a their accelerations, p parameters; all SI.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from pydantic import ConfigDict, create_model
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import In, Quantity, read_quantity, same_dimension, to_si, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, InertialPhysics
+from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
 from ctrlgen.devices.ports import Law, Ports
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.user_physics import PhysicsBuilder, UserDescription
@@ -53,8 +55,10 @@ class UserDevice(Device):
         """The user's functions with the values `p`. Raises InputError with every fault of the laws."""
         given = self.description
         given.faults.clear()
-        size = given.force.si if given.force else PhysicsBuilder(given, _numbers(given, self.values())).size()
-        physics = PhysicsBuilder(given, _numbers(given, p)).physics(size)
+        imposed = "needed_force" in given.laws
+        nominal, builder = (PhysicsBuilder(given, _numbers(given, values)) for values in (self.values(), p))
+        size = given.force.si if given.force else nominal.imposed_size() if imposed else nominal.size()
+        physics = builder.imposed(size) if imposed else builder.physics(size)
         if given.faults:
             raise InputError(self.name, given.faults)
         return physics
@@ -179,9 +183,30 @@ class _ArgumentReader:
             found[name] = (stated[0], size)
         return found
 
+    def imposed(
+        self, laws: Mapping[str, Law | None], ports: Mapping[str, Any], sizes: Mapping[str, Mapping[str, Quantity]]
+    ) -> None:
+        """Collects what does not go with `needed_force`, and speeds that do not fit the axes."""
+        beside = [name for name, law in laws.items() if law is not None and name != "needed_force"]
+        beside += [name for name, given in ports.items() if given]
+        self.faults += [
+            Fault(name, "and needed_force are both given; where the motion is imposed, needed_force holds all forces")
+            for name in beside
+        ]
+        axes, speed = sizes["axes"], sizes["speed"]
+        if set(axes) != set(speed):
+            self.faults.append(Fault("speed", f"must be given of each axis: {', '.join(axes)}"))
+        for name in axes.keys() & speed.keys():
+            if not same_dimension(written_unit(speed[name].text), f"({written_unit(axes[name].text)})/s"):
+                self.faults.append(
+                    Fault(f"speed.{name}", f"{speed[name].text!r} is no speed of an axis in {axes[name].text!r}")
+                )
+
     def laws(self, given: dict[str, Law | None], state: Mapping[str, Any], same: bool) -> dict[str, Law]:
         """The laws that are given, checked for what is missing and what excludes what; `same`: the readings are the axes."""
         present = {name: law for name, law in given.items() if law is not None}
+        if "needed_force" in present:
+            return present
         need = {
             "mass": any(m in present for m in NEED_MASS) and f"is missing: {' and '.join(m for m in NEED_MASS if m in present)} "
             "needs the inertia of each axis, on which the forces of effects act",
@@ -209,8 +234,8 @@ def user_device(
     name: str,
     *,
     parameters: Mapping[str, Any],
-    drive: Mapping[str, str | tuple[str, str]],
     axes: Mapping[str, str | tuple[str, str]],
+    drive: Mapping[str, str | tuple[str, str]] | None = None,
     force: Law | None = None,
     restoring_force: Law | None = None,
     damping_force: Law | None = None,
@@ -220,6 +245,8 @@ def user_device(
     rates: Law | None = None,
     reading: Mapping[str, str] | None = None,
     pose: Law | None = None,
+    needed_force: Law | None = None,
+    speed: Mapping[str, str] | None = None,
     limits: Mapping[str, tuple[Law, str]] | None = None,
     force_size: str | None = None,
     title: str = "",
@@ -235,15 +262,18 @@ def user_device(
     {value, sd, source, domain}: the diagnosis takes a number with an sd as uncertain, one without as exact until the data
     contradict it; its path is 'mechanism.NAME'. A law takes any of u, x, d, v, p as arguments of these names (see the
     module) and returns one number for each axis, state or reading: a vector, a list, or {name: number}. It may be a
-    `ca.Function` with inputs of these names. Without `mass` the axes have no inertia. `force_size` is the typical force
-    with its unit, by default that of the full drive in N, or N*m. Raises InputError with every fault.
+    `ca.Function` with inputs of these names. Without `mass` the axes have no inertia. With `needed_force` the motion of the axes is
+    imposed, up to the `speed` of each, and the force that it takes is read: there is then no drive and no other law.
+    `force_size` is the typical force with its unit, by default that of the full drive in N, or N*m. Raises InputError with
+    every fault.
     """
     read = _ArgumentReader(name)
     tables, domains, units = read.parameters(parameters)
-    ports = {"drive": drive, "axes": axes, "state": {} if state is None else state}
+    imposed = needed_force is not None
+    ports = {"drive": drive or {}, "axes": axes, "speed": speed or {}, "state": {} if state is None else state}
     sizes = {where: read.ports(where, given) for where, given in ports.items()}
     sizes["reading"] = sizes["axes"] if reading is None else read.ports("reading", reading)
-    for where in ("drive", "axes"):
+    for where in ("axes", "speed") if imposed else ("drive", "axes"):
         if not sizes[where]:
             read.faults.append(Fault(where, "is empty; name at least one"))
     sound = {axis: q for axis, q in sizes["axes"].items() if q is not PLACEHOLDER}
@@ -255,14 +285,19 @@ def user_device(
             )
     given = {
         "force": force, "restoring_force": restoring_force, "damping_force": damping_force, "mass": mass, "acceleration": acceleration,
-        "rates": rates, "pose": pose,
+        "rates": rates, "pose": pose, "needed_force": needed_force,
     }  # fmt: skip
+    if imposed:
+        read.imposed(given, {"drive": drive, "state": state, "reading": reading}, sizes)
+    elif speed is not None:
+        read.faults.append(Fault("speed", "is of an imposed motion; give needed_force, or leave it out"))
     expressions = read.limits({} if limits is None else limits)
     laws = read.laws(given, sizes["state"], reading is None or list(reading) == list(axes))
     size = None if force_size is None else read.ports("force_size", {"force_size": force_size})["force_size"]
     description = UserDescription(
         name, drive=sizes["drive"], axes=sizes["axes"], state=sizes["state"], reading=sizes["reading"], domains=domains, units=units,
         laws=laws, force=size, ranges=read.ranges, limits=expressions,
+        speed=sizes["speed"],
     )  # fmt: skip
     return _validated(
         description, tables, {"name": name, "title": title or name, "source": source, "effect": tuple(effect)}, read
@@ -280,7 +315,8 @@ def _validated(
     for effects in ((), plain["effect"]):  # the laws are checked even where an effect is wrong
         try:
             device = validate(device_class, {"kind": "user", **plain, "effect": effects, **sections}, description.name)
-            if description.axes and description.drive and not effects:
+            complete = description.drive or description.axes.keys() == description.speed.keys()
+            if description.axes and complete and not effects:
                 _check_at_home(device, read)
         except InputError as error:
             read.faults += [fault for fault in error.faults if fault not in read.faults]
@@ -293,6 +329,13 @@ def _check_at_home(device: UserDevice, read: _ArgumentReader) -> None:
     """Collects the laws that are not finite at home and at rest, and masses that are not above zero."""
     physics = device.physics(device.values())
     n = len(physics.axes)
+    if isinstance(physics, ImposedPhysics):
+        at = ca.Function("home", [physics.drive.expr], [physics.force(physics.drive.expr, ca.SX.zeros(n, 1))])(0).full()
+        if not np.all(np.isfinite(at)):
+            read.faults.append(
+                Fault("needed_force", f"is {at.ravel()} at home (all arguments zero); it must be finite there")
+            )
+        return
     d, v, u = ca.SX.sym("d", n), ca.SX.sym("v", n), physics.drive.expr
     x = ca.SX(0, 1) if physics.state is None else physics.state.expr
     if isinstance(physics, InertialPhysics):

@@ -12,11 +12,20 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import BalancedPhysics, DevicePhysics, InertialPhysics, Limit, Signal
+from ctrlgen.devices.base import (
+    BalancedPhysics,
+    DevicePhysics,
+    ImposedPhysics,
+    InertialPhysics,
+    Limit,
+    Signal,
+    imposed_motion,
+)
 from ctrlgen.devices.ports import Law, Ports, evaluate_law
 
 ARGUMENTS = {  # of each law
     "force": "uxdvp", "restoring_force": "dp", "damping_force": "vp", "mass": "p", "acceleration": "uxdvp", "rates": "uxdvp", "pose": "dp",
+    "needed_force": "dvap",
 }  # fmt: skip
 
 
@@ -24,7 +33,7 @@ ARGUMENTS = {  # of each law
 class UserDescription:
     """What the user gave: components {name: largest size} of each vector, domains and units of the parameters, the laws by
     name, the typical `force` if any, the `ranges` [SI] of components given by a lowest and a highest value, the `limits` on
-    expressions. Faults of the laws are collected as they are evaluated."""
+    expressions, the largest `speed` of each axis whose motion is imposed. Faults of the laws are collected as they are evaluated."""
 
     name: str
     axes: dict[str, Quantity]
@@ -37,6 +46,7 @@ class UserDescription:
     force: Quantity | None = None
     ranges: dict[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
     limits: dict[str, tuple[Law, Quantity]] = field(default_factory=dict)
+    speed: dict[str, Quantity] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
 
     def components(self, law: str) -> tuple[str, ...]:
@@ -45,8 +55,14 @@ class UserDescription:
 
     def evaluate(self, law: str, p: Ports, **vectors: ca.SX) -> ca.SX:
         """The vector that `law` returns; zeros where the law is not given or has faults, which are collected."""
-        names = {"u": self.drive, "x": self.state, "d": self.axes, "v": self.axes}
-        what = {"u": "the drive", "x": "the state", "d": "the displacement", "v": "the velocity"}
+        names = {"u": self.drive, "x": self.state, "d": self.axes, "v": self.axes, "a": self.axes}
+        what = {
+            "u": "the drive",
+            "x": "the state",
+            "d": "the displacement",
+            "v": "the velocity",
+            "a": "the acceleration",
+        }
         if law not in self.laws:
             return ca.SX.zeros(len(self.components(law)), 1)
         allowed = [key for key in ARGUMENTS[law] if key == "p" or (key in vectors and vectors[key].numel())]
@@ -95,6 +111,38 @@ class PhysicsBuilder:
         applied = (law(_sizes(given.drive), _sizes(given.state), 0)[0] - law(0, 0, 0)[0]).full()
         restoring = law(0, 0, _sizes(given.axes))[1].full()
         return float(next((size for f in (applied, restoring) if 0 < (size := np.abs(f).max()) < np.inf), 1.0))
+
+    def imposed_size(self) -> float:
+        """Typical force of an imposed motion: that at full travel, speed v and the acceleration v^2/d."""
+        travel, speed = np.array(_sizes(self.given.axes)), np.array(_sizes(self.given.speed))
+        d, v, a = (ca.SX.sym(name, len(travel)) for name in "dva")
+        law = self.given.evaluate("needed_force", self.p, d=d, v=v, a=a)
+        if self.given.faults:
+            return 1.0
+        size = np.abs(ca.Function("law", [d, v, a], [law])(travel, speed, speed**2 / travel).full()).max()
+        return float(size) if 0 < size < np.inf else 1.0
+
+    def imposed(self, size: float) -> ImposedPhysics:
+        """An imposed motion whose force is read: needed_force(d, v, a), `size` the typical one."""
+        given, n, axes = self.given, len(self.given.axes), tuple(self.given.axes)
+        travel, speed = _sizes(given.axes), _sizes(given.speed)
+        accelerations = tuple(v**2 / d for v, d in zip(speed, travel, strict=True))
+        unit = written_unit(next(iter(given.axes.values())).text)
+        still = ca.SX.zeros(n, 1)
+
+        def needed(d: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:
+            return given.evaluate("needed_force", self.p, d=d, v=v, a=a)
+
+        def restoring(d: ca.SX) -> ca.SX:
+            return needed(d, still, still) - needed(still, still, still)
+
+        force_unit = written_unit(given.force.text) if given.force else "N*m" if same_dimension(unit, "rad") else "N"
+        return ImposedPhysics(
+            axes=axes, components=axes, pose_units=(force_unit,) * n, pose_scale=(size,) * n,
+            drive=imposed_motion(axes, unit, (*travel, *speed, *accelerations)), displacement_scale=max(travel), travel_unit=unit,
+            force_scale=size, force_unit=force_unit, restoring_force=restoring, pose=lambda f: f, limits=self.limits,
+            force=lambda motion, d: needed(d, motion[n : 2 * n], motion[2 * n :]) - restoring(d),
+        )  # fmt: skip
 
     def physics(self, size: float) -> DevicePhysics:
         """The laws as a device's physics, `size` the typical force; faults of the laws are collected in the description."""

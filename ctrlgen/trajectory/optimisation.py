@@ -139,6 +139,7 @@ class TrajectoryProgramme:
                 "mu_strategy": "adaptive",
                 "max_iter": MOST_FROM_EXACT if begin is not None and begin.exact else MOST_ITERATIONS,
                 "nlp_scaling_method": "none",
+                "honor_original_bounds": "yes",  # it relaxes them by 1e-8 while it works
             },
         }
         solver = ca.nlpsol("trajectory", "ipopt", {"x": w, "f": 0.5 * SLACK_WEIGHT * ca.sumsqr(S), "g": g}, options)
@@ -195,8 +196,13 @@ class TrajectoryProgramme:
         before = needed.u
         if self.sample_time is not None:
             before = np.vstack([needed.u[-1:] if self.closed else needed.u_start[None], needed.u[:-1]])
-        none = np.zeros((self.n_command, self.sizes[3]))
-        return self._result(needed.x, needed.z, needed.u, before, none, 0)
+        none, m = np.zeros((self.n_command, self.sizes[3])), self.model
+        x, z, u = (
+            np.clip(needed.x, *m.x_bounds),
+            np.clip(needed.z, *m.z_bounds),
+            np.clip(needed.u, *m.u_bounds),
+        )  # rounding
+        return self._result(x, z, u, before, none, 0)
 
     def _result(
         self, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: np.ndarray, slack: np.ndarray, iterations: int

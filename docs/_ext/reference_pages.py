@@ -61,7 +61,7 @@ def type_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     if "x-unit" in schema:
         unit = schema["x-unit"]
         if unit == "any":
-            return "quantity in a unit of what it is along" + (", > 0" if schema.get("x-bounds") else "")
+            return "quantity with its unit" + (", > 0" if schema.get("x-bounds") else "")
         number = "count" if schema.get("x-whole") else "number" if unit == "1" else f'quantity, such as `"1 {unit}"`'
         bounds = schema.get("x-bounds", "")
         return number + (f", {bounds}" if bounds else "")

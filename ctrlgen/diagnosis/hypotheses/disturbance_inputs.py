@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import casadi as ca
 
 from ctrlgen.core.units import Quantity
-from ctrlgen.devices import Device, DevicePhysics
+from ctrlgen.devices import Device, DevicePhysics, ImposedPhysics
 from ctrlgen.effects import Effect, Param, Place
 from ctrlgen.model.effect_terms import available, channels
 
@@ -34,6 +34,16 @@ def with_disturbance_inputs(device: Device, physics: DevicePhysics) -> tuple[Dev
         if place is Place.HEAT and "heat" not in available(physics):
             continue
         for i, channel in enumerate(channels(physics, place)):
+            if place is Place.DISPLACEMENT and _moves_nothing(physics, i):
+                continue
             paths[place, i] = f"effect[{len(device.effect) + len(inputs)}].delta"
             inputs.append(_DisturbanceInput(place, channel.name, channel.unit))
     return device.model_copy(update={"effect": (*device.effect, *inputs)}), paths
+
+
+def _moves_nothing(physics: DevicePhysics, i: int) -> bool:
+    """Whether the displacement of axis i behind the stage is read by nothing: no pose, and no force of an imposed motion."""
+    d = ca.SX.sym("d", len(physics.axes))
+    if isinstance(physics, ImposedPhysics):
+        return not ca.depends_on(ca.vertcat(physics.restoring_force(d), physics.force(physics.drive.expr, d)), d[i])
+    return not ca.depends_on(physics.pose(d), d[i])
