@@ -143,7 +143,7 @@ def test_the_3_rrr_stage_as_a_mechanism_has_the_papers_matrices(tmp_path, case):
 def xy_axis_text(s, a) -> str:
     """One axis of S1's X-Y stage: two driven arms with half an actuator each, two guides; notch, lever and notch in each arm."""
     notch = ca.DM(xy_stage.notch_compliance(s)).full()
-    lever = ca.DM(xy_stage._lever_compliance(s, a)).full()
+    lever = ca.DM(xy_stage.lever_compliance(s, a)).full()
     half = 2 * np.linalg.inv(ca.DM(thermal_actuator.stiffness(a)).full())
     lines, r = [HEAD, '[[body]]\nname = "plate"\n'], s.notch_radius
 

@@ -91,7 +91,7 @@ def notch_compliance(s: Any) -> Matrix:
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
-def _lever_compliance(s: Any, a: Any) -> Matrix:
+def lever_compliance(s: Any, a: Any) -> Matrix:
     """Lever or guide beam between two notches, x along it, about its far end, shape (6, 6).
 
     A blade of length e_4 - 2 r. Its axial compliance is chosen so that an arm (beam and two notches) has half of k_a,
@@ -118,7 +118,7 @@ def _arm_stiffness(root: Matrix, s: Any, a: Any) -> Matrix:
         series(
             (
                 move(root, None, (-s.lever_long, 0, 0)),
-                move(_lever_compliance(s, a), None, (-r, 0, 0)),
+                move(lever_compliance(s, a), None, (-r, 0, 0)),
                 move(notch_compliance(s), None, (r, 0, 0)),
             )
         )
