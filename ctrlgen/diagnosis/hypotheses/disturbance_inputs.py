@@ -30,20 +30,26 @@ def with_disturbance_inputs(device: Device, physics: DevicePhysics) -> tuple[Dev
     """The device with a disturbance input on every channel of every place, and the path of each by place and channel index."""
     inputs: list[_DisturbanceInput] = []
     paths: dict[tuple[Place, int], str] = {}
+    unread = _unread_axes(device, physics)
     for place in Place:
         if place is Place.HEAT and "heat" not in available(physics):
             continue
         for i, channel in enumerate(channels(physics, place)):
-            if place is Place.DISPLACEMENT and _moves_nothing(physics, i):
+            if place is Place.DISPLACEMENT and i in unread:
                 continue
             paths[place, i] = f"effect[{len(device.effect) + len(inputs)}].delta"
             inputs.append(_DisturbanceInput(place, channel.name, channel.unit))
     return device.model_copy(update={"effect": (*device.effect, *inputs)}), paths
 
 
-def _moves_nothing(physics: DevicePhysics, i: int) -> bool:
-    """Whether the displacement of axis i behind the stage is read by nothing: no pose, and no force of an imposed motion."""
+def _unread_axes(device: Device, physics: DevicePhysics) -> frozenset[int]:
+    """The axes of an imposed motion on whose displacement no force depends, whatever the device's numbers."""
+    if not isinstance(physics, ImposedPhysics):
+        return frozenset()
+    bare = device.model_copy(update={"effect": ()})
+    any_numbers = {path: ca.SX.sym(path) for path, number in bare.quantities() if not number.whole}
+    general = bare.physics(bare.values(any_numbers))
+    assert isinstance(general, ImposedPhysics)  # as with the device's own numbers
     d = ca.SX.sym("d", len(physics.axes))
-    if isinstance(physics, ImposedPhysics):
-        return not ca.depends_on(ca.vertcat(physics.restoring_force(d), physics.force(physics.drive.expr, d)), d[i])
-    return not ca.depends_on(physics.pose(d), d[i])
+    forces = ca.vertcat(general.restoring_force(d), general.force(general.drive.expr, d))
+    return frozenset(i for i in range(d.numel()) if not ca.depends_on(forces, d[i]))
