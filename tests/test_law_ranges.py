@@ -70,3 +70,12 @@ def test_a_memory_has_a_typical_size_and_a_way_over_which_it_settles_may_be_a_hu
 def test_what_bends_or_moves_a_scale_acts_before_the_fringes_are_counted_along_it_in_the_order_of_the_file():
     orders = {Effect.library[kind].order for kind in ("bow", "cubic_sensor", "drift", "temperature_sensitivity")}
     assert len(orders) == 1 and max(orders) < Effect.library["cyclic"].order
+
+
+def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
+    """A law of two channels is tried with every partner; a clock counts on through a record and between records."""
+    library = Effect.library.items()
+    couplings = {"stiffness_coupling", "damping_coupling", "inertia_coupling"}
+    assert {k for k, law in library if law.pairs} == {"abbe_arm", "coupling", "link_compliance", "swapped"} | couplings
+    clocked = {"degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"}
+    assert {k for k, law in library if any(s.clock for s in law.states)} == clocked

@@ -433,3 +433,13 @@ def test_check_describes_and_draws_a_mechanism(tmp_path):
     refused = run_command("check", DEVICE, "--figure", tmp_path / "hexapod.svg")
     assert refused.returncode == 1 and 'only kind = "mechanism" is drawn' in refused.stderr
     assert not (tmp_path / "hexapod.svg").exists()
+
+
+def test_a_mechanism_read_twice_is_the_same_device_and_both_build_a_model(tmp_path):
+    text = (DEVICE.parent / "xy_lever_stage.toml").read_text()
+    first = loaded(tmp_path, text)
+    build_model(first)
+    second = loaded(tmp_path, text)
+    assert first == second and hash(first) == hash(second)
+    assert build_model(second).signals["pose"].channels == ("delta_x", "delta_y")
+    assert loaded(tmp_path, text.replace("25 N/um", "26 N/um")) != first

@@ -245,7 +245,7 @@ class ComplianceMatrix(Joining):
 AnyElement = Annotated[Blade | Wire | Strut | Compliance | ComplianceMatrix, Field(discriminator="kind")]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # a matrix has no truth value that a comparison could use
 class Placed:
     """One copy of an element or actuator: its section, its number `p` in it, and by which angle it is turned."""
 
