@@ -76,7 +76,7 @@ def test_a_toml_file_changes_numbers_of_a_python_file_and_adds_effects(folder):
     assert changed == {path: q.text for path, q in own.quantities() if path != "mechanism.stiffness"}
     scenario = load_scenario(folder / "circle.toml", folder / "stage.toml")
     assert scenario.inputs["device_code"].text == STAGE and "1.1 N/um" in scenario.inputs["device"].text
-    assert PathInverse(build_model(device), "pose", 1e-3).needed(scenario.command(build_model(device)), True).solved
+    assert PathInverse(build_model(device), "pose", 1e-3).trajectory(scenario.command(build_model(device)), True).solved
 
 
 @pytest.mark.parametrize(

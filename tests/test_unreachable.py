@@ -8,7 +8,7 @@ from conftest import DEVICE
 
 from ctrlgen import Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
-from ctrlgen.trajectory.excess import excesses
+from ctrlgen.trajectory.violations import violations
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import PathInverse
@@ -132,8 +132,8 @@ def test_the_drawn_paths_are_of_both_kinds(tmp_path):
 def test_what_a_path_needs_is_what_ipopt_finds(circle):
     """The inverse and the optimum are two computations of the same drives."""
     inverse = PathInverse(circle.model, "pose", circle.scenario.sample_time)
-    needed = inverse.needed(circle.command, True)
-    assert needed.exact and not excesses(circle.model, needed.x, needed.z, needed.u)
+    needed = inverse.trajectory(circle.command, True)
+    assert needed.exact and not violations(circle.model, needed.x, needed.z, needed.u)
     assert (
         np.abs(needed.u - circle.drive).max() < 1e-7
     )  # W, of 0.3: IPOPT's tolerance is 1e-10 of a sample's typical step
@@ -143,7 +143,7 @@ def test_what_a_path_needs_is_what_ipopt_finds(circle):
 def test_memories_are_carried_until_a_closed_path_repeats_or_is_seen_not_to(tmp_path, effects, settles):
     scenario = written(tmp_path, "mems_hexapod", effects, 200, 0.5, CIRCLE.format("20 um") + ABOVE)
     model = build_model(scenario.device)
-    needed = PathInverse(model, "pose", scenario.sample_time).needed(scenario.command(model), True)
+    needed = PathInverse(model, "pose", scenario.sample_time).trajectory(scenario.command(model), True)
     assert needed.solved and needed.exact is settles
     solution = solve(scenario, model)
     assert np.abs(needed.z - solution.trace.z).max() < (1e-12 if settles else 3 * needed.unsettled * 1e-5)

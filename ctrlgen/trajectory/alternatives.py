@@ -48,7 +48,7 @@ class Alternatives:
         self.confirming, self.inverse = inverse, inverse.without_memories
         self.signal, self.command, self.closed, self.slowed = signal, command, closed, slowed
         self.scale = np.array(signal.scale)
-        z = self.inverse.needed(command, closed).z
+        z = self.inverse.trajectory(command, closed).z
         extreme = np.concatenate([z.argmin(axis=0), z.argmax(axis=0), np.array(worst)]) / len(command)
         self.places = np.concatenate(
             [np.linspace(0, 1, LOOKED_AT), extreme]
@@ -182,7 +182,7 @@ class Alternatives:
 
     def _room(self, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """By how much each displacement must at least and may at most be moved to be in range at every sample."""
-        z = self.inverse.needed(command, self.closed).z
+        z = self.inverse.trajectory(command, self.closed).z
         low, high = self.inverse.model.z_bounds
         inside = (INSIDE + self.margin) * np.where(np.isfinite(high - low), high - low, 0.0)
         return low + inside - z.min(axis=0), high - inside - z.max(axis=0)

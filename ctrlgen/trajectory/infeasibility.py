@@ -10,9 +10,9 @@ from ctrlgen.core.errors import Infeasibility, SolverError, Unreachable
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.model import Model, Signal
 from ctrlgen.trajectory.alternatives import Alternatives
-from ctrlgen.trajectory.excess import Excess, excesses
+from ctrlgen.trajectory.violations import Violation, violations
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
-from ctrlgen.trajectory.path_inverse import Needed, PathInverse
+from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse
 from ctrlgen.trajectory.scenario import Scenario
 
 FEASIBILITY_TOLERANCE = (
@@ -23,12 +23,12 @@ SHOWN_CAUSES = 8  # limits that it lists
 
 
 def unreachable(
-    scenario: Scenario, inverse: PathInverse, command: np.ndarray, needed: Needed, certain: bool = False
+    scenario: Scenario, inverse: PathInverse, command: np.ndarray, needed: InverseTrajectory, certain: bool = False
 ) -> Unreachable | None:
     """The error that names the samples, the actuators and limits, by how much, and what can be followed instead; None where
     what is `needed` breaks no limit, or perhaps none, unless it is `certain` from elsewhere that the path cannot be followed."""
     model, n = inverse.model, len(command)
-    causes = primary(model, excesses(model, needed.x, needed.z, needed.u))
+    causes = primary(model, violations(model, needed.x, needed.z, needed.u))
     if not needed.exact and not certain:
         # of what may still change, or is out of the equations' range, only displacements far enough out of theirs
         least = 0.0 if not needed.solved else 2 * needed.unsettled * float(model.z_scale.max())
@@ -44,7 +44,7 @@ def unreachable(
         f"{_point(signal, command[worst])}"
     ]
     x, z, u = inverse.at_rest(command[worst])
-    held = excesses(model, x[None], z[None], u[None])
+    held = violations(model, x[None], z[None], u[None])
     listed, also = _grouped(model, causes)
     lines += [
         f"  {_said(model, cause, bool(held))}, worst at sample {cause.worst}{at(cause.worst)}, in {len(cause.samples)} of {n} "
@@ -69,7 +69,7 @@ def unreachable(
     )
 
 
-def primary(model: Model, broken: Sequence[Excess]) -> list[Excess]:
+def primary(model: Model, broken: Sequence[Violation]) -> list[Violation]:
     """Of the limits that would be `broken` those that do not follow from another: where a displacement is out of range, so are the
     force, the state and the drive that would hold it there; where a state is, the drive that would lead to it."""
     left = list(broken)
@@ -82,16 +82,16 @@ def primary(model: Model, broken: Sequence[Excess]) -> list[Excess]:
     return left
 
 
-def _grouped(model: Model, causes: Sequence[Excess]) -> tuple[list[Excess], list[int]]:
+def _grouped(model: Model, causes: Sequence[Violation]) -> tuple[list[Violation], list[int]]:
     """The causes to list, and how many more channels break the same: of a limit on an expression the worst channel stands for all."""
-    listed: dict[object, list[Excess]] = {}
+    listed: dict[object, list[Violation]] = {}
     for cause in causes:
         composite = model.limited_variable(cause.limit, cause.channel) is None
         listed.setdefault(cause.limit.name if composite else (cause.limit.name, cause.channel), []).append(cause)
     return [own[0] for own in listed.values()], [len(own) - 1 for own in listed.values()]
 
 
-def _said(model: Model, cause: Excess, held: bool) -> str:
+def _said(model: Model, cause: Violation, held: bool) -> str:
     """What is needed of whom, against which bound, and why there is one; `held`: a limit is also broken at rest."""
     limit, channel, value = cause.limit, cause.limit.channels[cause.channel], cause.value[cause.worst]
     below, variable = value < cause.bound, model.limited_variable(limit, cause.channel)

@@ -24,8 +24,8 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
-from ctrlgen.trajectory.excess import excesses
-from ctrlgen.trajectory.path_inverse import Needed
+from ctrlgen.trajectory.violations import violations
+from ctrlgen.trajectory.path_inverse import InverseTrajectory
 
 SLACK_WEIGHT = 1e8  # against IPOPT's barrier, which otherwise keeps the solution sqrt(mu) off an active bound
 TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error
@@ -100,7 +100,7 @@ class TrajectoryProgramme:
             rows[i] = m.x[i] - ca.substitute(value, m.x[stepped], ca.SX.zeros(len(stepped)))
         return ca.Function("settled", [m.x, m.z, m.u, m.p], [rows])
 
-    def run(self, limits: Sequence[Limit], begin: Needed | None = None) -> OptimisationResult:
+    def run(self, limits: Sequence[Limit], begin: InverseTrajectory | None = None) -> OptimisationResult:
         """IPOPT's solution with the composite `limits` as rows, begun at what the path needs where that is given.
 
         Raises SolverError, and KeyboardInterrupt on a signal.
@@ -174,7 +174,7 @@ class TrajectoryProgramme:
         return self._result(x, z, u, before, s, stats["iter_count"])
 
     def optimum(
-        self, begin: Needed | None = None, progress: Callable[[Sequence[Limit]], None] = lambda _: None
+        self, begin: InverseTrajectory | None = None, progress: Callable[[Sequence[Limit]], None] = lambda _: None
     ) -> tuple[OptimisationResult, list[Limit]]:
         """The solution that keeps every limit, and the composite limits that were added as rows. Raises SolverError.
 
@@ -185,13 +185,13 @@ class TrajectoryProgramme:
         while True:
             progress(rows)
             result = self.run(rows, begin)
-            broken = {e.limit.name: e.limit for e in excesses(self.model, result.x, result.z, result.u)}
+            broken = {e.limit.name: e.limit for e in violations(self.model, result.x, result.z, result.u)}
             added = [limit for limit in broken.values() if limit not in rows]
             if not added:
                 return result, rows
             rows += added
 
-    def exact(self, needed: Needed) -> OptimisationResult:
+    def exact(self, needed: InverseTrajectory) -> OptimisationResult:
         """What the path needs as the solution: an optimum where it keeps every limit, as its slack is zero."""
         before = needed.u
         if self.sample_time is not None:
@@ -214,7 +214,7 @@ class TrajectoryProgramme:
             result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
         return OptimisationResult(x, z, u, slack, result, iterations)
 
-    def _start(self, begin: Needed | None, starts_settled: bool) -> np.ndarray:
+    def _start(self, begin: InverseTrajectory | None, starts_settled: bool) -> np.ndarray:
         """Where IPOPT begins, scaled, inside the bounds."""
         m = self.model
         if begin is None or not all(np.all(np.isfinite(v)) for v in (begin.x, begin.z, begin.u)):

@@ -19,7 +19,7 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Model, Signal
-from ctrlgen.trajectory.excess import excesses
+from ctrlgen.trajectory.violations import violations
 
 HOME_DRIVE = 1e-3  # of the full drive, at which the slopes near home are taken: a heater's power has none at zero volt
 PERIODS = 20  # of a closed path, after which a memory that still changes is left to IPOPT
@@ -29,7 +29,7 @@ PROVEN = 1e-6  # typical sizes by which an exact inverse may be off the command 
 
 
 @dataclass(frozen=True)
-class Needed:
+class InverseTrajectory:
     """States `x` (n, n_x), displacements `z` (n, n_axes) and drives `u` (n, n_u) [SI] that follow a command; `u_start` (n_u,) the
     drive with which an open path begins.
 
@@ -113,17 +113,17 @@ class PathInverse:
         plain = device.model_copy(update={"effect": tuple(e for e in device.effect if not e.states)})
         return PathInverse(build_model(plain), self.follow, self.sample_time)
 
-    def needed(self, command: np.ndarray, closed: bool, periods: int = PERIODS) -> Needed:
+    def trajectory(self, command: np.ndarray, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
         """What `command` (n, channels) [SI] takes; not finite where the equations have no solution. A closed path is run through
         `periods` times at most."""
         if self.remembers and self.moving is not None:
             return self._carried(command, closed, periods)
         x, z, u_held = self._at_rest(command)
         if self.moving is None:
-            return self._checked(command, Needed(x, z, u_held, u_held[0]), closed)
+            return self._checked(command, InverseTrajectory(x, z, u_held, u_held[0]), closed)
         following = _following(len(command), closed)
         return self._checked(
-            command, Needed(x, z, self._drive(x, z, x[following], z[following]), u_held[0], True), closed
+            command, InverseTrajectory(x, z, self._drive(x, z, x[following], z[following]), u_held[0], True), closed
         )
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -152,12 +152,12 @@ class PathInverse:
         """Whether `command` can be followed with a `margin`, a share of each limit; judged by the samples `chosen` and those after them,
         where these are given and nothing is remembered from sample to sample."""
         if chosen is None or self.remembers or self.moving is None:
-            needed = self.needed(command, closed, periods)
-            return needed.solved and not excesses(self.model, needed.x, needed.z, needed.u, margin)
+            needed = self.trajectory(command, closed, periods)
+            return needed.solved and not violations(self.model, needed.x, needed.z, needed.u, margin)
         x, z, _ = self._at_rest(command[chosen])
         x_then, z_then, _ = self._at_rest(command[_following(len(command), closed)[chosen]])
         u = self._drive(x, z, x_then, z_then)
-        return bool(np.all(np.isfinite(u))) and not excesses(self.model, x, z, u, margin)
+        return bool(np.all(np.isfinite(u))) and not violations(self.model, x, z, u, margin)
 
     @cached_property
     def _equilibria(self) -> ca.Function:
@@ -184,7 +184,7 @@ class PathInverse:
         u = k.drive(x, z, wanted, k.state(x, z, wanted))
         return ca.Function("step", [now, target], [ca.vertcat(k.advance(x, z, u), wanted), now, u])
 
-    def _carried(self, command: np.ndarray, closed: bool, periods: int) -> Needed:
+    def _carried(self, command: np.ndarray, closed: bool, periods: int) -> InverseTrajectory:
         """With the effects' memories, from rest at the first sample; of a closed path the first period that repeats, or that at
         which it is seen not to within `periods`."""
         m, n = self.model, len(command)
@@ -203,9 +203,9 @@ class PathInverse:
                 break
         x, z = np.split(before, [m.x.numel()], axis=1)
         unsettled = _left(changes) if closed and changes[-1] > REPEATS else 0.0
-        return self._checked(command, Needed(x, z, u, u_start, False, unsettled), closed)
+        return self._checked(command, InverseTrajectory(x, z, u, u_start, False, unsettled), closed)
 
-    def _checked(self, command: np.ndarray, found: Needed, closed: bool) -> Needed:
+    def _checked(self, command: np.ndarray, found: InverseTrajectory, closed: bool) -> InverseTrajectory:
         """`found`, solved where it is finite and satisfies the model's own equations."""
         m, n = self.model, len(command)
         before = found.u

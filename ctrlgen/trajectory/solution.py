@@ -12,7 +12,7 @@ from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
-from ctrlgen.trajectory.path_inverse import Needed, PathInverse, count_faults
+from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
 from ctrlgen.trajectory.scenario import Scenario
 
 INERTIA = "has inertia: it can be simulated, diagnosed and exported as a plant, but not be led along a path yet"
@@ -54,7 +54,7 @@ class Solution:
         return min((m for m in self.margins if m.share is not None), key=lambda m: m.share or 0.0)
 
 
-def foresee(scenario: Scenario, model: Model, command: np.ndarray) -> tuple[PathInverse, Needed]:
+def check_feasibility(scenario: Scenario, model: Model, command: np.ndarray) -> tuple[PathInverse, InverseTrajectory]:
     """The inverse of `command` (n, channels) [SI] and what it needs, without IPOPT. Raises Unreachable where that breaks a limit, and
     InputError for a device that cannot be inverted, with inertia or too many or few drives, or a closed path of one that changes with
     time."""
@@ -67,7 +67,7 @@ def foresee(scenario: Scenario, model: Model, command: np.ndarray) -> tuple[Path
     if faults := count_faults(model, scenario.file.follow):
         raise InputError(scenario.path, faults)
     inverse = PathInverse(model, scenario.file.follow, scenario.sample_time)
-    needed = inverse.needed(command, scenario.closed)
+    needed = inverse.trajectory(command, scenario.closed)
     if (error := unreachable(scenario, inverse, command, needed)) is not None:
         raise error
     return inverse, needed
@@ -82,7 +82,7 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
     before each run of IPOPT.
     """
     command = scenario.command(model)
-    inverse, needed = foresee(scenario, model, command)
+    inverse, needed = check_feasibility(scenario, model, command)
 
     def step(rows: Sequence[Limit]) -> None:
         progress(f"IPOPT, {len(command)} samples" + (f", with {', '.join(r.label for r in rows)}" if rows else ""))

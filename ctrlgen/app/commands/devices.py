@@ -24,7 +24,7 @@ from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.schema import FILE as RECORDING
 from ctrlgen.trajectory.paths import Frame
 from ctrlgen.trajectory.scenario import load_scenario
-from ctrlgen.trajectory.solution import INERTIA, foresee
+from ctrlgen.trajectory.solution import INERTIA, check_feasibility
 
 
 @app.command()
@@ -70,7 +70,7 @@ def check(
             out.print(f"{scenario.device.name} {INERTIA}", markup=False)
             return
         try:
-            _, needed = foresee(scenario, model, command)
+            _, needed = check_feasibility(scenario, model, command)
         except Unreachable as error:
             if scenario.file.outcome == "solved":
                 raise

@@ -14,7 +14,7 @@ NEGLIGIBLE = (
 
 
 @dataclass(frozen=True)
-class Excess:
+class Violation:
     """A limit that one channel would break: `beyond` (n,) [SI] by how much at each sample, zero where it is kept, `value` (n,)
     the limited quantity. `bound` is the side that is broken most, `share` what is missing there, of the limit's range."""
 
@@ -36,7 +36,7 @@ class Excess:
         return np.flatnonzero(self.beyond)
 
 
-def excesses(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, margin: float = 0.0) -> list[Excess]:
+def violations(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, margin: float = 0.0) -> list[Violation]:
     """Every limit that the states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u) [SI] break, channel by channel,
     those that miss most first; with a `margin`, a share of the limit's range (of the limit, where there is one) by which it is to be kept.
 
@@ -55,5 +55,5 @@ def excesses(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, margin: 
             beyond[beyond < NEGLIGIBLE * unit] = 0.0
             if beyond.any():
                 k = int(np.argmax(beyond))
-                found.append(Excess(limit, i, low if value[k] < low else high, value, beyond, float(beyond[k] / unit)))
+                found.append(Violation(limit, i, low if value[k] < low else high, value, beyond, float(beyond[k] / unit)))
     return sorted(found, key=lambda e: -e.share)
