@@ -14,6 +14,7 @@ from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.rrr_stage import hinge_compliance, stage
 from ctrlgen.model.assembly import movable
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
+from ctrlgen.physics.flexure import rectangular_section
 
 HEAD = 'kind = "mechanism"\nname = "m"\ntitle = "t"\nsource = "a test"\n'
 SILICON = '[[material]]\nname = "silicon"\nyoung = "130 GPa"\npoisson = "0.28"\n'
@@ -190,34 +191,26 @@ def test_an_axis_of_the_xy_stage_as_a_mechanism_has_the_papers_stiffness(tmp_pat
     )  # of each entry's own size: turns and displacements differ by thousands
 
 
+def blade(name: str, x: float) -> str:
+    return f"""[[element]]
+kind = "blade"
+name = "{name}"
+from = "ground"
+to = "stage"
+at = ["{x} mm", "0 mm", "0 mm"]
+along = [0, 1, 0]
+across = [-1, 0, 0]
+length = "20 mm"
+thickness = "0.2 mm"
+width = "8 mm"
+material = "silicon"
+"""
+
+
 PARALLELOGRAM = f"""{HEAD}{SILICON.replace('poisson = "0.28"', 'poisson = "0.28"' + chr(10) + 'stress_limit = "300 MPa"')}
 [[body]]
 name = "stage"
-[[element]]
-kind = "blade"
-name = "left"
-from = "ground"
-to = "stage"
-at = ["-10 mm", "0 mm", "0 mm"]
-along = [0, 1, 0]
-across = [-1, 0, 0]
-length = "20 mm"
-thickness = "0.2 mm"
-width = "8 mm"
-material = "silicon"
-[[element]]
-kind = "blade"
-name = "right"
-from = "ground"
-to = "stage"
-at = ["10 mm", "0 mm", "0 mm"]
-along = [0, 1, 0]
-across = [-1, 0, 0]
-length = "20 mm"
-thickness = "0.2 mm"
-width = "8 mm"
-material = "silicon"
-[[actuator]]
+{blade("left", -10)}{blade("right", 10)}[[actuator]]
 name = "coil"
 kind = "force"
 on = "stage"
@@ -242,10 +235,9 @@ def test_a_parallelogram_has_the_stiffness_and_stress_of_the_textbook(tmp_path):
     I = w * t**3 / 12
     assert dm(c.stiffness)[0, 0] == pytest.approx(24 * E * I / l**3, rel=1e-9)
     assert dm(c.jacobian)[0, 0] == pytest.approx(1.0, rel=1e-9)
-    names, about_z, about_y, tension = c.section_stresses("silicon")
+    names, stress = c.stress("silicon", ca.DM(50e-6), 0.3)
     assert names == ("left_free_end", "left_fixed_end", "right_free_end", "right_fixed_end")
-    assert np.abs(dm(about_z)).ravel() == pytest.approx(np.full(4, 6 * E * I / l**2 / (w * t**2 / 6)), rel=1e-9)
-    assert np.abs(dm(about_y)).max() < 1e-6 * np.abs(dm(about_z)).max() > np.abs(dm(tension)).max()
+    assert dm(stress).ravel() == pytest.approx(np.full(4, 6 * E * I / l**2 / (w * t**2 / 6) * 50e-6), rel=1e-6)
 
 
 def test_a_mechanism_is_solved_and_its_stress_limit_kept(tmp_path):
@@ -277,6 +269,11 @@ def test_a_mechanism_is_solved_and_its_stress_limit_kept(tmp_path):
         ('width = "8 mm"', 'width = "0.1 mm"', "thickness = '0.2 mm' is above width = '0.1 mm'"),
         ('channels = ["delta_x"]', 'channels = ["delta_z"]', "no actuator moves delta_z"),
         ('name = "coil"', 'name = "coil"\npattern = "arm"', "actuator[0].pattern: 'arm' is no pattern"),
+        ('travel = "300 um"', 'travel = "300 um"\ntime_constant = "1 ms"\n[[actuator]]\nname = "b"\nkind = "force"\non = "stage"\n'
+         'at = ["0 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]\ngain = "2 N/A"\nlow = "-1 A"\nhigh = "1 A"\ntravel = "300 um"',
+         "actuator: some have a time_constant and some do not"),
+        ('to = "stage"\nat', 'too = "stage"\nat', "did you mean 'to'"),
+        ('from = "ground"', 'form = "ground"', "did you mean 'from'"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_together_is_said(tmp_path, old, new, says):
@@ -346,9 +343,8 @@ def test_degrees_of_freedom_are_those_of_exact_constraint(tmp_path, wires, free,
 
 def test_freedoms_of_known_guides(tmp_path):
     assert freedoms(loaded(tmp_path, PARALLELOGRAM)) == (1, 1)  # two leaf springs: one motion, over-constrained once
-    one = PARALLELOGRAM.replace('name = "right"', 'name = "right"', 1)
-    a, b = one.index('[[element]]\nkind = "blade"\nname = "right"'), one.index("[[actuator]]")
-    assert freedoms(loaded(tmp_path, one[:a] + one[b:])) == (3, 0)  # one leaf spring
+    one = PARALLELOGRAM.replace(blade("right", 10), "")
+    assert freedoms(loaded(tmp_path, one)) == (3, 0)  # one leaf spring
     mirror = (DEVICE.parent / "tip_tilt_mirror.toml").read_text()
     assert freedoms(loaded(tmp_path, mirror)) == (3, 0)  # x, y and the turn about z: the wires are soft across
 
@@ -443,3 +439,117 @@ def test_a_mechanism_read_twice_is_the_same_device_and_both_build_a_model(tmp_pa
     assert first == second and hash(first) == hash(second)
     assert build_model(second).signals["pose"].channels == ("delta_x", "delta_y")
     assert loaded(tmp_path, text.replace("25 N/um", "26 N/um")) != first
+
+
+SPRING = """[[element]]
+kind = "compliance"
+name = "{name}"
+from = "{first}"
+to = "{to}"
+at = ["{x} mm", "0 mm", "0 mm"]
+theta_x_per_M_x = "1 rad/(N*m)"
+theta_y_per_M_y = "1 rad/(N*m)"
+theta_z_per_M_z = "1 rad/(N*m)"
+delta_x_per_F_x = "{c} um/N"
+delta_y_per_F_y = "10 um/N"
+delta_z_per_F_z = "10 um/N"
+"""
+TWO_BODIES = f"""{HEAD}[[body]]
+name = "a"
+[[body]]
+name = "b"
+{SPRING.format(name="k_a", first="ground", to="a", x=0, c=0.5)}{SPRING.format(name="k_b", first="a", to="b", x=10, c=0.2)}"""
+OUTPUT_B = '[output]\nbody = "b"\nat = ["10 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]\n'
+
+
+def test_a_force_between_two_bodies_loads_the_flexure_between_them_alone(tmp_path):
+    """F on b and -F on a: a stays, b moves by F/k_b, and so do they relative to each other."""
+    push = (
+        '[[actuator]]\nname = "stack"\nkind = "force"\non = "b"\nagainst = "a"\nat = ["10 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]\n'
+        'gain = "1 N/V"\nlow = "0 V"\nhigh = "1 V"\ntravel = "50 um"\n'
+    )
+    c = Condensed(*with_values(loaded(tmp_path, TWO_BODIES + push + OUTPUT_B)))
+    assert dm(c.stiffness)[0, 0] == pytest.approx(1 / 0.2e-6, rel=1e-9)
+    assert dm(c.jacobian)[0, 0] == pytest.approx(1.0, rel=1e-9)
+    assert np.abs(dm(c.twists[0])).max() < 1e-12
+
+
+def test_a_displacement_between_two_bodies_is_shared_by_the_springs_at_both(tmp_path):
+    """The element stretches by d without load: b moves by k_b d/(k_b + k_c + k_b k_c/k_a), a by k_c/k_a of that, the other way."""
+    grounded = SPRING.format(name="k_c", first="ground", to="b", x=20, c=0.1)
+    move = (
+        '[[actuator]]\nname = "stroke"\nkind = "displacement"\non = "k_b"\nalong = [1, 0, 0]\ngain = "1 um/V"\nlow = "0 V"\n'
+        'high = "50 V"\ntravel = "50 um"\n'
+    )
+    c = Condensed(*with_values(loaded(tmp_path, TWO_BODIES + grounded + move + OUTPUT_B)))
+    k_a, k_b, k_c = 1 / 0.5e-6, 1 / 0.2e-6, 1 / 0.1e-6
+    b = k_b / (k_b + k_c + k_b * k_c / k_a)
+    assert dm(c.twists[1])[3, 0] == pytest.approx(b, rel=1e-9)
+    assert dm(c.twists[0])[3, 0] == pytest.approx(-b * k_c / k_a, rel=1e-9)
+
+
+@pytest.mark.parametrize("ahead", [12.0, -12.0])
+def test_a_mass_beside_the_end_of_a_beam_has_the_frequencies_of_deflection_and_turn(tmp_path, ahead):
+    """K of the cantilever's end in its plane, M = [[m, m e], [m e, I + m e^2]] with the centre of mass e ahead of the end."""
+    E, l, d, m, inertia, e = 130e9, 20e-3, 0.5e-3, 0.03, 4e-6, ahead * 1e-3
+    wire = (
+        '[[element]]\nkind = "wire"\nname = "w"\nfrom = "ground"\nto = "tip"\nat = ["20 mm", "0 mm", "0 mm"]\nlength = "20 mm"\n'
+        'diameter = "0.5 mm"\nmaterial = "silicon"\n'
+    )
+    body = f'[[body]]\nname = "tip"\nmass = "30 g"\ncentre = ["{20 + ahead} mm", "0 mm", "0 mm"]\n'
+    body += 'inertia = ["4 kg*mm^2", "4 kg*mm^2", "4 kg*mm^2"]\n'
+    modes = natural_frequencies(loaded(tmp_path, HEAD + SILICON + body + wire + REST.replace("plate", "tip")))
+    EI = E * np.pi * d**4 / 64
+    K = np.linalg.inv([[l**3 / (3 * EI), l**2 / (2 * EI)], [l**2 / (2 * EI), l / EI]])
+    M = np.array([[m, m * e], [m * e, inertia + m * e**2]])
+    wanted = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real) / (2 * np.pi)
+    for f in wanted:
+        assert np.abs(modes / f - 1).min() < 1e-9
+
+
+def test_the_stress_at_a_clamped_end_is_that_of_both_bendings_tension_and_torsion(tmp_path):
+    """A force (1, 1, 1) N 3 mm above the tip of a cantilever 20 mm long: at its root M = (-3, 3 - 20, 20) mN m, N = 1 N."""
+    device = """[[body]]
+name = "plate"
+[[element]]
+kind = "{kind}"
+name = "beam"
+from = "ground"
+to = "plate"
+at = ["20 mm", "0 mm", "0 mm"]
+length = "20 mm"
+{section}
+material = "silicon"
+"""
+    push = REST.replace(
+        'at = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]', 'at = ["20 mm", "0 mm", "3 mm"]\nalong = [1, 1, 1]', 1
+    )
+    text = HEAD + SILICON + device + push
+    T, M_y, M_z = -3e-3, 3e-3 - 20e-3, 20e-3
+    t, w = 1e-3, 4e-3
+    corner = abs(M_y) * 6 / (t * w**2) + M_z * 6 / (w * t**2) + 1 / (t * w)
+    tau = abs(T) / (0.282 * w * t**2)  # Timoshenko's table of torsion of bars: 0.282 at w/t = 4
+    r = 0.5e-3
+    round_bending = 4 * np.hypot(M_y, M_z) / (np.pi * r**3) + 1 / (np.pi * r**2)
+    for kind, section, wanted in (
+        ("blade", 'thickness = "1 mm"\nwidth = "4 mm"', np.hypot(corner, np.sqrt(3) * tau)),
+        ("wire", 'diameter = "1 mm"', np.hypot(round_bending, np.sqrt(3) * 2 * T / (np.pi * r**3))),
+    ):
+        c = Condensed(*with_values(loaded(tmp_path, text.format(kind=kind, section=section))))
+        d = np.sqrt(3) / dm(c.stiffness)[0, 0]
+        names, stress = c.stress("silicon", ca.DM(d), 0.3)
+        assert dm(stress)[names.index("beam_fixed_end"), 0] == pytest.approx(wanted, rel=1e-3)  # digits of the table
+
+
+@pytest.mark.parametrize(("r", "factor"), [(1.0, 0.208), (0.5, 0.246), (0.25, 0.282), (0.1, 0.313)])
+def test_the_torsion_modulus_of_a_rectangle_is_that_of_timoshenkos_table(r, factor):
+    assert rectangular_section(r, 1.0)[3] / r**2 == pytest.approx(factor, abs=0.001)  # three digits are given
+
+
+def test_a_channel_has_the_same_scale_whether_numbers_are_free_or_not(tmp_path):
+    device = loaded(tmp_path, (DEVICE.parent / "tip_tilt_mirror.toml").read_text())
+    fixed, free = build_model(device), build_model(device, free=movable(device))
+    assert fixed.signals["pose"].scale == free.signals["pose"].scale == device.channel_scale
+    J = dm(Condensed(*with_values(device)).jacobian)
+    travel = max(a.travel.si for a in device.actuator)
+    assert device.channel_scale == pytest.approx(np.abs(J).sum(axis=1) * travel)

@@ -8,10 +8,10 @@ from conftest import DEVICE
 
 from ctrlgen import Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
-from ctrlgen.trajectory.violations import violations
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import PathInverse
+from ctrlgen.trajectory.violations import violations
 
 DEVICES = DEVICE.parent
 BACKLASH = '\n[[effect]]\nkind = "backlash"\nat = "2X"\ngap = "0.3 um"\n'

@@ -159,7 +159,7 @@ def _keys(model: type[BaseModel], location: Sequence[Any]) -> list[str]:
             models = [member for field in fields for member in _models(field.annotation)]
         else:
             models = [m for m in models if part in _kinds(m)] or models
-    return list(dict.fromkeys(key for m in models for key in m.model_fields))
+    return list(dict.fromkeys(field.alias or key for m in models for key, field in m.model_fields.items()))
 
 
 def write_text(path: Path, text: str) -> None:

@@ -6,8 +6,7 @@ Motions are small: stiffness, Jacobian and loads are those of the mechanism as d
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal
@@ -18,8 +17,8 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 from ctrlgen.devices.base import BalancedPhysics, Device, Section
-from ctrlgen.devices.mechanism_elements import AnyElement, Direction, Flexible, Name, Place, Placed
-from ctrlgen.devices.mechanism_model import TWIST, Condensed
+from ctrlgen.devices.mechanism_elements import TWIST, AnyElement, Copied, Direction, Flexible, Name, Place, Placed
+from ctrlgen.devices.mechanism_model import Condensed
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
 from ctrlgen.physics.screw import rotation_z
@@ -193,6 +192,8 @@ class Mechanism(Device):
             faults.append(
                 "actuator: some push and some prescribe a displacement; give one kind, a stack as force with stiffness"
             )
+        if len({a.time_constant is None for a in self.actuator}) > 1:
+            faults.append("actuator: some have a time_constant and some do not; give one to all or to none")
         if not faults and len(self.output.channels) != len(self.placed_actuators):
             counts = f"{len(self.output.channels)} channels, {len(self.placed_actuators)} actuators"
             faults.append(f"output.channels: {counts}; follow as many channels as there are actuators")
@@ -206,8 +207,7 @@ class Mechanism(Device):
 
     def _unmoved(self) -> list[str]:
         """Channels that no actuator moves, or that move only together."""
-        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
-        moved *= np.array([self.size] * 3 + [1.0] * 3)[:, None]  # turns as displacements
+        moved = self._output_motion * np.array([self.size] * 3 + [1.0] * 3)[:, None]  # turns as displacements
         rows, channels = moved[[TWIST.index(c) for c in self.output.channels]], self.output.channels
         still = [c for c, row in zip(channels, rows, strict=True) if np.abs(row).max() <= MOVED * np.abs(moved).max()]
         if still:
@@ -251,11 +251,7 @@ class Mechanism(Device):
     @cached_property
     def bodies(self) -> tuple[str, ...]:
         """The names of all bodies, copies with their number."""
-        names = []
-        for b in self.body:
-            times = next((q.times for q in self.pattern if q.name == b.pattern), 0)
-            names += [f"{b.name}_{k + 1}" for k in range(times)] if times else [b.name]
-        return tuple(names)
+        return tuple(b.name for b in self.placed_bodies)
 
     @cached_property
     def size(self) -> float:
@@ -275,35 +271,45 @@ class Mechanism(Device):
                 return self.bodies.index(known)
         return None
 
-    def _copies(self, sections: Iterable[Any], first: str, second: str) -> tuple[Placed, ...]:
-        placed = []
+    def _copies(self, sections: Iterable[Any]) -> Iterator[Copied]:
         for index, section in enumerate(sections):
             pattern = next((q for q in self.pattern if q.name == section.pattern), None)
-            angles = [0.0] if pattern is None else [a.si for a in pattern.angles]
-            if pattern is not None and not angles:
-                angles = [2 * np.pi * k / pattern.times for k in range(pattern.times)]
+            if pattern is None:
+                yield Copied(section, index, section.name, 0, ca.DM.eye(3))
+                continue
+            angles = [a.si for a in pattern.angles] or [2 * np.pi * k / pattern.times for k in range(pattern.times)]
             for k, angle in enumerate(angles, start=1):
-                ends = [self._number(getattr(section, key, GROUND_NAME), section.pattern, k) for key in (first, second)]
-                name = section.name if pattern is None else f"{section.name}_{k}"
-                numbers = [GROUND if n is None else n for n in ends]
-                placed.append(Placed(section, index, name, numbers[0], numbers[1], ca.DM(rotation_z(angle))))
-        return tuple(placed)
+                yield Copied(section, index, f"{section.name}_{k}", k, ca.DM(rotation_z(angle)))
+
+    def _between(self, copy: Copied, first: str, second: str) -> Placed:
+        numbers = [self._number(name, copy.section.pattern, copy.copy) for name in (first, second)]
+        ends = [GROUND if n is None else n for n in numbers]
+        return Placed(copy.section, copy.index, copy.name, copy.copy, copy.turn, ends[0], ends[1])
+
+    @cached_property
+    def placed_bodies(self) -> tuple[Copied, ...]:
+        """Every copy of every body, by its number."""
+        return tuple(self._copies(self.body))
 
     @cached_property
     def placed_elements(self) -> tuple[Placed, ...]:
         """Every copy of every element."""
-        return self._copies(self.element, "from_", "to")
-
-    @cached_property
-    def placed_bodies(self) -> tuple[Placed, ...]:
-        """Every copy of every body; `second` is its number."""
-        copies = self._copies(self.body, "", "")
-        return tuple(replace(b, second=k) for k, b in enumerate(copies))
+        return tuple(self._between(c, c.section.from_, c.section.to) for c in self._copies(self.element))
 
     @cached_property
     def placed_actuators(self) -> tuple[Placed, ...]:
-        """Every copy of every actuator."""
-        return self._copies(self.actuator, "against", "on")
+        """Every copy of every actuator; one that prescribes a displacement names an element and no bodies."""
+        return tuple(self._between(c, c.section.against, c.section.on) for c in self._copies(self.actuator))
+
+    @cached_property
+    def channel_scale(self) -> tuple[float, ...]:
+        """A typical size [rad, m] of each channel that is followed: what all actuators at their travel make of it as described."""
+        reach = np.abs(self._output_motion).sum(axis=1) * max(a.travel.si for a in self.actuator)
+        return tuple(float(reach[TWIST.index(c)]) for c in self.output.channels)
+
+    @property
+    def _output_motion(self) -> np.ndarray:
+        return ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
 
     @property
     def _joints(self) -> list[Element]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -20,11 +20,14 @@ Length = Annotated[Quantity, In("mm", positive=True)]
 Coordinate = Annotated[Quantity, In("mm")]
 Place = tuple[Coordinate, Coordinate, Coordinate]
 Direction = tuple[float, float, float]
+TWIST = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 STIFF = 0.01  # of the largest compliance of a mechanism's flexures, below which a direction counts as held
 
 
 class Joining(Section):
     """What all elements have: whom they join, and where."""
+
+    ideal: ClassVar[tuple[str, ...] | None] = None  # what the ideal flexure holds, where there is one
 
     name: Name
     """In messages and reports."""
@@ -61,11 +64,14 @@ class Joining(Section):
         """R (3, 3) from its own frame to the global one."""
         return mechanism.frame(ca.DM(self.along), ca.DM(self.thin))
 
-    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
-        """(m, 6): the directions of relative twist at its free end, in its frame, that count as held: those in which its compliance
-        C (6, 6), turns counted as displacements, is below a share `STIFF` of what flexures of the mechanism yield at most."""
+    def constrained(self, C: np.ndarray, largest: float) -> np.ndarray:
+        """(m, 6): the directions of relative twist at its free end, in its frame, that count as held: those of the ideal flexure, or
+        those in which its compliance C (6, 6), turns counted as displacements, is below a share `STIFF` of the `largest` one in the
+        mechanism."""
+        if self.ideal is not None:
+            return np.eye(6)[[TWIST.index(name) for name in self.ideal]]
         values, directions = np.linalg.eigh((C + C.T) / 2)
-        return directions[:, values < STIFF * yields].T
+        return directions[:, values < STIFF * largest].T
 
 
 class Flexible(Joining):
@@ -76,9 +82,26 @@ class Flexible(Joining):
     material: str
     """Name of its material."""
 
+    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+        """Area [m^2] and section moduli of bending about y and z and of torsion [m^3] at its ends."""
+        raise NotImplementedError
+
+    @staticmethod
+    def largest_stress(about_y: Matrix, about_z: Matrix, tension: Matrix, shear: Matrix, floor: float) -> Matrix:
+        """The largest stress of its section [Pa], from the parts that `stresses` gives."""
+        raise NotImplementedError
+
+    def stresses(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+        """Bending about y and z, tension and torsion [Pa] at an end with the section loads (6, n) [N, N m], in its frame."""
+        area, about_y, about_z, torsion = self.section(p)
+        return load[4, :] / about_y, load[5, :] / about_z, load[0, :] / area, load[3, :] / torsion
+
 
 class Blade(Flexible):
     """A leaf spring."""
+
+    ideal = ("delta_x", "delta_z", "theta_y")
+    largest_stress = staticmethod(flexure.rectangular_stress)
 
     kind: Literal["blade"]
     """A blade: thin along its y axis."""
@@ -99,18 +122,16 @@ class Blade(Flexible):
         """[C] about the free end (6, 6). Source: S1 eq. (21)-(23)."""
         return flexure.blade_compliance(p.length, p.thickness, p.width, m.young, m.poisson)
 
-    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
-        """An ideal blade holds extension, deflection along its width and rotation about its thickness."""
-        return np.eye(6)[[3, 5, 1]]
-
-    def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
-        """Bending about z and y and tension [Pa] of section loads (6, n) in its frame."""
-        area = p.thickness * p.width
-        return load[5, :] * 6 / (area * p.thickness), load[4, :] * 6 / (area * p.width), load[0, :] / area
+    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+        """Of the rectangle."""
+        return flexure.rectangular_section(p.thickness, p.width)
 
 
 class Wire(Flexible):
     """A round wire or rod."""
+
+    ideal = ("delta_x",)
+    largest_stress = staticmethod(flexure.round_stress)
 
     kind: Literal["wire"]
     """A wire or rod of round section."""
@@ -121,18 +142,17 @@ class Wire(Flexible):
         """[C] about the free end (6, 6). Source: S1 eq. (24)."""
         return flexure.wire_compliance(p.length, p.diameter, m.young, m.poisson)
 
-    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
-        """An ideal wire holds its length alone."""
-        return np.eye(6)[[3]]
-
-    def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
-        """Bending about z and y and tension [Pa] of section loads (6, n) in its frame."""
-        bending = 32 / (ca.pi * p.diameter**3)
-        return load[5, :] * bending, load[4, :] * bending, load[0, :] / (ca.pi * p.diameter**2 / 4)
+    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+        """Of the wire."""
+        area, bending, torsion = flexure.round_section(p.diameter)
+        return area, bending, bending, torsion
 
 
 class Strut(Flexible):
     """Wire, rod and wire in line, as of a hexapod."""
+
+    ideal = ("delta_x",)
+    largest_stress = staticmethod(flexure.round_stress)
 
     kind: Literal["strut"]
     """A rod between two equal wires; both wires are part of `length`."""
@@ -156,14 +176,10 @@ class Strut(Flexible):
         lower = move(wire, None, (p.wire_length - p.length, 0, 0))
         return series((lower, move(rod, None, (-p.wire_length, 0, 0)), wire))
 
-    def constrained(self, C: np.ndarray, yields: float) -> np.ndarray:
-        """An ideal strut holds its length alone."""
-        return np.eye(6)[[3]]
-
-    def stress(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix]:
-        """Bending about z and y and tension [Pa] of the wires at the strut's ends."""
-        bending = 32 / (ca.pi * p.wire_diameter**3)
-        return load[5, :] * bending, load[4, :] * bending, load[0, :] / (ca.pi * p.wire_diameter**2 / 4)
+    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+        """Of its wires."""
+        area, bending, torsion = flexure.round_section(p.wire_diameter)
+        return area, bending, bending, torsion
 
 
 class Compliance(Joining):
@@ -246,12 +262,20 @@ AnyElement = Annotated[Blade | Wire | Strut | Compliance | ComplianceMatrix, Fie
 
 
 @dataclass(frozen=True, eq=False)  # a matrix has no truth value that a comparison could use
-class Placed:
-    """One copy of an element or actuator: its section, its number `p` in it, and by which angle it is turned."""
+class Copied:
+    """One copy of a body, element or actuator: which table of the file it is, its name, its number in the pattern (0: it has none)
+    and the rotation (3, 3) by which it is turned."""
 
     section: Any
-    index: int  # in the file
+    index: int
     name: str
+    copy: int
+    turn: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Placed(Copied):
+    """A copy of an element or actuator and the numbers of the bodies between which it acts, `GROUND` for none."""
+
     first: int
     second: int
-    turn: Matrix

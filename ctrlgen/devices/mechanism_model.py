@@ -11,15 +11,13 @@ from scipy.linalg import eigh
 
 from ctrlgen.core.units import show, written_unit
 from ctrlgen.devices.base import BalancedPhysics, Limit, Signal
-from ctrlgen.devices.mechanism_elements import Direction, Flexible, Placed
+from ctrlgen.devices.mechanism_elements import TWIST, Copied, Direction, Flexible, Placed
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
-from ctrlgen.physics.screw import Matrix, inverse, inverse_adjoint, move
+from ctrlgen.physics.screw import Matrix, adjoint, inverse, inverse_adjoint, move
 
-INDEPENDENT = (
-    1e-3  # singular value of unit rows below which a constraint adds nothing: flexures are not drawn more exactly
-)
-TWIST = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
+INDEPENDENT = 1e-3  # singular value of unit rows below which a constraint adds nothing: no drawing is more exact
+STILL = 1e-9  # m/m or rad/m: of the motion per actuator, below which it is rounding
 
 
 class Drawing(Protocol):
@@ -36,8 +34,8 @@ class Drawing(Protocol):
         ...
 
     @property
-    def placed_bodies(self) -> tuple[Placed, ...]:
-        """Every copy of every body."""
+    def placed_bodies(self) -> tuple[Copied, ...]:
+        """Every copy of every body, by its number."""
         ...
 
     @property
@@ -53,6 +51,11 @@ class Drawing(Protocol):
     @property
     def size(self) -> float:
         """The largest distance of an element's end from the origin [m]."""
+        ...
+
+    @property
+    def channel_scale(self) -> tuple[float, ...]:
+        """A typical size of each channel that is followed."""
         ...
 
     def values(self) -> SimpleNamespace:
@@ -102,7 +105,7 @@ class Condensed:
         per_input = mechanism.twists(len(device.bodies), self.elements, loads, device.size)
         if self.pushes:
             travel = ca.vertcat(*(self._travel(i, per_input) for i in range(n)))
-            self.stiffness = ca.solve(travel * 1e6, ca.DM.eye(n)) * 1e6  # [N/m] force per displacement of the axes
+            self.stiffness = ca.solve(travel, ca.DM.eye(n))  # [N/m] force per displacement of the axes
             self.twists = [ca.mtimes(T, self.stiffness) for T in per_input]
         else:
             self.stiffness, self.twists = ca.DM.eye(n), per_input
@@ -113,7 +116,7 @@ class Condensed:
 
     def moved(self, a: Placed) -> str:
         """The name of the element that a displacement actuator moves."""
-        return a.section.on if not a.section.pattern else f"{a.section.on}_{a.name.rpartition('_')[2]}"
+        return f"{a.section.on}_{a.copy}" if a.copy else a.section.on
 
     def _travel(self, i: int, twists: list[Matrix]) -> Matrix:
         """(1, n) travel of actuator i."""
@@ -123,10 +126,15 @@ class Condensed:
         return ends[0] - ends[1]
 
     @property
+    def output_point(self) -> Matrix:
+        """(3,) the point that is followed [m]."""
+        return ca.vertcat(*self.p.output.at)
+
+    @property
     def output_motion(self) -> Matrix:
         """(6, n): rotation and displacement of the output point per displacement of the actuated axes."""
         T = self.twists[self.device.bodies.index(self.device.output.body)]
-        return ca.mtimes(_at(ca.vertcat(*self.p.output.at)), T)
+        return ca.mtimes(inverse_adjoint(None, self.output_point), T)
 
     @property
     def jacobian(self) -> Matrix:
@@ -136,12 +144,10 @@ class Condensed:
     @property
     def output_compliance(self) -> Matrix:
         """(6, 6) twist of the output point per wrench there, the drives held."""
-        device, at = self.device, _at(ca.vertcat(*self.p.output.at))
+        device, at = self.device, self.output_point
         k = device.bodies.index(device.output.body)
-        T = mechanism.twists(
-            len(device.bodies), self.held_elements(), {k: inverse_at(ca.vertcat(*self.p.output.at))}, device.size
-        )
-        return ca.mtimes(at, T[k])
+        T = mechanism.twists(len(device.bodies), self.held_elements(), {k: adjoint(None, at)}, device.size)
+        return ca.mtimes(inverse_adjoint(None, at), T[k])
 
     def held_elements(self) -> list[Element]:
         """The elements, as they are with the drives held, and the stiffness of the actuators beside them."""
@@ -166,22 +172,21 @@ class Condensed:
         m = self.prescribed[k]
         return ca.mtimes(e.stiffness, T[0] - T[1] - (0 if m is None else m))
 
-    def section_stresses(self, material: str) -> tuple[tuple[str, ...], Matrix, Matrix, Matrix]:
-        """Of the flexures of a material: names of both ends of each, and bending about z and y and tension there per displacement of
-        the axes, (ends, n) each [Pa/m]."""
-        names, parts = [], []
+    def stress(self, material: str, d: Matrix, floor: float) -> tuple[tuple[str, ...], Matrix]:
+        """Of the flexures of a material: the names of both ends of each, and the largest stress there (ends,) [Pa] with the axes
+        displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`."""
+        names, stresses = [], []
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
                 continue
             own = self.p.element[e.index]
             for end, back in (("free_end", 0), ("fixed_end", own.length)):
-                local = ca.mtimes(
-                    inverse_adjoint(self.frames[k], self.ends[k] - back * self.frames[k][:, 0]), self.wrench(k)
-                )
+                section = self.ends[k] - back * self.frames[k][:, 0]
+                load = ca.mtimes(inverse_adjoint(self.frames[k], section), self.wrench(k))
+                parts = (ca.mtimes(part, d) for part in e.section.stresses(load, own))
                 names.append(f"{e.name}_{end}")
-                parts.append(e.section.stress(local, own))
-        z, y, tension = (ca.vertcat(*rows) for rows in zip(*parts, strict=True))
-        return tuple(names), z, y, tension
+                stresses.append(e.section.largest_stress(*parts, floor))
+        return tuple(names), ca.vertcat(*stresses)
 
     def physics(self) -> BalancedPhysics:
         """As a device's physics."""
@@ -195,16 +200,10 @@ class Condensed:
         sizes = tuple(max(abs(s.low.si), abs(s.high.si)) for s in sections)
         drive = Signal("drive", "drive", axes, units, "u_", ca.SX.sym("u", n), sizes)
         lags = [q.time_constant for q in own]
-        lagging = [i for i, tau in enumerate(lags) if tau is not None]
-        if lagging and len(lagging) < n:
-            raise ValueError("all actuators have a time_constant, or none")
+        lagging = all(tau is not None for tau in lags)  # all of them, or none
         state = Signal("state", "amplifier output", axes, units, "x_", ca.SX.sym("x", n), sizes) if lagging else None
         flexed = {e.material for e in device.element if isinstance(e, Flexible)}
-        stressed = {
-            m.name: (m.stress_limit, *self.section_stresses(m.name))
-            for m in device.material
-            if m.stress_limit and m.name in flexed
-        }
+        stressed = {m.name: m.stress_limit for m in device.material if m.stress_limit and m.name in flexed}
         force_unit = "N" if self.pushes else "um"
         travel = max(s.travel.si for s in sections)
         K, J = self.stiffness, self.jacobian
@@ -223,22 +222,16 @@ class Condensed:
                     )
                 label, reach = f"travel of {axes[i]}", s.travel.si
                 found.append(Limit(f"travel_{axes[i]}", label, (axes[i],), "um", signal.displacement[i], -reach, reach))
-            for material, (limit, names, *parts) in stressed.items():
-                z, y, tension = (ca.mtimes(part, signal.mechanism_displacement) for part in parts)
-                floor = (1e-9 * limit.si) ** 2  # so that the derivative exists at home
-                stress = ca.sqrt(z**2 + y**2 + floor) + ca.fabs(tension)
+            for material, limit in stressed.items():
+                names, stress = self.stress(material, signal.mechanism_displacement, 1e-9 * limit.si)
                 found.append(Limit(f"stress_{material}", f"stress of {material}", names, "MPa", stress, None, limit.si))
             return found
 
         channels = device.output.channels
         turn = [c.startswith("theta") for c in channels]
-        reach = ca.DM(ca.evalf(ca.fabs(ca.SX(J)))).full().sum(axis=1) * travel if not ca.symvar(ca.SX(J)) else None
-        scale = (
-            tuple(1e-3 if t else travel for t in turn) if reach is None else tuple(float(r) or travel for r in reach)
-        )
         force_scale = float(max(abs(s.gain.si) * size for s, size in zip(sections, sizes, strict=True)))
         return BalancedPhysics(
-            axes=axes, components=channels, pose_units=tuple("urad" if t else "um" for t in turn), pose_scale=scale,
+            axes=axes, components=channels, pose_units=tuple("urad" if t else "um" for t in turn), pose_scale=device.channel_scale,
             drive=drive, state=state, rest=(0.0,) * (n if lagging else 0), displacement_scale=travel, force_scale=force_scale,
             force_unit=force_unit, bipolar=any(s.low.si < 0 for s in sections),
             rates=(lambda x, u: (u - x) / ca.vertcat(*lags)) if lagging else (lambda x, u: ca.SX(0, 1)),
@@ -250,16 +243,6 @@ class Condensed:
 
 def _unit(direction: Direction) -> Matrix:
     return ca.DM(np.array(direction) / np.linalg.norm(direction))
-
-
-def _at(point: Matrix) -> Matrix:
-    """(6, 6): twist at a point (rotation; displacement of the point) per twist at the origin."""
-    return ca.vertcat(ca.horzcat(ca.DM.eye(3), ca.DM.zeros(3, 3)), ca.horzcat(-ca.skew(point), ca.DM.eye(3)))
-
-
-def inverse_at(point: Matrix) -> Matrix:
-    """(6, 6): wrench at the origin per wrench (force; moment) at a point."""
-    return ca.vertcat(ca.horzcat(ca.DM.eye(3), ca.DM.zeros(3, 3)), ca.horzcat(ca.skew(point), ca.DM.eye(3)))
 
 
 def freedoms(device: Drawing) -> tuple[int, int]:
@@ -310,7 +293,7 @@ def natural_frequencies(device: Drawing) -> np.ndarray:
             if GROUND not in (i, j):
                 K[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += sign * k
     heavy: list[int] = []
-    for placed in device.placed_bodies:
+    for number, placed in enumerate(device.placed_bodies):
         own = p.body[placed.index]
         if own.mass is None:
             continue
@@ -318,7 +301,7 @@ def natural_frequencies(device: Drawing) -> np.ndarray:
         r = R @ np.array((0.0, 0.0, 0.0) if own.centre is None else own.centre)
         S = np.array(ca.DM(ca.skew(ca.DM(r))))
         about = R @ np.diag(own.inertia) @ R.T - own.mass * S @ S
-        at = slice(6 * placed.second, 6 * placed.second + 6)
+        at = slice(6 * number, 6 * number + 6)
         M[at, at] = np.block([[about, own.mass * S], [-own.mass * S, own.mass * np.eye(3)]])
         heavy += range(at.start, at.stop)
     if not heavy:
@@ -341,7 +324,7 @@ def summary(device: Drawing) -> list[str]:
         f"{len(device.bodies)} bodies, {len(device.placed_elements)} flexures, {len(device.placed_actuators)} actuators"
     ]
     free, over = freedoms(device)
-    lines.append(f"without its actuators {free} degrees of freedom, over-constrained {over} times")
+    lines.append(f"degrees of freedom without actuators: {free}; redundant constraints: {over}")
     forces = ", ".join(f"{name} {show(1 / C[3 + i, i], 'N/um')}" for i, name in enumerate("xyz"))
     moments = ", ".join(f"{name} {show(1 / C[i, 3 + i], 'N*m/rad')}" for i, name in enumerate("xyz"))
     lines.append(f"stiffness at the output point: {forces}; about {moments}")
@@ -351,7 +334,7 @@ def summary(device: Drawing) -> list[str]:
     for channel, row in zip(device.output.channels, J, strict=True):
         unit = "urad/um" if channel.startswith("theta") else "um/um"
         parts = ", ".join(
-            f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > 1e-9
+            f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )
         lines.append(f"{channel}: {parts or 'not moved'}")
     return lines

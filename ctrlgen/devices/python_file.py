@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import sys
 import traceback
+from contextlib import suppress
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,8 @@ def python_device(path: Path) -> Device:
     assert spec is not None and spec.loader is not None  # a .py file has a loader
     module = module_from_spec(spec)
     sys.modules[spec.name] = module  # so that its functions can be pickled
-    sys.path.insert(0, str(path.resolve().parent))  # what stands beside it can be imported
+    beside = str(path.resolve().parent)
+    sys.path.insert(0, beside)  # what stands beside it can be imported
     try:
         spec.loader.exec_module(module)
     except InputError:
@@ -52,7 +54,8 @@ def python_device(path: Path) -> Device:
     except (Exception, SystemExit) as error:  # a user's code may raise anything
         raise InputError(path, [Fault(_line(path, error), f"raised {type(error).__name__}: {error}")]) from None
     finally:
-        sys.path.pop(0)
+        with suppress(ValueError):  # the file itself may have taken it out
+            sys.path.remove(beside)
     made = getattr(module, VARIABLE, None)
     if not isinstance(made, Device):
         what = "is missing" if made is None else f"is {type(made).__name__}, and no device"

@@ -59,3 +59,41 @@ def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
     """
     EI = E * ca.pi * d**4 / 64
     return beam_compliance(l, E * ca.pi * d**2 / 4, EI, EI, 2 * shear_ratio(nu) * EI)
+
+
+def round_section(d: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """Area pi d^2/4, section moduli pi d^3/32 of bending and pi d^3/16 of torsion of a round section of diameter d [m]."""
+    bending = ca.pi * d**3 / 32
+    return ca.pi * d**2 / 4, bending, 2 * bending
+
+
+def round_stress(about_y: Matrix, about_z: Matrix, tension: Matrix, shear: Matrix, floor: float) -> Matrix:
+    """Largest von Mises stress of a round section, sqrt((sqrt(s_y^2 + s_z^2) + |s_N|)^2 + 3 tau^2) [Pa].
+
+    `about_y`, `about_z`, `tension`, `shear`: stress by bending about y and z, by tension and by torsion, each at its largest
+    [Pa]. `floor` [Pa] is added under the root of bending, squared, so that its derivative exists without load; the stress is
+    overestimated by that. Shear by transverse force is left out, as in slender flexures it is small. Source: S. Timoshenko,
+    Strength of Materials I, chapters 4 and 11.
+    """
+    return ca.sqrt((ca.sqrt(about_y**2 + about_z**2 + floor**2) + ca.fabs(tension)) ** 2 + 3 * shear**2)
+
+
+def rectangular_section(t: Scalar, w: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """Area t w, section moduli t w^2/6 about y, w t^2/6 about z, and of torsion, of a rectangular section t <= w [m].
+
+    Torsion, largest in the middle of the long sides: w t^2 / (3 (1 + 0.6095 r + 0.8865 r^2 - 1.8023 r^3 + 0.91 r^4)), r = t/w.
+    Source: Roark's Formulas for Stress and Strain, 7th ed., table 10.1, case 4.
+    """
+    r = t / w
+    torsion = w * t**2 / (3 * (1 + 0.6095 * r + 0.8865 * r**2 - 1.8023 * r**3 + 0.91 * r**4))
+    return t * w, t * w**2 / 6, w * t**2 / 6, torsion
+
+
+def rectangular_stress(about_y: Matrix, about_z: Matrix, tension: Matrix, shear: Matrix, floor: float) -> Matrix:
+    """Bound of the von Mises stress of a rectangular section, sqrt((|s_y| + |s_z| + |s_N|)^2 + 3 tau^2 + floor^2) [Pa].
+
+    Bending and tension add up at a corner, where torsion makes no shear; its largest, tau, in the middle of a side is counted
+    there too, which errs on the safe side. Arguments as in `round_stress`.
+    """
+    normal = ca.fabs(about_y) + ca.fabs(about_z) + ca.fabs(tension)
+    return ca.sqrt(normal**2 + 3 * shear**2 + floor**2)

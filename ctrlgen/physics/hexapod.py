@@ -11,7 +11,7 @@ from typing import Any
 
 import casadi as ca
 
-from ctrlgen.physics.flexure import wire_compliance
+from ctrlgen.physics.flexure import round_section, round_stress, wire_compliance
 from ctrlgen.physics.screw import (
     Matrix,
     inverse,
@@ -230,12 +230,10 @@ def wire_stress(d: Matrix, loads: WireLoads, h: Any) -> Matrix:
     M = |(M_y, M_z)|, N the tension, T the torque; `d`: (6,) [m]. (1e-9 of the allowed stress)^2 is added under
     the root of the bending stress, so that its derivative exists at home; the stress is overestimated by that.
     """
-    section = ca.pi * h.wire_diameter**3 / 32
-    floor = (1e-9 * h.stress_limit) ** 2
-    bending = ca.sqrt(
-        ca.mtimes(loads.bending_y / section, d) ** 2 + ca.mtimes(loads.bending_z / section, d) ** 2 + floor
-    )
-    axial = ca.fabs(ca.mtimes(loads.tension / (ca.pi * h.wire_diameter**2 / 4), d))
-    shear_2 = 3 * ca.mtimes(loads.torque / (2 * section), d) ** 2
+    area, bending, torsion = round_section(h.wire_diameter)
     strut = [i // 4 for i in range(24)]
-    return ca.sqrt((bending + axial[strut]) ** 2 + shear_2[strut])
+    return round_stress(
+        ca.mtimes(loads.bending_y / bending, d), ca.mtimes(loads.bending_z / bending, d),
+        ca.mtimes(loads.tension / area, d)[strut], ca.mtimes(loads.torque / torsion, d)[strut],
+        1e-9 * h.stress_limit,
+    )  # fmt: skip

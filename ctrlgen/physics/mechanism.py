@@ -47,16 +47,6 @@ def point_force(point: Matrix, direction: Matrix) -> Matrix:
     return ca.vertcat(direction, ca.cross(point, direction))
 
 
-def pure_turn(direction: Matrix) -> Matrix:
-    """(1, 6): rotation about `direction` per twist."""
-    return ca.horzcat(direction.T, ca.DM.zeros(1, 3))
-
-
-def pure_moment(direction: Matrix) -> Matrix:
-    """(6, 1): the wrench of a unit moment about `direction`."""
-    return ca.vertcat(ca.DM.zeros(3, 1), direction)
-
-
 def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix], size: float = 1e-3) -> list[Matrix]:
     """The twists (6, n) of `count` bodies under `loads` {body: wrenches (6, n)} at the global origin; `size` [m] of the mechanism, in
     which lengths are counted while it is solved.

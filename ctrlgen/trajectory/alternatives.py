@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -56,7 +57,7 @@ class Alternatives:
         self.everywhere, self.margin = False, 0.0
 
     def found(self) -> tuple[Alternative, ...]:
-        """Those that exist: a slower one where the path itself is within reach, else a shifted and a smaller one, else both."""
+        """Those that exist of a slower, a shifted and a smaller one; where none does, one that is smaller and shifted."""
         alone = [a for a in map(self._searched, (self._slower, self._shifted, self._smaller)) if a]
         both = None if alone else self._searched(self._smaller_and_shifted)
         return (*alone, *([both] if both else []))
@@ -187,7 +188,7 @@ class Alternatives:
         inside = (INSIDE + self.margin) * np.where(np.isfinite(high - low), high - low, 0.0)
         return low + inside - z.min(axis=0), high - inside - z.max(axis=0)
 
-    @property
+    @cached_property
     def slope(self) -> np.ndarray:
         """(n_axes, channels) d displacement / d command at the middle of the path."""
         m, k = self.inverse.model, self.inverse.static

@@ -24,8 +24,8 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
-from ctrlgen.trajectory.violations import violations
 from ctrlgen.trajectory.path_inverse import InverseTrajectory
+from ctrlgen.trajectory.violations import violations
 
 SLACK_WEIGHT = 1e8  # against IPOPT's barrier, which otherwise keeps the solution sqrt(mu) off an active bound
 TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error

@@ -55,5 +55,7 @@ def violations(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, margin
             beyond[beyond < NEGLIGIBLE * unit] = 0.0
             if beyond.any():
                 k = int(np.argmax(beyond))
-                found.append(Violation(limit, i, low if value[k] < low else high, value, beyond, float(beyond[k] / unit)))
+                found.append(
+                    Violation(limit, i, low if value[k] < low else high, value, beyond, float(beyond[k] / unit))
+                )
     return sorted(found, key=lambda e: -e.share)
