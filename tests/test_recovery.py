@@ -158,6 +158,23 @@ def bouc_wen(u, t):
     return move(u, force)
 
 
+def slack_friction(u, t):
+    """Eight sliders that yield at 1/36 ... 8/36 of 0.8 N after 1 ... 8 um, each behind a slack of 20 um, in steps of a tenth of a
+    sample: a slider is dragged while its spring would carry more than it holds."""
+    yields, half = 1e-6 * np.arange(1, 9), 1e-5
+    slider = np.zeros(8)
+
+    def force(time, q, v, memory):
+        gap = q - slider
+        bent = np.sign(gap) * np.maximum(np.abs(gap) - half, 0)
+        dragged = np.abs(bent) > yields
+        slider[dragged] += (bent - np.sign(bent) * yields)[dragged]
+        bent = np.clip(bent, -yields, yields)
+        return -0.8 * bent.sum() / yields.sum(), memory
+
+    return move(u, force)
+
+
 ON_AXIS = {
     asymmetric_gain: Planted("actuator:axis", {"gain": 0.03}),
     reversed: Planted("actuator:axis", {}),
@@ -172,6 +189,9 @@ ON_AXIS = {
         "stage:axis", {"force": 0.7, "skew": 2 / 7, "reach": 3e-6}, within={"force": 0.02, "skew": 0.05, "reach": 0.05}
     ),
     one_sided_stiffening: Planted("stage:axis", {"k2": 2e8}, within={"k2": 0.02}),
+    slack_friction: Planted(
+        "stage:axis", {"force": 0.8, "slack": 2e-5, "reach": 8e-6}, within={"force": 0.02, "slack": 0.02, "reach": 0.05}
+    ),
     drive_hysteresis: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
     bouc_wen: Planted(
         "stage:axis", {"stiffness": 2e4, "reach": 1e-5, "loop": 0.8}, within={"stiffness": 0.03, "reach": 0.03, "loop": 0.05}

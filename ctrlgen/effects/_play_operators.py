@@ -34,14 +34,18 @@ def beginning(s: SimpleNamespace, radius: ca.SX) -> ca.SX:
 def weighted_lag(s: SimpleNamespace, value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
     """sum_j w_j (value - P_j), w_j ~ j^-taper, sum w_j = 1."""
     weights = _weights(taper)
-    plays = (getattr(s, name) + beginning(s, r) for name, r in zip(_play_names(), _radii(reach), strict=True))
-    return sum(w * (value - play) for w, play in zip(weights, plays, strict=True)) / sum(weights)
+    return sum(w * lag for w, lag in zip(weights, lags(s, value, radii(reach)), strict=True)) / sum(weights)
+
+
+def lags(s: SimpleNamespace, value: ca.SX, widths: list[ca.SX]) -> list[ca.SX]:
+    """value - P_j of the plays with these half widths."""
+    return [value - getattr(s, name) - beginning(s, r) for name, r in zip(_play_names(), widths, strict=True)]
 
 
 def following(value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
     """sum_j w_j P_j of plays that began in the middle, once their input has risen to `value`."""
     weights = _weights(taper)
-    behind = sum(w * ca.fmin(r, value) for w, r in zip(weights, _radii(reach), strict=True)) / sum(weights)
+    behind = sum(w * ca.fmin(r, value) for w, r in zip(weights, radii(reach), strict=True)) / sum(weights)
     return value - behind
 
 
@@ -49,10 +53,10 @@ def _weights(taper: ca.SX) -> list[ca.SX]:
     return [float(j) ** -taper for j in range(1, ELEMENTS + 1)]
 
 
-def updated_plays(s: SimpleNamespace, path: list[ca.SX], reach: ca.SX) -> dict[str, ca.SX]:
-    """The plays after the input has taken the values of `path` in turn: P_j stays within r_j = reach j/8 of each value."""
+def updated_plays(s: SimpleNamespace, path: list[ca.SX], widths: list[ca.SX]) -> dict[str, ca.SX]:
+    """The plays after the input has taken the values of `path` in turn: P_j stays within its half width of each value."""
     new = {}
-    for name, radius in zip(_play_names(), _radii(reach), strict=True):
+    for name, radius in zip(_play_names(), widths, strict=True):
         first = beginning(s, radius)
         play = getattr(s, name) + first
         for value in path:
@@ -65,5 +69,6 @@ def _play_names() -> list[str]:
     return [f"play{j}" for j in range(1, ELEMENTS + 1)]
 
 
-def _radii(reach: ca.SX) -> list[ca.SX]:
+def radii(reach: ca.SX) -> list[ca.SX]:
+    """r_j = reach j/8."""
     return [reach * j / ELEMENTS for j in range(1, ELEMENTS + 1)]

@@ -3,7 +3,7 @@
 import casadi as ca
 
 from ctrlgen.effects import Effect, Param, Place
-from ctrlgen.effects._play_operators import following, play_states, updated_plays, weighted_lag
+from ctrlgen.effects._play_operators import following, play_states, radii, updated_plays, weighted_lag
 
 
 class Butterfly(Effect):
@@ -38,4 +38,4 @@ class Butterfly(Effect):
         return p.share * (s.scale * (polarisation / most) ** 2 - p.linear * s.value)
 
     def update(self, s, p):
-        return updated_plays(s, [s.value], p.reach)
+        return updated_plays(s, [s.value], radii(p.reach))

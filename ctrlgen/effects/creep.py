@@ -12,6 +12,7 @@ class Creep(Effect):
     """
 
     place = Place.DISPLACEMENT
+    order = 2  # what creeps is carried by the joints: behind their play and hysteresis
     source = (
         "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), chain of Kelvin solids"
     )

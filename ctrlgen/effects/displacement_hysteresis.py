@@ -1,7 +1,7 @@
 """Hysteresis of a joint or guide between stage and mechanism: the displacement lags."""
 
 from ctrlgen.effects import Effect, Param, Place
-from ctrlgen.effects._play_operators import play_states, updated_plays, weighted_lag
+from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
 
 
 class DisplacementHysteresis(Effect):
@@ -29,4 +29,4 @@ class DisplacementHysteresis(Effect):
         return -p.share * (weighted_lag(s, s.value, p.reach, p.taper) - p.reversible * s.value)
 
     def update(self, s, p):
-        return updated_plays(s, [s.value], p.reach)
+        return updated_plays(s, [s.value], radii(p.reach))

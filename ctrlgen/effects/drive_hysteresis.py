@@ -1,7 +1,7 @@
 """Hysteresis of a piezo stack: the displacement lags behind the voltage."""
 
 from ctrlgen.effects import Effect, Param, Place
-from ctrlgen.effects._play_operators import play_states, updated_plays, weighted_lag
+from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
 
 
 class DriveHysteresis(Effect):
@@ -26,4 +26,4 @@ class DriveHysteresis(Effect):
         return -p.share * weighted_lag(s, s.value, p.reach, p.taper)
 
     def update(self, s, p):
-        return updated_plays(s, [s.value], p.reach)
+        return updated_plays(s, [s.value], radii(p.reach))

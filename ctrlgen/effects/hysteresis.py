@@ -1,7 +1,7 @@
 """Hysteresis of many small slipping contacts."""
 
 from ctrlgen.effects import Effect, Param, Place, State
-from ctrlgen.effects._play_operators import play_states, updated_plays, weighted_lag
+from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
 from ctrlgen.effects._reversal_points import reversal_point
 
 
@@ -31,4 +31,4 @@ class Hysteresis(Effect):
 
     def update(self, s, p):
         new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
-        return new | updated_plays(s, [reversal_point(s, s.d, s.v), s.displacement], p.reach)
+        return new | updated_plays(s, [reversal_point(s, s.d, s.v), s.displacement], radii(p.reach))

@@ -15,6 +15,7 @@ class LogCreep(Effect):
     """
 
     place = Place.DISPLACEMENT
+    order = 2  # what creeps is carried by the joints: behind their play and hysteresis
     source = "H. Jung, D.-G. Gweon, Rev. Sci. Instrum. 71 (2000) 1896: creep of piezoelectric actuators"
     params = (
         Param("gain", "1", (0.0, 0.5), "extra travel per decade of time, per travel", off=0.0),

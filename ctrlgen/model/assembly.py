@@ -231,11 +231,20 @@ def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) 
 
 
 def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
-    """Motion imposed, force read: the displacements are the first components of the drive."""
+    """Motion imposed, force read: the displacements are the first components of the drive.
+
+    What stands behind the displacement effects moves by d(z) with d' = J v, J = dd/dz; by virtual work its force F takes J' F of
+    the machine: none while a play is crossed.
+    """
     n = len(physics.axes)
     drive = terms.added(Place.DRIVE, physics.drive.expr)
+    v, a = drive[n : 2 * n], drive[2 * n :]
     displacement = terms.added(Place.DISPLACEMENT, z)
-    needed = physics.force(drive, displacement) + physics.restoring_force(displacement)
+    velocity = ca.jtimes(displacement, z, v)
+    acceleration = ca.jtimes(displacement, z, a) + ca.jtimes(velocity, z, v)
+    motion = ca.vertcat(displacement, velocity, acceleration)
+    behind = physics.force(motion, displacement) + physics.restoring_force(displacement)
+    needed = ca.jtimes(displacement, z, behind, True)
     applied = needed - terms.added(Place.FORCE, ca.SX(n, 1))  # forces of effects act on the axis beside the machine
     force = terms.added(Place.POSE, applied)
     reading = terms.added(Place.SENSOR, force)

@@ -305,6 +305,14 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         model_form_error=0.01,
         parameters={"frequency": _starts((10.0, 20.0, 40.0, 80.0, 160.0, 320.0)), "damping": _starts((0.02, 0.2))},
     ),
+    "slack_friction": LawPrior(
+        "Friction without a slack before it is commoner: judgement. " + _HYSTERESIS + _IN_BALANCE,
+        log_prior_odds=-1.0,
+        unless=frozenset({"balanced"}),
+        model_form_error=0.02,
+        family="hysteresis",
+        parameters={"slack": _peaks(0.1, 0.3, 0.6), "reach": _peaks(0.03, 0.1, 0.3)},
+    ),
     "stribeck": LawPrior(
         "Dry friction that does not fall with speed is commoner: judgement. " + _DRY_FRICTION,
         log_prior_odds=-1.0,

@@ -101,6 +101,7 @@ FAMILY_OF = {
             "displacement_bouc_wen",
             "displacement_hysteresis",
             "drive_hysteresis",
+            "slack_friction",
             "backlash",
         ),
         Family.HYSTERESIS,

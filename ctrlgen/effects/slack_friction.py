@@ -1,0 +1,45 @@
+"""Friction that grips only once a slack is crossed."""
+
+import casadi as ca
+
+from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects._play_operators import lags, play_states, radii, updated_plays
+from ctrlgen.effects._reversal_points import reversal_point
+
+
+class SlackFriction(Effect):
+    """F = -f sum_j D(e_j)/sum_j r_j, r_j = r j/8, j = 1..8: slipping contacts in series with a slack of width b.
+
+    e_j = d - P_j, P_j the play of d with radius r_j + b/2; D(e) = sign(e) max(|e| - b/2, 0). After a reversal the contacts
+    spring back, no force is carried while b is crossed, then they are bent the other way and slide. Rate-independent, dissipates.
+    Holds where what slides stands still while the slack is crossed; b = 0 is `hysteresis` of equal weights.
+    """
+
+    place = Place.FORCE
+    requires = frozenset({"force"})
+    source = "W. D. Iwan, J. Appl. Mech. 33 (1966) 893, each element behind a gap; M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633"
+    params = (
+        Param("force", "channel", (0.0, 5.0), "f: force of sliding", off=0.0),
+        Param("slack", "travel", (0.0, 10.0), "b: travel without force after a reversal"),
+        Param("reach", "travel", (1e-3, 5.0), "r: travel after which all contacts slide, once the slack is crossed"),
+    )
+    states = (
+        *play_states("travel"),
+        State("d", "travel", 1.0, stepped=True),
+        State("v", "travel/s", 100.0, stepped=True),
+    )
+
+    def term(self, s, p):
+        bent = (
+            ca.fmax(e - p.slack / 2, 0) + ca.fmin(e + p.slack / 2, 0) for e in lags(s, s.displacement, self.widths(p))
+        )
+        return -p.force * sum(bent) / sum(radii(p.reach))
+
+    def update(self, s, p):
+        new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
+        return new | updated_plays(s, [reversal_point(s, s.d, s.v), s.displacement], self.widths(p))
+
+    @staticmethod
+    def widths(p):
+        """Radii of the plays."""
+        return [r + p.slack / 2 for r in radii(p.reach)]
