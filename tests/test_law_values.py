@@ -52,6 +52,14 @@ def clipped(s, p):
     return p.share * ((np.hypot(s.value + p.level, e) - np.hypot(s.value - p.level, e)) / 2 - s.value)
 
 
+def gripping(s, p):
+    """Springs that slip at r_j, each behind half the slack to either side."""
+    r = p.reach * np.arange(1, 9) / 8
+    plays = np.array([getattr(s, f"play{j}") for j in range(1, 9)]) + np.clip(s.start, -1, 1) * (r + p.slack / 2)
+    e = s.displacement - plays
+    return -p.force * np.sum(sign(e) * np.maximum(abs(e) - p.slack / 2, 0)) / r.sum()
+
+
 def stop(s, p):
     side, e = sign(p.gap), 1e-3 * s.travel
     x = max(side * (s.displacement - p.gap), 0.0)
@@ -190,6 +198,7 @@ LAWS = {
         {"breakaway": 1.8, "speed": 0.5, "reach": 0.02}, lambda s, p: -p.force * s.z,
         lambda s, p: {"z": lugre_rate(s, p)},
     ),
+    "slack_friction": ({"slack": 0.2, "reach": 0.3}, gripping),
     "stuck": ({"level": 0.2}, lambda s, p: -p.share * (s.value - 0.2)),
     "swapped": ({}, lambda s, p: p.share * (s.all[s.partner] - s.value)),
     "temperature_sensitivity": ({"reference": 0.2}, lambda s, p: p.slope * (s.ambient - 0.2)),
@@ -290,6 +299,17 @@ def test_springs_that_slip_pull_alone_and_stiffly_right_after_a_reversal():
     virgin = along("hysteresis", np.array([0.0, 0.1]), p)[1]  # r_j = 0.3 j/8: the first two slip
     w = np.arange(1, 9) ** -p.taper
     assert virgin == pytest.approx(-0.2 * float(w @ np.minimum(0.1, 0.3 * np.arange(1, 9) / 8)) / w.sum())
+
+
+def test_friction_behind_a_slack_slides_lets_go_and_grips_again():
+    """Back from 1 the last contact lets go after r, the first grips again after its r/8 and the slack, the last slides after 2 r and
+    the slack."""
+    p = SimpleNamespace(force=0.4, slack=0.2, reach=0.1)
+    path = np.array([0.0, 1.0, 0.9 + 1e-3, 0.9 - 1e-9, 0.8, 0.7875 + 1e-9, 0.7875 - 1e-3, 0.6 + 1e-3, 0.6, 0.0])
+    found = along("slack_friction", path, p)
+    assert found[[1, 8, 9]] == pytest.approx([-0.4, 0.4, 0.4])
+    assert found[[3, 4, 5]] == pytest.approx(0.0, abs=1e-7)
+    assert -0.01 < found[2] < 0 < found[6] < 0.01 and 0.39 < found[7] < 0.4
 
 
 def bent(z: float, step: float, b: float, r: float) -> float:

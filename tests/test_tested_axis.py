@@ -48,7 +48,6 @@ def test_each_axis_takes_its_own_torque():
 @pytest.mark.parametrize(
     "effect, expected",
     [
-        ({"kind": "coupling", "at": "a", "of": "b", "gain": 0.2}, lambda: 100 * 0.2 * ANGLE[:, 1]),  # k_a g d_b
         ({"kind": "quadratic_damping", "at": "a", "damping": "1 N*m*s^2/rad^2"}, lambda: np.abs(SPEED[:, 0]) * SPEED[:, 0]),
         ({"kind": "stiffening", "at": "a", "k3": "1000 N*m/rad^3"}, lambda: 1000 * ANGLE[:, 0] ** 3),
     ],
@@ -59,6 +58,14 @@ def test_a_law_acts_on_the_axis_where_it_stands(effect, expected):
     added = torque(device_of(effect)) - torque(device_of())
     assert added[:, 0] == pytest.approx(expected(), abs=1e-6 * np.abs(expected()).max())
     assert not added[:, 1].any()
+
+
+def test_what_moves_with_both_axes_takes_torque_of_both():
+    """d_a = z_a + g z_b: a takes F_a = m d_a'' + k d_a, and b by virtual work g F_a beside its own."""
+    found = torque(device_of({"kind": "coupling", "at": "a", "of": "b", "gain": 0.2}))
+    first = MOTION[:, 4] + 0.2 * MOTION[:, 5] + 100 * (ANGLE[:, 0] + 0.2 * ANGLE[:, 1])
+    second = 2 * MOTION[:, 5] + 3 * SPEED[:, 1] + 50 * ANGLE[:, 1] + 0.2 * first
+    assert found == pytest.approx(np.column_stack([first, second]), abs=1e-9 * np.abs(first).max())
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from ctrlgen.effects._reversal_points import reversal_point
 
 
 class SlackFriction(Effect):
-    """F = -f sum_j D(e_j)/sum_j r_j, r_j = r j/8, j = 1..8: slipping contacts in series with a slack of width b.
+    """F = -f sum_j D(e_j)/sum_j r_j, r_j = r j/8, j = 1..8: slipping contacts, each in series with a slack of width b.
 
-    e_j = d - P_j, P_j the play of d with radius r_j + b/2; D(e) = sign(e) max(|e| - b/2, 0). After a reversal the contacts
-    spring back, no force is carried while b is crossed, then they are bent the other way and slide. Rate-independent, dissipates.
+    e_j = d - P_j, P_j the play of d with radius r_j + b/2; D(e) = sign(e) max(|e| - b/2, 0). After a reversal each contact springs
+    back, carries nothing while b is crossed, then is bent the other way and slides. Rate-independent, dissipates.
     Holds where what slides stands still while the slack is crossed; b = 0 is `hysteresis` of equal weights.
     """
 
