@@ -65,7 +65,8 @@ def place_of(effect: type[Effect]) -> tuple[dict, list[Channel]]:
         physics = device.physics(device.values())
         places = channels(physics, effect.place)
         if effect.pairs:
-            places = [w.paired_with(other) for w in places for other in places]
+            others = places if effect.partner_place is None else channels(physics, effect.partner_place)
+            places = [w.paired_with(other) for w in places for other in others]
         places = [w for w in places if effect.applies_to(w)]
         if places and effect.requires <= available(physics, SAMPLE_TIME):
             return table, places
@@ -84,7 +85,14 @@ def shapes(effect: type[Effect], where: Channel) -> list[dict[str, float]]:
     ]
 
 
+EMPIRICAL = {"low": -3.0, "width": 6.0, "speed": 10.0, "reach": 0.3} | {
+    f"c{j}": float(np.sin(2 * j)) for j in range(1, 18)
+}
+
+
 def starts(effect: type[Effect], p: Param) -> tuple[float, ...]:
+    if effect.kind.startswith("empirical_"):  # no fit begins with them
+        return (EMPIRICAL[p.name],)
     prior = prior_of(effect).of(p)
     return prior.start_values or SUGGESTED[prior.start_from_data]
 
@@ -318,6 +326,8 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
         every_unit[law.partner] = effect.partner_unit
     if effect.pairs and effect.place is Place.FORCE:  # by the motion of the other axis, in the amplitude's name
         every_unit = [MOTION[effect.amplitude().name]] * 6
+    if effect.partner_place is Place.DISPLACEMENT:
+        every_unit = ["m/s" if "velocity" in effect.requires else "m"] * 6
 
     def evaluated(scale: dict[str, float]) -> tuple[list[float], list[float], float]:
         def factor(unit: str) -> float:

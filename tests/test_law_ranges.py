@@ -56,6 +56,8 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
             "taper",
             "reversible",
             "skew",
+            "low",
+            *(f"c{j}" for j in range(1, 18)),
         )
         assert either or p.bounds[0] >= 0.0
 
@@ -76,6 +78,9 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     """A law of two channels is tried with every partner; a clock counts on through a record and between records."""
     library = Effect.library.items()
     couplings = {"stiffness_coupling", "damping_coupling", "inertia_coupling"}
-    assert {k for k, law in library if law.pairs} == {"abbe_arm", "coupling", "link_compliance", "swapped"} | couplings
+    empirical = {"empirical_history", "empirical_position", "empirical_speed"}
+    two = {"abbe_arm", "coupling", "link_compliance", "swapped"} | couplings | empirical
+    assert {k for k, law in library if law.pairs} == two
+    assert {k for k, law in library if not prior_of(law).suspected} == empirical | {"zero_per_record"}
     clocked = {"degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"}
     assert {k for k, law in library if any(s.clock for s in law.states)} == clocked

@@ -11,6 +11,7 @@ import pytest
 from conftest import AXIS_FILE
 from numpy import abs, cos, cross, exp, sign, sin, sqrt, tanh
 from scipy.integrate import solve_ivp
+from scipy.interpolate import BSpline
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen import load_device
@@ -58,6 +59,21 @@ def gripping(s, p):
     plays = np.array([getattr(s, f"play{j}") for j in range(1, 9)]) + np.clip(s.start, -1, 1) * (r + p.slack / 2)
     e = s.displacement - plays
     return -p.force * np.sum(sign(e) * np.maximum(abs(e) - p.slack / 2, 0)) / r.sum()
+
+
+WEIGHTS = {f"c{j}": float(np.cos(3 * j)) for j in range(1, 18)}
+
+
+def bends(share):
+    """Cubic B-splines on knots a fourteenth apart, held beyond 0 and 1."""
+    knots = (np.arange(21) - 3) / 14
+    return float(BSpline(knots, list(WEIGHTS.values()), 3)(np.clip(share, 0, 1)))
+
+
+def remembered(s, p):
+    j = np.arange(1, 9)
+    lag = s.displacements[s.partner] - np.array([getattr(s, f"play{k}") for k in j])
+    return p.size * float(np.array([WEIGHTS[f"c{k}"] for k in j]) @ (lag / (0.3 * j / 8)))
 
 
 def stop(s, p):
@@ -152,6 +168,13 @@ LAWS = {
         lambda s, p: -p.share * (weighted(s, p, s.value) - 0.7 * s.value),
     ),
     "drive_offset": ({}, lambda s, p: p.offset),
+    "empirical_history": ({"reach": 0.3, **WEIGHTS}, remembered),
+    "empirical_position": (
+        {"low": -0.4, "width": 0.9, **WEIGHTS}, lambda s, p: p.size * bends((s.displacements[s.partner] + 0.4) / 0.9),
+    ),
+    "empirical_speed": (
+        {"speed": 0.3, **WEIGHTS}, lambda s, p: p.size * bends((1 + s.velocities[s.partner] / np.hypot(s.velocities[s.partner], 0.3)) / 2),
+    ),
     "end_stop": ({"gap": -0.4, "power": 1.5}, stop),
     "expansion": ({}, lambda s, p: p.slope * (s.state - s.rest) * s.value),
     "finite_rotation": ({}, lambda s, p: p.share * s.second_order_kinematics()[s.index]),

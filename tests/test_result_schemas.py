@@ -24,7 +24,7 @@ EMPTY = {
 }  # fmt: skip
 RECORD = {
     **origin({"device.toml": "0" * 64}, 7, ("a note",)),
-    "verdict": "consistent", "sentence": "Consistent.", "findings": [], "shares": None,
+    "verdict": "consistent", "sentence": "Consistent.", "findings": [], "shares": None, "empirical_terms": [],
     "attribution": {"explained": 0.0, "rest": None, "held_out": True},
     "residual_location": {"before": EMPTY, "after": EMPTY}, "held_out": {},
     "spikes": {}, "detectability": {"smallest": {}, "undetectable": []}, "next_experiment": None, "search_history": [],

@@ -41,6 +41,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.verdict import in_another_unit, verdict
 from ctrlgen.diagnosis.settings import NOISE, NOISE_UPDATE, SIMULATION
+from ctrlgen.diagnosis.shares.empirical_terms import empirical_terms
 from ctrlgen.diagnosis.shares.gather import residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.model.assembly import build_model, movable
@@ -96,13 +97,16 @@ def _diagnose(
     step("supporting analyses")
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
+    shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
+    left = () if tests.passed else empirical_terms(search.fitter, search.chosen.fit, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed)
     return Diagnosis(
         verdict=answer,
         findings=(*findings(search, attribution, likelihoods), *detected),
         attribution=attribution,
-        shares=residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed),
+        shares=shares,
+        empirical_terms=left,
         held_out=held_out_errors(search, known),
         residual_tests=tests,
         spikes=spikes,

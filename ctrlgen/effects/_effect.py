@@ -37,9 +37,10 @@ class Effect:
     the effect's own states, by name
     ambient [K]: rise of the surroundings' temperature; sample_time [s]
     second_order_kinematics(), tangent_compliance(): vectors of the device, see `BalancedPhysics`; only where it has them
-    and, at places of an axis: displacement, displacements (of all axes), velocity (None for a device without inertia) and
-        velocities, accelerations (of all axes; None but for an imposed motion), force (that the stage takes at this
-        displacement), and the actuator's state, such as its temperature, with its rest
+    displacements, velocities (of all axes; no velocities for a device without inertia)
+    and, at places of an axis: displacement, velocity (None for a device without inertia), accelerations (of all axes; None but
+        for an imposed motion), force (that the stage takes at this displacement), and the actuator's state, such as its
+        temperature, with its rest
     """
 
     library: ClassVar[dict[str, type[Effect]]] = {}
@@ -55,6 +56,8 @@ class Effect:
     # Couples a channel to another one, `of`, whose index is `partner`; a symmetric one acts on both.
     pairs: ClassVar[bool] = False
     symmetric: ClassVar[bool] = False
+    # Where the other one, `of`, is a channel; None: at the law's own place.
+    partner_place: ClassVar[Place | None] = None
     # Restrict the effect to channels of this dimension, or of one of these; of the partner, "channel" means the same one.
     channel_unit: ClassVar[str | tuple[str, ...] | None] = None
     partner_unit: ClassVar[str | None] = None
@@ -107,7 +110,8 @@ class Effect:
         if not cls.pairs:
             return True
         wanted = channel.unit if cls.partner_unit == "channel" else cls.partner_unit or channel.partner_unit
-        return channel.partner not in (None, channel.name) and same_dimension(channel.partner_unit, wanted)
+        itself = cls.partner_place is None and channel.partner == channel.name
+        return channel.partner is not None and not itself and same_dimension(channel.partner_unit, wanted)
 
     def term(self, s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
         """The contribution at this place and channel."""

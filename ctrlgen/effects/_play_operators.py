@@ -27,8 +27,8 @@ def play_states(unit: str) -> tuple[State, ...]:
 
 
 def beginning(s: SimpleNamespace, radius: ca.SX) -> ca.SX:
-    """Where a play of this `radius` begins: within it."""
-    return radius * ca.fmax(ca.fmin(s.start, 1.0), -1.0)
+    """Where a play of this `radius` begins: within it; in its middle where the law has no `start`."""
+    return radius * ca.fmax(ca.fmin(s.start, 1.0), -1.0) if hasattr(s, "start") else 0.0 * radius
 
 
 def weighted_lag(s: SimpleNamespace, value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:

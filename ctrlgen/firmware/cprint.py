@@ -75,6 +75,7 @@ TRUSTED = 1e15  # products between 1/TRUSTED and TRUSTED neither overflow nor un
 PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
 _OPERATOR = re.compile(r" (?:[-+*/<>?]|<=|==|!=|&&|\|\|) |\(-[a-z]|[a-z]\w*\(")
 
+_NAME = re.compile(r"\bt\d\w*")
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _CALLS = {  # of `elementary`
@@ -112,17 +113,31 @@ def print_function(
     results = printer.run()
     written = {i for i, _ in results}
     results += [(i, real.literal(0.0)) for i in range(function.size1_out(0)) if i not in written]
-    lines = printer.lines + [f"    result[{i}] = {text};" for i, text in sorted(results)]
-    arguments = tuple(function.name_in(i) for i in range(function.n_in()) if i in printer.used)
+    lines = _read(printer.lines, [f"    result[{i}] = {text};" for i, text in sorted(results)])
+    body = "\n".join(lines)
+    arguments = tuple(name for name in function.name_in() if f"{name}[" in body)
     parameters = ", ".join(
         [
             *(f"const {real.value} {a}[{function.size1_in(a)}]" for a in arguments),
             f"{real.value} result[{function.size1_out(0)}]",
         ]
     )
-    text = f"static void {name}({parameters})\n{{\n" + "\n".join(lines) + "\n}\n"
-    operations = sum(len(_OPERATOR.findall(line)) for line in lines)
-    return Kernel(name, text, arguments, operations, frozenset(printer.calls))
+    text = f"static void {name}({parameters})\n{{\n{body}\n}}\n"
+    operations = len(_OPERATOR.findall(body))
+    return Kernel(
+        name, text, arguments, operations, frozenset(c for c in printer.calls if re.search(rf"\b{c}\(", body))
+    )
+
+
+def _read(lines: list[str], results: list[str]) -> list[str]:
+    """The lines that a result needs, and the results: what turned out to be a constant leaves operands that nothing reads."""
+    kept, read = results[::-1], {word for line in results for word in _NAME.findall(line)}
+    for line in reversed(lines):
+        name, *operands = _NAME.findall(line)
+        if name in read:
+            read.update(operands)
+            kept.append(line)
+    return kept[::-1]
 
 
 @dataclass(frozen=True)
@@ -149,7 +164,6 @@ class _Printer:
         self.function, self.real = function, real
         self.between, self.uses = intervals(function, ranges), _uses(function)
         self.lines: list[str] = []
-        self.used: set[int] = set()
         self.calls: set[str] = set()
 
     def run(self) -> list[tuple[int, str]]:
@@ -158,7 +172,6 @@ class _Printer:
         for k in range(f.n_instructions()):
             op, inputs, outputs = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
             if op == ca.OP_INPUT:
-                self.used.add(inputs[0])
                 text = f"{f.name_in(inputs[0])}[{_dense(f.sparsity_in(inputs[0]), inputs[1])}]"
                 at[outputs[0]] = _Value(text, 1.0, self.between[k])
             elif op == ca.OP_OUTPUT:
@@ -198,6 +211,8 @@ class _Printer:
             op, a = ca.OP_SUB, [a[1], a[0].scaled(-1.0)]
         if op in (ca.OP_POW, ca.OP_CONSTPOW) and a[1].number and _by_products(a[1].factor):
             return self._power(k, self._named(f"{k}_b", self._scaled(a[0]), _range_of(a[0])), a[1].factor)
+        if op in (ca.OP_ADD, ca.OP_SUB) and a[1].number and a[1].factor == 0.0:
+            return a[0]
         operands = [self._operand(v) for v in a]
         if op == ca.OP_SQRT:
             return self._root(k, operands[0], a[0])

@@ -95,15 +95,17 @@ class EffectTerms:
         chosen = range(len(names)) if effect.at == "all" else [i for i, c in enumerate(names) if c == effect.at]
         if not chosen:
             self.faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(names)}, all"))
-        if effect.of is not None and effect.of not in names:
-            self.faults.append(Fault(f"effect[{k}].of", f"{effect.of!r} is not one of {', '.join(names)}"))
+        partners = places if effect.partner_place is None else channels(self.physics, effect.partner_place)
+        others = [channel.name for channel in partners]
+        if effect.of is not None and effect.of not in others:
+            self.faults.append(Fault(f"effect[{k}].of", f"{effect.of!r} is not one of {', '.join(others)}"))
             return
-        other = None if effect.of is None else names.index(effect.of)
+        other = None if effect.of is None else others.index(effect.of)
         pairs: list[tuple[int, int | None]] = [(i, other) for i in chosen]
         if effect.symmetric and other is not None:
             pairs += [(other, i) for i in chosen]
         for i, partner in pairs:
-            channel = places[i] if partner is None else places[i].paired_with(places[partner])
+            channel = places[i] if partner is None else places[i].paired_with(partners[partner])
             if not effect.applies_to(channel):
                 if effect.at != "all":
                     self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} cannot act on {names[i]}: wrong unit"))
@@ -141,11 +143,11 @@ class EffectTerms:
         )  # fmt: skip
         s.second_order_kinematics = lambda: self.second_order_kinematics
         s.tangent_compliance = lambda: self.tangent_compliance
+        s.displacements, s.velocities = self.displacement, self.velocity
         at_platform = place in (Place.POSE, Place.SENSOR)
         if not at_platform:
             i = min(i, len(self.physics.axes) - 1)
-            s.displacement, s.displacements = self.displacement[i], self.displacement
-            s.velocities, s.velocity = self.velocity, self.velocity[i] if self.velocity.numel() else None
+            s.displacement, s.velocity = self.displacement[i], self.velocity[i] if self.velocity.numel() else None
             s.accelerations = self.imposed_acceleration
             state = self.physics.state if _has_heaters(self.physics) else None
             s.state = None if state is None else state.expr[i]

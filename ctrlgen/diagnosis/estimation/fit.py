@@ -66,6 +66,13 @@ class Fit:
         Q = np.linalg.qr(self.J[:, k:])[0]
         return np.linalg.qr(self.J[:, :k] - Q @ (Q.T @ self.J[:, :k])).R
 
+    @property
+    def restarted(self) -> Structure:
+        """Its structure with all parameters starting at their fitted values."""
+        s = self.structure
+        own = {u.path: float(v) for u, v in zip(s.free_parameters, self.theta, strict=True) if u.cause is None}
+        return Structure(s.device, s.causes, tuple(self.values(k) for k in range(len(s.causes))), own)
+
     def values(self, cause: int) -> dict[str, float]:
         """The parameters [SI] by name of one cause, by its place in the structure."""
         found = dict(self.structure.starts[cause])
@@ -207,28 +214,33 @@ class Fitter:
         return _fit_at(problem, optimum)
 
     def predict(self, fit: Fit, record: Record) -> np.ndarray:
-        """Readings (n, n_y) [SI] of a fitted structure on any record, with the initial state that suits this record best.
+        """Readings (n, n_y) [SI] of a fitted structure on any record, with the initial state that suits this record best."""
+        return self.begun(fit, record)[1]
+
+    def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
+        """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
         One Gauss-Newton step from rest, shortened until it lowers the objective; from rest where no step does.
         """
         simulator = self.simulator(fit.structure, record)
         sd = initial_state_sd(simulator)
+        rest = np.zeros(len(sd))
         if len(sd) == 0:
-            return simulator.simulate(record, fit.theta)
-        y, Y = simulator.sensitivities(record, fit.theta, np.zeros(len(sd)), by_free=False)
+            return rest, simulator.simulate(record, fit.theta)
+        y, Y = simulator.sensitivities(record, fit.theta, rest, by_free=False)
         white = self._white(record, y)
         J = self.error.whiten(Y, record.valid).reshape(len(white), len(sd)) * sd
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
-            return y
+            return rest, y
         with_prior = np.vstack([J, np.eye(len(sd))])
-        step = np.linalg.lstsq(with_prior, np.concatenate([white, np.zeros(len(sd))]), rcond=None)[0]
+        step = np.linalg.lstsq(with_prior, np.concatenate([white, rest]), rcond=None)[0]
         for _ in range(HELD_OUT_REFIT.halvings):  # a gap or a friction threshold makes the first step useless
             shifted = simulator.simulate(record, fit.theta, sd * step)
             residual = self._white(record, shifted)
             if residual @ residual + step @ step <= white @ white:
-                return shifted
+                return sd * step, shifted
             step = step / 4
-        return y
+        return rest, y
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         """Whitened residual (n n_y,), not bounded."""

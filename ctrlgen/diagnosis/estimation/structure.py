@@ -119,9 +119,13 @@ class Structure:
 
     def channel_of(self, cause: Hypothesis) -> Channel:
         """The channel at which a cause acts; the first one where it acts at all of them."""
-        every = {c.name: c for c in channels(nominal_physics(self.device), cause.law.place)}
+        physics, law = nominal_physics(self.device), cause.law
+        every = {c.name: c for c in channels(physics, law.place)}
         own = next(iter(every.values())) if cause.at == "all" else every[cause.at]
-        return own if cause.of is None else own.paired_with(every[cause.of])
+        if cause.of is None:
+            return own
+        others = every if law.partner_place is None else {c.name: c for c in channels(physics, law.partner_place)}
+        return own.paired_with(others[cause.of])
 
     @cached_property
     def device_with_causes(self) -> Device:

@@ -364,6 +364,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType({
         log_prior_odds=ONE_IN_TEN,
     ),
     "payload": LawPrior("Upright, or hanging out sideways.", parameters={"lean": _starts((0.0, 90.0))}),
+    # Empirical: written where no law reaches what is left, never suspected ---------------------------------------------------
+    **dict.fromkeys(
+        ("empirical_history", "empirical_position", "empirical_speed"),
+        LawPrior("A smoother of what no law reaches: `shares.empirical_terms` gives it its numbers.", suspected=False),
+    ),
     # One amplitude and no shape: the default ------------------------------------------------------------------------------
     **dict.fromkeys(
         (

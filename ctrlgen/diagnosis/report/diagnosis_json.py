@@ -36,6 +36,13 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> dict[str, 
             "held_out": diagnosis.attribution.held_out,
         },
         "shares": _shares(diagnosis),
+        "empirical_terms": [
+            {
+                "effect": t.effect.kind, "at": t.effect.at, "of": t.effect.of, "channel": t.channel, "function_of": t.kind.value,
+                "share": t.share, "rms_before": t.rms_before, "rms_after": t.rms_after, "unit": t.unit,
+            }
+            for t in diagnosis.empirical_terms
+        ],
         "residual_location": diagnosis.residual_location,
         "held_out": {channel: dataclasses.asdict(error) for channel, error in diagnosis.held_out.items()},
         "spikes": {s.channel: _spikes(s) for s in diagnosis.spikes},

@@ -349,6 +349,20 @@ class RoundEntry(Keys):
     decision: str = Field(description="What was decided, and why.")
 
 
+class SmootherEntry(Keys):
+    """A smoother of what no law reaches, as an effect in device.next.toml; it names no cause."""
+
+    effect: str = Field(description="Name of the effect: empirical_position, empirical_speed or empirical_history.")
+    at: str = Field(description="Component of the pose to which it is added.")
+    of: str = Field(description="Axis of whose motion it is a function.")
+    channel: str = Field(description="Reading that it corrects.")
+    function_of: str = Field(description="Kind of the model-free shares that it holds.")
+    share: float = Field(description="Of the energy left in the channel on the held-out records what it takes away.")
+    rms_before: float = Field(description="Error there without it [unit].")
+    rms_after: float = Field(description="Error there with it [unit].")
+    unit: str = Field(description="Unit of the errors.")
+
+
 class DiagnosisRecord(Origin):
     """Result of `ctrlgen diagnose`: what a recording shows that the device file leaves out."""
 
@@ -361,6 +375,7 @@ class DiagnosisRecord(Origin):
     shares: SharesEntry | None = Field(
         description="How much of the residual is a function of what; null where the records are too short."
     )
+    empirical_terms: list[SmootherEntry] = Field(description="What device.next.toml holds beside the findings.")
     residual_location: ResidualLocations = Field(description="Where the residual is large, before and after.")
     held_out: dict[str, ChannelErrorEntry] = Field(description="Errors on the held-out records, by channel.")
     spikes: dict[str, SpikesEntry] = Field(

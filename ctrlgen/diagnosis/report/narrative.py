@@ -273,6 +273,22 @@ def refusals(diagnosis: Diagnosis) -> list[str]:
     return list(reasons)[:NAMED]
 
 
+def empirical_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Of every empirical term what it is a function of, how much it takes away, and that it names no cause."""
+    return [
+        f"Beside the findings device.next.toml holds an empirical term, {t.effect.kind} at {t.effect.at} of {t.effect.of}: a function of "
+        f"{FUNCTIONS[t.effect.kind]} takes away {100 * t.share:.0f} % of what is left in {short(t.channel)} on the held-out records "
+        f"({number(t.rms_before, 3)} -> {number(t.rms_after, 3)} {t.unit}). It names no cause and holds inside the recorded range."
+        for t in diagnosis.empirical_terms
+    ]
+
+
+FUNCTIONS = {
+    "empirical_position": "the position", "empirical_speed": "the speed and its direction",
+    "empirical_history": "the last reversals",
+}  # fmt: skip
+
+
 def unknown_lines(diagnosis: Diagnosis) -> list[str]:
     """What the unknown input depends on, and the empirical term: they describe the residual and name no cause."""
     force = diagnosis.extra.get("unmodelled_force")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ctrlgen.diagnosis.report.narrative import number, short
+from ctrlgen.diagnosis.report.narrative import empirical_sentences, number, short
 from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT
 from ctrlgen.diagnosis.settings import SHARES
@@ -36,12 +36,12 @@ def shares_sentences(diagnosis: Diagnosis) -> list[str]:
     worst = worst_of(diagnosis, shares.before)
     said = ceiling_sentence(worst)
     if not diagnosis.search.chosen.causes:
-        return [f"{said}; no law of the library is confirmed for it."]
+        return [f"{said}; no law of the library is confirmed for it.", *empirical_sentences(diagnosis)]
     reached = shares.reached(worst.channel)
     sentences = [f"{said}; the accepted laws reach {with_interval(reached)}."]
     if not diagnosis.residual_tests.passed:
         sentences.append(rest_sentence(worst_of(diagnosis, shares.after)))
-    return sentences
+    return [*sentences, *empirical_sentences(diagnosis)]
 
 
 def family_shares(diagnosis: Diagnosis, table: SharesTable) -> list[tuple[Family, float]]:

@@ -29,6 +29,7 @@ from ctrlgen.diagnosis.report.narrative import (
     HARD_SPACE,
     WORSE,
     channel_sentence,
+    empirical_sentences,
     hard,
     predicts_better,
     sentence,
@@ -165,6 +166,7 @@ def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
     lines = [f"Diagnosed from {diagnosis.recording.title!r} by {program()}, verdict {diagnosis.verdict}."]
     lines.append(sentence(diagnosis))
     lines += [channel_sentence(channel, error) for channel, error in diagnosis.held_out.items()]
+    lines += empirical_sentences(diagnosis)
     if changed:
         lines.append(f"Parameters changed above: {', '.join(changed)}.")
     if diagnosis.findings:

@@ -9,7 +9,6 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.error_model import ErrorModel
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.misfit import Misfit
-from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screened
 
@@ -86,15 +85,3 @@ def linearised_optimum(fit: Fit) -> float:
     """The objective at the optimum of a fit's linearisation: what remains once all free parameters have adapted."""
     step = np.linalg.lstsq(fit.J, fit.residual, rcond=None)[0]
     return float(np.sum((fit.residual - fit.J @ step) ** 2))
-
-
-def restart(fit: Fit) -> Structure:
-    """The structure of a fit with all parameters starting at their fitted values."""
-    s = fit.structure
-    own = {u.path: float(v) for u, v in zip(s.free_parameters, fit.theta, strict=True) if u.cause is None}
-    return Structure(s.device, s.causes, tuple(fit.values(k) for k in range(len(s.causes))), own)
-
-
-def restart_with(fit: Fit, cause: Hypothesis, start: dict[str, float]) -> Structure:
-    """The same with another cause, whose parameters start at `start` [SI]."""
-    return restart(fit).with_cause(cause, start)

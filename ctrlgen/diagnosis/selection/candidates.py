@@ -10,7 +10,7 @@ import numpy as np
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, restart, restart_with
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.screen import Screened, Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
@@ -56,7 +56,7 @@ def fit_each(
     """Each suspect beside what is fitted, and what `finish` makes of it."""
 
     def one(own: Trials, s: Suspect) -> list[CandidateModel]:
-        return [finish(own, t) for t in own.tried(restart_with(fit, s.hypothesis, s.start), s.hypothesis, fit)]
+        return [finish(own, t) for t in own.tried(fit.restarted.with_cause(s.hypothesis, s.start), s.hypothesis, fit)]
 
     return tuple(t for found in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in found)
 
@@ -75,7 +75,7 @@ def restart_elsewhere(
     for k, cause in enumerate(candidate.causes):
         if cause in before.causes or candidate.errors.is_noise:
             continue
-        structure, shapes = restart(candidate.fit), others.get(cause, ())
+        structure, shapes = candidate.fit.restarted, others.get(cause, ())
         size = cause.law.amplitude().name if shapes else ""
         begins = [*shapes, *({**shape, size: structure.starts[k][size]} for shape in shapes)]
         if not begins:
@@ -110,7 +110,7 @@ def fit_other_clocks(
             low, high = cause.bounds(p, current.fit.structure.channel_of(cause))
             try:
                 for start in (2**k * h for k in range(SEARCH.clock_doublings) if low <= 2**k * h <= high):
-                    structure = restart_with(beside.fit, cause, {p.name: start})
+                    structure = beside.fit.restarted.with_cause(cause, {p.name: start})
                     begun.append((own.fitter.initial_objective(structure), cause, structure))
             except FAILURES as error:
                 own.note_failure(cause, error)
@@ -127,7 +127,7 @@ def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel,
     """What is suspected of the device with its own numbers as stated: a fit that bends them so far sees what they hide no
     more."""
     try:
-        stated = trials.fitter.fit(replace(restart(current.fit), nominal_starts={}), steps=0)
+        stated = trials.fitter.fit(replace(current.fit.restarted, nominal_starts={}), steps=0)
     except FAILURES as error:
         trials.note_failure(None, error)
         return ()
@@ -147,7 +147,7 @@ def fit_subsets(
     found: list[CandidateModel] = []
 
     def one(own: Trials, suspects: Sequence[Suspect]) -> list[CandidateModel]:
-        structure = restart(current.fit)
+        structure = current.fit.restarted
         for s in suspects:
             structure = structure.with_cause(s.hypothesis, s.start)
         return own.tried(structure, suspects[-1].hypothesis, current.fit)

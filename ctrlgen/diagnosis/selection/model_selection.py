@@ -23,7 +23,7 @@ from ctrlgen.diagnosis.estimation.held_out import refit_to_held_out
 from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, restart
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT, MODEL_SELECTION, RESIDUAL_TESTS, STATISTICS
 
@@ -217,7 +217,7 @@ class ModelSelection:
         (most,) = self.fit_candidate(Structure(current.fit.structure.device), None, steps=FIT.max_steps)
         for j, cause in enumerate(current.causes):
             if form_error := cause.prior.model_form_error:
-                tried = self.fit_candidate(restart(current.fit).without(j), None)
+                tried = self.fit_candidate(current.fit.restarted.without(j), None)
                 # the model without one cause may diverge, or not stand at all
                 lost = min(_lost(t, current) for t in (*tried, most))
                 if squares < (form_error * times) ** 4 * lost:

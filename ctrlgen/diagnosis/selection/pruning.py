@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal, restart
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.trials import Trials
 
 
@@ -30,7 +30,7 @@ def pruned(trials: Trials, candidate: CandidateModel, accepted: Sequence[Hypothe
             return candidate
         causes = tuple(candidate.causes[k] for k in against)
         trials.refused.append(Refusal(candidate, causes, tuple(against.values())))
-        structure = restart(candidate.fit)
+        structure = candidate.fit.restarted
         for k in sorted(against, reverse=True):
             structure = structure.without(k)
         if set(structure.causes) <= set(accepted):
@@ -45,7 +45,7 @@ def pruned(trials: Trials, candidate: CandidateModel, accepted: Sequence[Hypothe
 def without_needless(trials: Trials, current: CandidateModel) -> CandidateModel:
     """The model without the causes that it does not need."""
     for k in reversed(range(len(current.causes))):
-        for bare in trials.tried(restart(current.fit).without(k), None):
+        for bare in trials.tried(current.fit.restarted.without(k), None):
             if not _needed(trials, bare, current) or trials.selection.within_model_form_error(bare, current, k):
                 current = bare
     return current

@@ -22,6 +22,7 @@ from ctrlgen.diagnosis.selection.attribution import Attribution, Share
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.verdict import unconfirmed
 from ctrlgen.diagnosis.settings import STATISTICS
+from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm
 from ctrlgen.diagnosis.shares.gather import ResidualShares
 from ctrlgen.recordings.recording import Recording
 
@@ -84,13 +85,15 @@ class Diagnosis:
     """The answer: verdict, findings and supporting analyses; `search` and `fitter` hold how it was found.
 
     attribution: shares of the causes and of the rest. shares: of what the residual is a function, whatever the law, before and
-    after; None where the records are too short. spikes: isolated outliers, of the channels that have some.
+    after; None where the records are too short. empirical_terms: smoothers of what no law reaches. spikes: isolated outliers, of
+    the channels that have some.
     """
 
     verdict: str
     findings: tuple[Finding, ...]
     attribution: Attribution
     shares: ResidualShares | None
+    empirical_terms: tuple[EmpiricalTerm, ...]
     held_out: dict[str, ChannelError]
     residual_tests: ResidualTests
     residual_location: dict[str, Any]
@@ -121,7 +124,7 @@ class Diagnosis:
 
     @cached_property
     def corrected(self) -> Device:
-        """The device with all findings, as device.next.toml describes it; directly detected effects stand last."""
+        """The device with all findings, then what was detected directly, then empirical terms: as device.next.toml describes it."""
         fit = self.search.chosen.fit
         own = {
             u.path: float(v) for u, v in zip(fit.structure.free_parameters, fit.theta, strict=True) if u.cause is None
@@ -135,7 +138,8 @@ class Diagnosis:
             )
             for f in beside
         ]
-        return device.model_copy(update={"effect": (*device.effect, *read)})
+        left = (term.effect for term in self.empirical_terms)
+        return device.model_copy(update={"effect": (*device.effect, *read, *left)})
 
 
 def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ctrlgen.diagnosis.estimation.fit import Fit
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum, restart
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.screen import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
@@ -73,7 +73,7 @@ def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateM
 def replacements(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
     """What would be suspected instead of cause k, with all the rest as it is now: refitted, it may have gone astray."""
     structure = current.fit.structure
-    others = restart(current.fit).without(k)
+    others = current.fit.restarted.without(k)
     try:
         bare = trials.fitter.fit(others, steps=0)
         screened = trials.screen.run(bare)

@@ -16,7 +16,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise_update import update_noise
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult, restart
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
@@ -38,7 +38,7 @@ class Searcher:
         fitter, described = trials.fitter.described(device)
         trials.use(fitter)
         rounds: list[Round] = []
-        current = trials.with_noise_update(trials.fit(restart(described), steps=FIT.max_steps))
+        current = trials.with_noise_update(trials.fit(described.restarted, steps=FIT.max_steps))
         trials.mismatch = current.held_out.plain_mean * trials.fitter.noise.floor**2
         for _ in range(SEARCH.most_noise_updates):
             current = self._forward_rounds(current, rounds)
@@ -117,5 +117,5 @@ class Searcher:
 
 def _without(trials: Trials, current: CandidateModel, k: int, nominal: CandidateModel) -> CandidateModel:
     """The model without cause k; the device as described where that cannot be simulated."""
-    found = trials.tried(restart(current.fit).without(k), None, None)
+    found = trials.tried(current.fit.restarted.without(k), None, None)
     return found[0] if found else nominal

@@ -18,7 +18,7 @@ from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.noise_update import update_noise_size
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal, restart
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
@@ -150,7 +150,7 @@ class Trials:
     def converged(self, candidate: CandidateModel) -> CandidateModel:
         """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
         steps only."""
-        found = self.tried(restart(candidate.fit), candidate.cause, steps=FIT.max_steps)
+        found = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
         return found[0] if found else candidate
 
     def screened(self, candidate: CandidateModel) -> Screened:
@@ -177,7 +177,7 @@ class Trials:
                 break
             before = self.fitter
             self.use(fitter)
-            found = self.tried(restart(candidate.fit), candidate.cause, steps=FIT.max_steps)
+            found = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
             if not found:
                 self.use(before)
                 break

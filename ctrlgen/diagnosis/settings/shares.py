@@ -88,6 +88,17 @@ class SharesSettings:
     """Share of samples up to which such samples are spikes; more of them are structure and are kept. Judgement."""
     told: float = 0.05
     """Share below which a sentence does not name what has it: the half width of a usual interval. Judgement."""
+    more_than_noise: float = 1.2
+    """Residual over noise from which a channel may get an empirical term: below, a term saves less than a tenth of the error."""
+    empirical_channels: int = 3
+    """Channels that may get empirical terms, those with the largest residual: bounds the time."""
+    turning_speeds: tuple[float, ...] = (0.01, 0.03, 0.1, 0.3, 1.0)
+    """Speeds v_c of `empirical_speed` that are tried, over the typical speed: from a change of sign to a curve."""
+    reaches: tuple[float, ...] = (0.4, 0.1, 0.025)
+    """Widest plays of `empirical_history` that are tried, over the range of the travel: most of it to what a joint yields."""
+    weight_ridges: tuple[float, ...] = (1.0, 0.1, 0.01, 1e-3, 1e-4)
+    """Ridges on the weights of an empirical term that are tried, weights counted in the residual's deviation: from weights of its
+    own size to free ones."""
     mostly: float = 0.5
     """Share from which on a residual is mostly a function of something: the larger half."""
 
