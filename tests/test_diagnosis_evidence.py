@@ -197,22 +197,15 @@ def test_the_free_force_is_the_conditional_mean_with_its_deviation():
 
 def test_unknown_physics_is_mapped_and_described_but_not_named():
     fitter = axis_fitter(detent)
-    fit, left, _ = mapped(fitter)
-    found = describe_unmodelled_force(fitter, fit, left)
+    _, left, _ = mapped(fitter)
+    found = describe_unmodelled_force(fitter, left)
     share = {m.coordinate: m.variance_share for m in found.maps["axis"]}
     assert found.quantity == "force" and found.unit == "N"
     assert share["position"] > 3 * max(share["time"], share["velocity"])
     warm = [replace(a, record=replace(a.record, ambient=np.linspace(0, 1, len(a.record.time)))) for a in left]
-    assert {m.coordinate for m in describe_unmodelled_force(fitter, fit, warm).maps["axis"]} - share.keys() == {
+    assert {m.coordinate for m in describe_unmodelled_force(fitter, warm).maps["axis"]} - share.keys() == {
         "temperature"
     }
-    slow, fit = axis_fitter(stop).described(AXIS)
-    left = [linearise_along(slow, fit, r) for r in (*slow.fit_records, *slow.held_out_records)]
-    term = describe_unmodelled_force(slow, fit, left).empirical_term
-    assert term.label == "empirical" and term.held_out_gain > 0.7
-    clean = axis_fitter()
-    fit, left, _ = mapped(clean)
-    assert describe_unmodelled_force(clean, fit, left).empirical_term is None
 
 
 def test_profiles_are_finite_and_cover():

@@ -58,12 +58,10 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
             failed.append(f"{name} is left out: {error}")
             return None
 
-    if not explained and (f := tried("the unknown input", lambda: describe_unmodelled_force(fitter, chosen, after))):
+    if not explained and (f := tried("the unknown input", lambda: describe_unmodelled_force(fitter, after))):
         short = {key: value for key, value in vars(f).items() if key != "estimates"}  # one value a sample
         extra["unmodelled_force"] = plain(short)
-        location["after"]["unmodelled_force"] = {
-            key: extra["unmodelled_force"][key] for key in ("statements", "empirical_term")
-        }
+        location["after"]["unmodelled_force"] = {"statements": extra["unmodelled_force"]["statements"]}
     experiment = tried("the next experiment", lambda: next_experiment(search, explained, seed))
     if experiment is not None:
         extra["files"] = files(fitter, chosen, experiment, NEXT_DEVICE)

@@ -1,4 +1,4 @@
-"""Unmodelled dynamics: the unknown input that would explain the residual, what it depends on, and an empirical term for it.
+"""Unmodelled dynamics: the unknown input that would explain the residual, and what it depends on.
 
 Dependence maps show the estimated input against position, velocity, time and temperature, and against position for
 forward and backward motion apart.
@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
+from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.evidence.residual_localisation import equivalent_inputs
-from ctrlgen.diagnosis.evidence.sparse_regression import EmpiricalTerm, fit_empirical_term
 from ctrlgen.diagnosis.evidence.unknown_input import UnknownInput, estimate_unknown_input
 from ctrlgen.diagnosis.settings import MAPS, STATISTICS
 
@@ -38,19 +37,18 @@ class DependenceMap:
 
 @dataclass(frozen=True, eq=False)
 class UnmodelledForce:
-    """The unknown input of each axis: kind, rms [unit], dependence maps, empirical term, statements, estimates by record."""
+    """The unknown input of each axis: kind, rms [unit], dependence maps, statements, estimates by record."""
 
     quantity: str
     rms: dict[str, float]
     unit: str
     maps: dict[str, tuple[DependenceMap, ...]]
-    empirical_term: EmpiricalTerm | None
     statements: tuple[str, ...]
     estimates: tuple[UnknownInput, ...]
 
 
-def describe_unmodelled_force(fitter: Fitter, fit: Fit, models: list[LtvModel]) -> UnmodelledForce:
-    """The unknown input for the residual of `fit`; `models` are its LTV models, the records to fit first.
+def describe_unmodelled_force(fitter: Fitter, models: list[LtvModel]) -> UnmodelledForce:
+    """The unknown input for the residual of a fit; `models` are its LTV models, the records to fit first.
 
     Raises ArithmeticError where it has no finite estimate.
     """
@@ -67,13 +65,9 @@ def describe_unmodelled_force(fitter: Fitter, fit: Fit, models: list[LtvModel]) 
     loudest = sorted(range(len(axes)), key=lambda i: -_rms(estimates, i) / max(_sd(estimates, i), 1e-300))[
         : MAPS.most_axes
     ]
-    terms = [e for i in loudest if (e := fit_empirical_term(fitter, fit, models, i)) is not None]
-    best = max(terms, key=lambda e: e.held_out_gain, default=None)
     statements = [_statement(axis, maps[axis]) for axis in (axes[i] for i in loudest)]
-    if best is None:
-        statements.append("no empirical term of position, velocity, history and drive reduces the held-out error")
     return UnmodelledForce(
-        models[0].place.value, rms, units[0], maps, best, tuple(s for s in statements if s), tuple(estimates)
+        models[0].place.value, rms, units[0], maps, tuple(s for s in statements if s), tuple(estimates)
     )
 
 

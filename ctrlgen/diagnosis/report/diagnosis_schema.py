@@ -211,26 +211,10 @@ class SpectralLinesEntry(Keys):
     statement: str = Field(description="What follows.")
 
 
-class EmpiricalTermEntry(Keys):
-    """A sparse sum of features that describes the residual; no cause."""
-
-    label: Literal["empirical"] = Field(description="Always empirical: it names no cause.")
-    axis: str = Field(description="Axis on which it acts.")
-    terms: dict[str, float] = Field(
-        description="Coefficient [unit] by feature; d, v, u: position, speed, drives over their largest."
-    )
-    unit: str = Field(description="Unit of the coefficients.")
-    travel: float = Field(description="Largest displacement of the axis, SI.")
-    speed: float = Field(description="Largest speed of the axis, SI.")
-    drives: list[float] = Field(description="Largest value of every drive, SI.")
-    held_out_gain: float = Field(description="Share of the held-out excess that it explains.")
-
-
 class UnmodelledForceEntry(Keys):
     """The unknown input (force or displacement) that would explain the residual after the correction."""
 
     statements: list[str] = Field(description="What it depends on.")
-    empirical_term: EmpiricalTermEntry | None = Field(description="Null where no term helps on the held-out records.")
 
 
 class ResidualLocationEntry(Keys):
@@ -349,7 +333,7 @@ class RoundEntry(Keys):
     decision: str = Field(description="What was decided, and why.")
 
 
-class SmootherEntry(Keys):
+class EmpiricalTermEntry(Keys):
     """A smoother of what no law reaches, as an effect in device.next.toml; it names no cause."""
 
     effect: str = Field(description="Name of the effect: empirical_position, empirical_speed or empirical_history.")
@@ -375,7 +359,7 @@ class DiagnosisRecord(Origin):
     shares: SharesEntry | None = Field(
         description="How much of the residual is a function of what; null where the records are too short."
     )
-    empirical_terms: list[SmootherEntry] = Field(description="What device.next.toml holds beside the findings.")
+    empirical_terms: list[EmpiricalTermEntry] = Field(description="What device.next.toml holds beside the findings.")
     residual_location: ResidualLocations = Field(description="Where the residual is large, before and after.")
     held_out: dict[str, ChannelErrorEntry] = Field(description="Errors on the held-out records, by channel.")
     spikes: dict[str, SpikesEntry] = Field(

@@ -290,19 +290,9 @@ FUNCTIONS = {
 
 
 def unknown_lines(diagnosis: Diagnosis) -> list[str]:
-    """What the unknown input depends on, and the empirical term: they describe the residual and name no cause."""
+    """What the unknown input depends on: it describes the residual and names no cause."""
     force = diagnosis.extra.get("unmodelled_force")
-    if not force:
-        return []
-    term = force["empirical_term"]
-    lines = list(force["statements"])
-    if term:
-        formula = " ".join(f"{value:+.3g} {name}" for name, value in term["terms"].items()).removeprefix("+")
-        lines.append(
-            f"{term['axis']}: the empirical term {formula} {term['unit']} explains {term['held_out_gain']:.0%} of the excess on "
-            "the held-out records (d, v, u: position, speed and drives, each over its largest value); it names no cause"
-        )
-    return lines
+    return list(force["statements"]) if force else []
 
 
 def hard(text: str) -> str:

@@ -78,35 +78,7 @@ class MapSettings:
     fewest_samples: int = 5
     """Samples in a bin that is shown."""
     most_axes: int = 2
-    """Axes, those with the largest disturbance, for which a term is sought."""
-
-
-@dataclass(frozen=True)
-class RegressorSettings:
-    """Features of the sparse regression."""
-
-    plays: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.4)
-    """Half widths of the play operators, over the largest displacement."""
-    stops: tuple[float, ...] = (0.4, 0.6, 0.8)
-    """Displacements at which a one-sided contact may begin, over the largest one."""
-    lags: int = 5
-    """Relaxation times, logarithmic from four samples to a third of the longest record."""
-    soft_sign: float = 0.02
-    """Speed over the largest one at which the smooth sign of the velocity reaches tanh(1)."""
-
-
-@dataclass(frozen=True)
-class SparseRegressionSettings:
-    """An empirical term by forward selection of features."""
-
-    most_terms: int = 5
-    """Features of a term at most."""
-    least_gain: float = 12.0
-    """Decrease of the squares that a feature must bring beside BIC's price, as for a cause."""
-    least_share: float = 0.01
-    """Share of the excess that a feature must explain, and the term of the held-out excess. Judgement."""
-    own_share: float = 1e-6
-    """Smallest eigenvalue of the chosen features' correlation matrix: below, they depend on each other."""
+    """Axes that a sentence describes, those with the largest disturbance."""
 
 
 @dataclass(frozen=True)
@@ -174,8 +146,6 @@ LOCALISATION = LocalisationSettings()
 SPECTRAL_LINES = SpectralLineSettings()
 UNKNOWN_INPUT = UnknownInputSettings()
 MAPS = MapSettings()
-REGRESSORS = RegressorSettings()
-SPARSE_REGRESSION = SparseRegressionSettings()
 DETECTABILITY = DetectabilitySettings()
 EXCITATION = ExcitationSettings()
 EXPERIMENT = ExperimentSettings()
