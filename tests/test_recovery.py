@@ -46,6 +46,7 @@ ALSO = {
     "viscous": "asymmetric_viscous",
 }  # the battery's names for them
 IN_THE_LOOP = {"link_load"}  # found on the finite-rotation plant of tests/test_loop.py
+SMOOTHERS = {"empirical_history", "empirical_position", "empirical_speed"}  # written in tests/test_empirical_terms.py
 
 
 @dataclass(frozen=True)
@@ -513,4 +514,4 @@ def test_no_law_is_left_out():
         "payload",
         "second_pole",
     }
-    assert not set(Effect.library) - battery - here - STATED - IN_THE_LOOP
+    assert not set(Effect.library) - battery - here - STATED - IN_THE_LOOP - SMOOTHERS

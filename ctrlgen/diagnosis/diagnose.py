@@ -39,10 +39,11 @@ from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findi
 from ctrlgen.diagnosis.selection.result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.selection.verdict import in_another_unit, verdict
 from ctrlgen.diagnosis.settings import NOISE, NOISE_UPDATE, SIMULATION
-from ctrlgen.diagnosis.shares.empirical_terms import empirical_terms
-from ctrlgen.diagnosis.shares.gather import residual_shares
+from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
+from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
@@ -98,9 +99,9 @@ def _diagnose(
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
-    left = () if tests.passed else empirical_terms(search.fitter, search.chosen.fit, shares)
+    left, failed = _empirical_terms(search, tests.passed, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
-    notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed)
+    notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed, *failed)
     return Diagnosis(
         verdict=answer,
         findings=(*findings(search, attribution, likelihoods), *detected),
@@ -118,6 +119,18 @@ def _diagnose(
         profiles=likelihoods,
         **{name: value for name, value in vars(analyses).items() if name != "failed"},
     )
+
+
+def _empirical_terms(
+    search: SearchResult, explained: bool, shares: ResidualShares | None
+) -> tuple[tuple[EmpiricalTerm, ...], tuple[str, ...]]:
+    """Smoothers of what is left, and a note where they cannot be had: no finding depends on them."""
+    if explained:
+        return (), ()
+    try:
+        return empirical_terms(search.fitter, search.chosen.fit, shares), ()
+    except FAILURES as error:
+        return (), (f"empirical terms are left out: {error}",)
 
 
 def _with_both_roles(recording: Recording) -> Recording:

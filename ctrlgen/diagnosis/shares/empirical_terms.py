@@ -153,7 +153,7 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
         X = np.nan_to_num(np.vstack(white))
         c, left = ridge_regression(X, y)
         if left < least:
-            theta[weights] = c
+            theta[weights] = np.clip(c, [free[k].low for k in weights], [free[k].high for k in weights])
             found = fit.restarted.with_cause(smoother.cause, numbers | {free[k].name: float(theta[k]) for k in weights})
             empty = np.zeros(0)
             best, least = replace(fit, structure=found, theta=theta, initial_states=(), residual=empty, J=empty), left
@@ -172,7 +172,7 @@ def ridge_regression(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
     values, b, best = np.maximum(values, 0.0), V.T @ (X.T @ y), (np.zeros(X.shape[1]), np.inf)
     for ridge in SHARES.weight_ridges:
         c = V @ (b / (values + ridge))
-        free = 1 - float(np.sum(values / (values + ridge))) / float(y @ y)
+        free = 1 - float(np.sum(values / (values + ridge))) / max(float(y @ y), 1e-300)
         left = float(np.sum((y - X @ c) ** 2)) / max(free, 1e-3) ** 2
         best = min(best, (c, left), key=lambda found: found[1])
     return best
