@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
+from scipy.integrate import quad
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices.mechanism_model import Condensed, freedoms, natural_frequencies
 from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
+from ctrlgen.devices.meso_hexapod import matrices as meso_matrices
 from ctrlgen.devices.rrr_stage import hinge_compliance, stage
 from ctrlgen.model.assembly import movable
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
+from ctrlgen.physics import meso_hexapod as meso
 from ctrlgen.physics.flexure import rectangular_section
 
 HEAD = 'kind = "mechanism"\nname = "m"\ntitle = "t"\nsource = "a test"\n'
@@ -553,3 +556,163 @@ def test_a_channel_has_the_same_scale_whether_numbers_are_free_or_not(tmp_path):
     J = dm(Condensed(*with_values(device)).jacobian)
     travel = max(a.travel.si for a in device.actuator)
     assert device.channel_scale == pytest.approx(np.abs(J).sum(axis=1) * travel)
+
+
+HINGE = """[[element]]
+kind = "hinge"
+name = "{name}"
+from = "{first}"
+to = "{to}"
+at = ["{x} mm", "0 mm", "0 mm"]
+along = [{along}]
+hinge = {{ kind = "circular", R = "2 mm", t = "0.3 mm", b = "8 mm", equation = "paros_weisbord", outside = "accept" }}
+rotation_limit = "{limit} deg"
+material = "silicon"
+"""
+
+
+def hinged(limit: float) -> str:
+    """An arm 30 mm long on one hinge, pushed across its end."""
+    push = REST.replace(
+        'at = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]', 'at = ["32 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]', 1
+    )
+    push = push.replace(
+        'at = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]',
+        'at = ["32 mm", "0 mm", "0 mm"]\nchannels = ["delta_y"]',
+    )
+    push = push.replace('travel = "50 um"', 'travel = "2 mm"')
+    silicon = SILICON.replace('poisson = "0.28"', 'poisson = "0.28"\nstress_limit = "300 MPa"')
+    hinge = HINGE.format(name="notch", first="ground", to="plate", x=2, along="1, 0, 0", limit=limit)
+    return HEAD + silicon + '[[body]]\nname = "plate"\n' + hinge + push
+
+
+def test_a_circular_hinge_is_that_of_its_equations_in_the_plane_and_of_beam_theory_out_of_it(tmp_path):
+    """Against quadrature over the profile; the arm's stiffness is that of S2 C.1-C.4 about its end."""
+    c = Condensed(*with_values(loaded(tmp_path, hinged(1.0))))
+    C = dm(c.compliances[0])
+    R, t, b, E, nu = 2e-3, 0.3e-3, 8e-3, 130e9, 0.28
+    G = E / (2 * (1 + nu))
+    I_0, I_2, I_3 = (
+        quad(lambda x, f=f: f(x, t + 2 * R - 2 * np.sqrt(R * R - x * x)), -R, R, epsabs=0, epsrel=1e-12, limit=200)[0]
+        for f in (lambda x, h: 1 / h, lambda x, h: x * x / h, lambda x, h: 1 / h**3)
+    )
+    alpha = 12 * I_3 / (E * b)
+    assert C[2, 5] == pytest.approx(alpha, rel=1e-9) and C[4, 5] == C[2, 1] == pytest.approx(R * alpha, rel=1e-9)
+    assert C[3, 0] == pytest.approx(I_0 / (E * b), rel=1e-9)
+    assert C[1, 4] == pytest.approx(12 * I_0 / (E * b**3), rel=1e-9)
+    assert C[5, 4] == C[1, 2] == pytest.approx(-R * 12 * I_0 / (E * b**3), rel=1e-9)
+    assert C[5, 2] == pytest.approx(12 * (R**2 * I_0 + I_2) / (E * b**3) + 1.2 * I_0 / (G * b), rel=1e-9)
+    assert C[0, 3] == pytest.approx(3 * I_3 / (G * b), rel=0.03)  # a neck much thinner than wide
+    assert dm(c.stiffness)[0, 0] == pytest.approx(1 / (C[4, 1] + 2 * 30e-3 * C[4, 5] + (30e-3) ** 2 * alpha), rel=1e-9)
+
+
+def test_a_hinges_rotation_and_the_stress_of_its_neck_are_limits(tmp_path):
+    """1 mm at 32 mm from the neck turns it by very nearly 1/32; 6 M K/(b t^2) there, K = (1 + t/2R)^0.45."""
+    device = loaded(tmp_path, hinged(1.0))
+    assert freedoms(device) == (1, 0)
+    c, model = Condensed(*with_values(device)), build_model(device)
+    limits = {limit.name: limit for limit in model.limits}
+    d = 1e-3
+    force = dm(c.stiffness)[0, 0] * d
+    values = dict(
+        zip(
+            (limit.name for limit in model.limits),
+            model.evaluate_limits(model.rest, [d], [0.0], model.p_nominal),
+            strict=True,
+        )
+    )
+    turn = float(values["rotation_notch"][0])
+    assert turn == pytest.approx(force * (dm(c.compliances[0])[2, 1] + 30e-3 * dm(c.compliances[0])[2, 5]), rel=1e-9)
+    assert turn == pytest.approx(d / 32e-3, rel=0.02) and limits["rotation_notch"].upper == pytest.approx(np.radians(1))
+    bending = 6 * force * 32e-3 / (8e-3 * 0.3e-3**2) * (1 + 0.3 / 4) ** 0.45
+    assert float(values["stress_silicon"][0]) == pytest.approx(bending, rel=1e-6)
+    assert limits["stress_silicon"].channels == ("notch_neck",)
+    assert any("notch: alpha_z_per_M_z at t/R = 0.15 by C.1" in text for text in device.remarks())
+
+
+def test_the_rotations_of_hinges_in_a_row_add_up(tmp_path):
+    text = hinged(1.0).replace('[[body]]\nname = "plate"', '[[body]]\nname = "plate"\n[[body]]\nname = "link"')
+    text = text.replace('to = "plate"\nat = ["2 mm"', 'to = "link"\nat = ["2 mm"')
+    second = HINGE.format(name="second", first="link", to="plate", x=14, along="1, 0, 0", limit=1.0)
+    device = loaded(tmp_path, text.replace("[[actuator]]", second + "[[actuator]]"))
+    c = Condensed(*with_values(device))
+    turns = [dm(c.rotation(k))[0, 0] for k in (0, 1)]
+    assert min(turns) > 0 and sum(turns) == pytest.approx(dm(c.twists[device.bodies.index("plate")])[2, 0], rel=1e-9)
+
+
+def test_a_mirrored_half_is_the_same_as_both_halves_written_out(tmp_path):
+    """A body on two slanted blades and two matrices without symmetry, image of each other in the plane x = 0."""
+    skew = np.diag([1.0, 2.0, 3.0, 1e-6, 2e-6, 3e-6]) + 0.1 * np.diag([1e-3, 1e-3], 4) + 0.1 * np.diag([1e-3, 1e-3], -4)
+    C = skew[[0, 1, 2, 3, 4, 5]][:, [3, 4, 5, 0, 1, 2]]  # twist per (F; M)
+
+    def element(name, x, along, across, matrix, extra=""):
+        rows = ", ".join(vector(row) for row in matrix)
+        return (
+            f'[[element]]\nkind = "matrix"\nname = "{name}"\n{extra}from = "ground"\nto = "plate"\nat = ["{x} mm", "3 mm", "1 mm"]\n'
+            f"along = {along}\nacross = {across}\ncompliance_si = [{rows}]\n"
+        )
+
+    flip_T, flip_W = np.diag([-1, -1, 1, 1, 1, -1]), np.diag([1, 1, -1, -1, -1, 1])  # z of its own frame turned round
+    head = HEAD + SILICON + '[[body]]\nname = "plate"\n'
+    rest = REST.replace("along = [1, 0, 0]", "along = [0, 1, 0]").replace("delta_x", "delta_y")
+    half = '[[pattern]]\nname = "both"\nmirror = "x"\n' + element(
+        "m", 10, [1, 2, 3], [0, 1, 0], C, 'pattern = "both"\n'
+    )
+    whole = element("m1", 10, [1, 2, 3], [0, 1, 0], C) + element("m2", -10, [-1, 2, 3], [0, 1, 0], flip_T @ C @ flip_W)
+    found = [
+        dm(Condensed(*with_values(loaded(tmp_path, head + text + rest))).output_compliance) for text in (half, whole)
+    ]
+    assert np.abs(found[0] - found[1]).max() < 1e-12 * np.abs(found[1]).max()
+    image_T, image_W = np.diag([1, -1, -1, -1, 1, 1]), np.diag([-1, 1, 1, 1, -1, -1])
+    symmetric = image_T @ found[0] @ image_W
+    assert np.abs(symmetric - found[0]).max() < 1e-9 * np.abs(found[0]).max()  # the whole is its own image
+    with pytest.raises(InputError) as caught:
+        loaded(tmp_path, head + half.replace('mirror = "x"', 'mirror = "x"\ntimes = 3') + rest)
+    assert "mirror: makes two copies; leave out times and angles" in str(caught.value)
+
+
+def meso_hexapod_text(device) -> str:
+    """S0's hexapod: three stages moved by two actuators each, six struts that hold their length alone (1e-12 of it across)."""
+    p = device.values()
+    h, directions = p.hexapod, p.directions.jacobian
+    A, B = (dm(points) for points in meso.geometry(h))
+    lines = [HEAD, '[[body]]\nname = "platform"\n']
+    along, across, turning = 1e-6, 1e6, 1e6  # m/N and rad/(N m)
+
+    def entries(axial):
+        return (
+            f'theta_x_per_M_x = "{turning} rad/(N*m)"\ntheta_y_per_M_y = "{turning} rad/(N*m)"\ntheta_z_per_M_z = "{turning} rad/(N*m)"\n'
+            f'delta_x_per_F_x = "{axial} m/N"\ndelta_y_per_F_y = "{across} m/N"\ndelta_z_per_F_z = "{across} m/N"\n'
+        )
+
+    for j in range(3):
+        lines.append(f'[[body]]\nname = "stage{j + 1}"\n')
+        stiff = np.diag([1e-9] * 6)[:, [3, 4, 5, 0, 1, 2]]
+        rows = ", ".join(vector(row) for row in stiff)
+        lines.append(
+            f'[[element]]\nkind = "matrix"\nname = "xy{j + 1}"\nfrom = "ground"\nto = "stage{j + 1}"\nat = ["0 m", "0 m", "0 m"]\n'
+            f"compliance_si = [{rows}]\n"
+        )
+    for i in range(6):
+        span = A[:, i] - B[:, i]
+        lines.append(
+            f'[[element]]\nkind = "compliance"\nname = "strut{i + 1}"\nfrom = "stage{meso.STAGE_OF_STRUT[i] + 1}"\nto = "platform"\n'
+            f"at = {place(A[:, i])}\nalong = {vector(span)}\nacross = [0, 0, 1]\n{entries(along)}"
+        )
+    for i, (axis, angle) in enumerate(zip(device.axes, directions, strict=True)):
+        lines.append(
+            f'[[actuator]]\nname = "a{axis}"\nkind = "displacement"\non = "xy{meso.STAGE_OF_ACTUATOR[i] + 1}"\n'
+            f'along = {vector([np.cos(angle), np.sin(angle), 0.0])}\ngain = "1 um/V"\nlow = "-50 V"\nhigh = "50 V"\ntravel = "50 um"\n'
+        )
+    lines.append(
+        '[output]\nbody = "platform"\nat = ["0 m", "0 m", "0 m"]\n'
+        'channels = ["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]\n'
+    )
+    return "\n".join(lines)
+
+
+def test_the_meso_scale_hexapod_as_a_mechanism_has_the_papers_jacobian(tmp_path):
+    special = load_device(DEVICE.parent / "meso_hexapod.toml")
+    J = dm(Condensed(*with_values(loaded(tmp_path, meso_hexapod_text(special)))).jacobian)
+    wanted = meso_matrices(special)["J_k"]
+    assert np.abs((J - wanted) / np.abs(wanted).max(axis=1, keepdims=True)).max() < 1e-9

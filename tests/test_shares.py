@@ -196,7 +196,9 @@ def test_a_drive_that_is_the_position_has_no_row(signals, rng):
 
 def test_every_kind_speaks_and_every_effect_of_the_library_belongs_to_a_family():
     assert set(SPEAKS_FOR) == set(Kind) and all(reason for _, reason in SPEAKS_FOR.values())
-    assert set(FAMILY_OF) == {kind for kind in Effect.library if not kind.startswith("empirical_")}  # these name no cause
+    assert set(FAMILY_OF) == {
+        kind for kind in Effect.library if not kind.startswith("empirical_")
+    }  # these name no cause
     assert set(FAMILY_OF.values()) == set(Family)
     assert {family for families, _ in SPEAKS_FOR.values() for family in families} == set(Family)
 

@@ -17,11 +17,21 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 from ctrlgen.devices.base import BalancedPhysics, Device, Section
-from ctrlgen.devices.mechanism_elements import TWIST, AnyElement, Copied, Direction, Flexible, Name, Place, Placed
+from ctrlgen.devices.mechanism_elements import (
+    TWIST,
+    AnyElement,
+    CircularHinge,
+    Copied,
+    Direction,
+    Flexible,
+    Name,
+    Place,
+    Placed,
+)
 from ctrlgen.devices.mechanism_model import Condensed
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
-from ctrlgen.physics.screw import rotation_z
+from ctrlgen.physics.screw import Matrix, rotation_z
 
 PerDrive = Annotated[Quantity, In(None)]
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
@@ -43,20 +53,35 @@ class Material(Section):
 
 
 class Pattern(Section):
-    """`[[pattern]]`: copies of bodies, elements and actuators that name it, turned about z."""
+    """`[[pattern]]`: copies of bodies, elements and actuators that name it, turned about z or mirrored."""
 
     name: Name
     """By which they name it; copy k of a body NAME is called NAME_k, from 1."""
-    times: Annotated[int, Field(ge=2, le=100)]
-    """How many there are, the first as written."""
+    times: Annotated[int, Field(ge=2, le=100)] | None = None
+    """How many there are, the first as written; of a mirror: two."""
     angles: tuple[Annotated[Quantity, In("deg")], ...] = ()
     """Angle of each copy; left out: evenly spaced over a turn."""
+    mirror: Literal["x", "y", "z"] | None = None
+    """The second copy is the image of the first in the plane through the origin that is normal to this axis."""
 
     @model_validator(mode="after")
-    def _one_angle_each(self) -> Pattern:
+    def _is_one_or_the_other(self) -> Pattern:
+        if self.mirror is not None and (self.times is not None or self.angles):
+            raise ValueError("mirror: makes two copies; leave out times and angles")
+        if self.mirror is None and self.times is None:
+            raise ValueError("times: is missing; say how many copies, or give mirror")
         if self.angles and len(self.angles) != self.times:
             raise ValueError(f"angles: has {len(self.angles)} for {self.times} copies; give one for each, or none")
         return self
+
+    @property
+    def turns(self) -> list[Matrix]:
+        """The rotation or reflection (3, 3) of each copy."""
+        if self.mirror is not None:
+            return [ca.DM.eye(3), ca.diag(ca.DM([-1 if axis == self.mirror else 1 for axis in "xyz"]))]
+        times = self.times or 0
+        angles = [a.si for a in self.angles] or [2 * np.pi * k / times for k in range(times)]
+        return [ca.DM(rotation_z(angle)) for angle in angles]
 
 
 class Body(Section):
@@ -277,9 +302,8 @@ class Mechanism(Device):
             if pattern is None:
                 yield Copied(section, index, section.name, 0, ca.DM.eye(3))
                 continue
-            angles = [a.si for a in pattern.angles] or [2 * np.pi * k / pattern.times for k in range(pattern.times)]
-            for k, angle in enumerate(angles, start=1):
-                yield Copied(section, index, f"{section.name}_{k}", k, ca.DM(rotation_z(angle)))
+            for k, turn in enumerate(pattern.turns, start=1):
+                yield Copied(section, index, f"{section.name}_{k}", k, turn)
 
     def _between(self, copy: Copied, first: str, second: str) -> Placed:
         numbers = [self._number(name, copy.section.pattern, copy.copy) for name in (first, second)]
@@ -315,6 +339,11 @@ class Mechanism(Device):
     def _joints(self) -> list[Element]:
         """Who is joined to whom."""
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
+
+    def remarks(self) -> list[str]:
+        """Remarks on hinge equations used outside their t/R range."""
+        hinges = [e for e in self.element if isinstance(e, CircularHinge)]
+        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()]
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """The condensed mechanism with the values `p`."""

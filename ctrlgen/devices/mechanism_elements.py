@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
@@ -11,8 +12,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ctrlgen.core.units import In, Quantity
+from ctrlgen.devices.hinge import Hinge
 from ctrlgen.devices.section import Section
-from ctrlgen.physics import flexure, mechanism
+from ctrlgen.physics import circular_hinge, flexure, mechanism
 from ctrlgen.physics.screw import Matrix, move, series
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -22,6 +24,23 @@ Place = tuple[Coordinate, Coordinate, Coordinate]
 Direction = tuple[float, float, float]
 TWIST = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 STIFF = 0.01  # of the largest compliance of a mechanism's flexures, below which a direction counts as held
+
+
+@dataclass(frozen=True, eq=False)
+class FlexureSection:
+    """A section of a flexure, `back` [m] from its free end: area [m^2], section moduli of bending about y and z and of torsion
+    [m^3]."""
+
+    name: str
+    back: Any
+    area: Any
+    about_y: Any
+    about_z: Any
+    torsion: Any
+
+    def stresses(self, load: Matrix) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+        """Bending about y and z, tension and torsion [Pa] by the loads (6, n) [N, N m] there, in the flexure's frame."""
+        return load[4, :] / self.about_y, load[5, :] / self.about_z, load[0, :] / self.area, load[3, :] / self.torsion
 
 
 class Joining(Section):
@@ -52,6 +71,10 @@ class Joining(Section):
             raise ValueError("across: is parallel to along, or one of them is zero; give two directions")
         return self
 
+    def reach(self, p: SimpleNamespace) -> Any:
+        """Distance between its ends [m]; None where it says none."""
+        return None
+
     @property
     def thin(self) -> Direction:
         """`across`, or what stands for it."""
@@ -77,27 +100,40 @@ class Joining(Section):
 class Flexible(Joining):
     """A flexure made of a material."""
 
-    length: Length
-    """Length between its ends."""
     material: str
     """Name of its material."""
 
-    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
-        """Area [m^2] and section moduli of bending about y and z and of torsion [m^3] at its ends."""
+    def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
+        """Where it is stressed most."""
         raise NotImplementedError
 
     @staticmethod
     def largest_stress(about_y: Matrix, about_z: Matrix, tension: Matrix, shear: Matrix, floor: float) -> Matrix:
-        """The largest stress of its section [Pa], from the parts that `stresses` gives."""
+        """The largest stress of a section [Pa], from the stresses by bending, tension and torsion."""
         raise NotImplementedError
 
-    def stresses(self, load: Matrix, p: SimpleNamespace) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-        """Bending about y and z, tension and torsion [Pa] at an end with the section loads (6, n) [N, N m], in its frame."""
-        area, about_y, about_z, torsion = self.section(p)
-        return load[4, :] / about_y, load[5, :] / about_z, load[0, :] / area, load[3, :] / torsion
+
+class Beam(Flexible):
+    """A flexure of some length, stressed most at its ends."""
+
+    length: Length
+    """Length between its ends."""
+
+    def reach(self, p: SimpleNamespace) -> Any:
+        """Its length."""
+        return p.length
+
+    def section(self, p: SimpleNamespace) -> Sequence[Any]:
+        """Area [m^2] and section moduli of bending about y and z and of torsion [m^3] at its ends."""
+        raise NotImplementedError
+
+    def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
+        """Both ends."""
+        own = self.section(p)
+        return FlexureSection("free_end", 0.0, *own), FlexureSection("fixed_end", p.length, *own)
 
 
-class Blade(Flexible):
+class Blade(Beam):
     """A leaf spring."""
 
     ideal = ("delta_x", "delta_z", "theta_y")
@@ -122,12 +158,12 @@ class Blade(Flexible):
         """[C] about the free end (6, 6). Source: S1 eq. (21)-(23)."""
         return flexure.blade_compliance(p.length, p.thickness, p.width, m.young, m.poisson)
 
-    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+    def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Of the rectangle."""
         return flexure.rectangular_section(p.thickness, p.width)
 
 
-class Wire(Flexible):
+class Wire(Beam):
     """A round wire or rod."""
 
     ideal = ("delta_x",)
@@ -142,13 +178,13 @@ class Wire(Flexible):
         """[C] about the free end (6, 6). Source: S1 eq. (24)."""
         return flexure.wire_compliance(p.length, p.diameter, m.young, m.poisson)
 
-    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+    def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Of the wire."""
         area, bending, torsion = flexure.round_section(p.diameter)
         return area, bending, bending, torsion
 
 
-class Strut(Flexible):
+class Strut(Beam):
     """Wire, rod and wire in line, as of a hexapod."""
 
     ideal = ("delta_x",)
@@ -176,10 +212,53 @@ class Strut(Flexible):
         lower = move(wire, None, (p.wire_length - p.length, 0, 0))
         return series((lower, move(rod, None, (-p.wire_length, 0, 0)), wire))
 
-    def section(self, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+    def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Of its wires."""
         area, bending, torsion = flexure.round_section(p.wire_diameter)
         return area, bending, bending, torsion
+
+
+class CircularHinge(Flexible):
+    """A notch hinge: two circular cut-outs, thin along its y axis, so that it turns about z."""
+
+    ideal = ("delta_x", "delta_y", "delta_z", "theta_x", "theta_y")
+    largest_stress = staticmethod(flexure.rectangular_stress)
+
+    kind: Literal["hinge"]
+    """A right circular hinge by the equations of S2."""
+    hinge: Hinge
+    """Radius, neck and whose equations, as in `hinge = { kind = "circular", R = "2 mm", t = "0.3 mm", b = "8 mm" }`."""
+    rotation_limit: Annotated[Quantity, In("deg", positive=True)] | None = None
+    """Largest rotation to both sides; a limit where it is given."""
+
+    @model_validator(mode="after")
+    def _is_deep(self) -> CircularHinge:
+        if self.hinge.b is None:
+            raise ValueError('hinge.b: is missing; add it, such as b = "8 mm"')
+        if self.hinge.b.si < self.hinge.t.si:
+            raise ValueError("hinge.b: is below the neck t; turn the hinge by across")
+        return self
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
+        """[C] about the free end (6, 6): in the plane by S2's equations, out of it by beam theory, torsion by the neck's J/I_z."""
+        h = self.hinge.geometry(p.hinge, E=m.young, nu=m.poisson)
+        plane = self.hinge.planar(p.hinge, E=m.young, nu=m.poisson)
+        turn, across, coupled = circular_hinge.out_of_plane(h.R, h.t, h.b, h.E, h.G)
+        twist = plane[2, 2] * h.E / (h.G * flexure.torsion_ratio(h.t, h.b))
+        return _of_entries((twist, turn, plane[2, 2]), (plane[0, 0], plane[1, 1], across), plane[2, 1], coupled)
+
+    def reach(self, p: SimpleNamespace) -> Any:
+        """Its length 2 R."""
+        return 2 * p.hinge.R
+
+    def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
+        """The neck, where bending about z is K = (1 + t/2R)^(9/20) times that of a straight bar.
+
+        Source: S. T. Smith, D. G. Chetwynd, Foundations of Ultraprecision Mechanism Design (1992), chapter 4.
+        """
+        R, t = p.hinge.R, p.hinge.t
+        area, about_y, about_z, torsion = flexure.rectangular_section(t, p.hinge.b)
+        return (FlexureSection("neck", R, area, about_y, about_z / (1 + t / (2 * R)) ** 0.45, torsion),)
 
 
 class Compliance(Joining):
@@ -222,15 +301,21 @@ class Compliance(Joining):
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6), twist per wrench."""
         z, y, x = (0.0 if c is None else c for c in (p.theta_z_per_F_y, p.theta_y_per_F_z, p.theta_x_per_F_z))
-        rows = [
-            [0, 0, x, p.theta_x_per_M_x, 0, 0],
-            [0, 0, y, 0, p.theta_y_per_M_y, 0],
-            [0, z, 0, 0, 0, p.theta_z_per_M_z],
-            [p.delta_x_per_F_x, 0, 0, 0, 0, 0],
-            [0, p.delta_y_per_F_y, 0, 0, 0, z],
-            [0, 0, p.delta_z_per_F_z, x, y, 0],
-        ]
-        return ca.vertcat(*(ca.horzcat(*row) for row in rows))
+        turns = (p.theta_x_per_M_x, p.theta_y_per_M_y, p.theta_z_per_M_z)
+        return _of_entries(turns, (p.delta_x_per_F_x, p.delta_y_per_F_y, p.delta_z_per_F_z), z, y, x)
+
+
+def _of_entries(turns: Sequence[Any], shifts: Sequence[Any], z: Any, y: Any, x: Any = 0.0) -> Matrix:
+    """[C] (6, 6) of theta per M, delta per F, and theta_z/F_y = delta_y/M_z, theta_y/F_z = delta_z/M_y, theta_x/F_z = delta_z/M_x."""
+    rows = [
+        [0, 0, x, turns[0], 0, 0],
+        [0, 0, y, 0, turns[1], 0],
+        [0, z, 0, 0, 0, turns[2]],
+        [shifts[0], 0, 0, 0, 0, 0],
+        [0, shifts[1], 0, 0, 0, z],
+        [0, 0, shifts[2], x, y, 0],
+    ]
+    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
 class ComplianceMatrix(Joining):
@@ -258,7 +343,9 @@ class ComplianceMatrix(Joining):
         return ca.DM(np.array(self.compliance_si))
 
 
-AnyElement = Annotated[Blade | Wire | Strut | Compliance | ComplianceMatrix, Field(discriminator="kind")]
+AnyElement = Annotated[
+    Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix, Field(discriminator="kind")
+]
 
 
 @dataclass(frozen=True, eq=False)  # a matrix has no truth value that a comparison could use

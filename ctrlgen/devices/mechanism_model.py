@@ -70,12 +70,14 @@ class Condensed:
         self.device, self.p = device, p
         self.pushes = device.actuator[0].kind == "force"
         materials = {m.name: q for m, q in zip(device.material, p.material, strict=True)}
-        self.frames = [ca.mtimes(e.turn, e.section.frame) for e in device.placed_elements]
+        self.frames = [_right_handed(ca.mtimes(e.turn, e.section.frame)) for e in device.placed_elements]
         self.ends = [ca.mtimes(e.turn, ca.vertcat(*p.element[e.index].at)) for e in device.placed_elements]
         stiffness, self.compliances = [], []
         for e, R, end in zip(device.placed_elements, self.frames, self.ends, strict=True):
             own = p.element[e.index]
             C = e.section.compliance(own, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
+            if float(ca.det(e.turn)) < 0:
+                C = ca.mtimes([REFLECTED, C, -REFLECTED])
             self.compliances.append(C)
             stiffness.append(move(inverse(C), R, end))
         self.elements = [Element(e.first, e.second, K) for e, K in zip(device.placed_elements, stiffness, strict=True)]
@@ -172,19 +174,25 @@ class Condensed:
         m = self.prescribed[k]
         return ca.mtimes(e.stiffness, T[0] - T[1] - (0 if m is None else m))
 
+    def rotation(self, k: int) -> Matrix:
+        """(1, n) rotation of element k about its z axis per displacement of the axes [rad/m]."""
+        e = self.elements[k]
+        turns = [0 if b == GROUND else self.twists[b][:3, :] for b in (e.second, e.first)]
+        return ca.mtimes(self.frames[k][:, 2].T, turns[0] - turns[1])
+
     def stress(self, material: str, d: Matrix, floor: float) -> tuple[tuple[str, ...], Matrix]:
-        """Of the flexures of a material: the names of both ends of each, and the largest stress there (ends,) [Pa] with the axes
-        displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`."""
+        """Of the flexures of a material: the names of the sections that are stressed most, and the largest stress there (m,) [Pa] with
+        the axes displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`."""
         names, stresses = [], []
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
                 continue
             own = self.p.element[e.index]
-            for end, back in (("free_end", 0), ("fixed_end", own.length)):
-                section = self.ends[k] - back * self.frames[k][:, 0]
-                load = ca.mtimes(inverse_adjoint(self.frames[k], section), self.wrench(k))
-                parts = (ca.mtimes(part, d) for part in e.section.stresses(load, own))
-                names.append(f"{e.name}_{end}")
+            for section in e.section.sections(own):
+                place = self.ends[k] - section.back * self.frames[k][:, 0]
+                load = ca.mtimes(inverse_adjoint(self.frames[k], place), self.wrench(k))
+                parts = (ca.mtimes(part, d) for part in section.stresses(load))
+                names.append(f"{e.name}_{section.name}")
                 stresses.append(e.section.largest_stress(*parts, floor))
         return tuple(names), ca.vertcat(*stresses)
 
@@ -222,6 +230,13 @@ class Condensed:
                     )
                 label, reach = f"travel of {axes[i]}", s.travel.si
                 found.append(Limit(f"travel_{axes[i]}", label, (axes[i],), "um", signal.displacement[i], -reach, reach))
+            for k, e in enumerate(device.placed_elements):
+                most = getattr(e.section, "rotation_limit", None)
+                if most is not None:
+                    angle = ca.fabs(ca.mtimes(self.rotation(k), signal.mechanism_displacement))
+                    found.append(
+                        Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si)
+                    )
             for material, limit in stressed.items():
                 names, stress = self.stress(material, signal.mechanism_displacement, 1e-9 * limit.si)
                 found.append(Limit(f"stress_{material}", f"stress of {material}", names, "MPa", stress, None, limit.si))
@@ -239,6 +254,14 @@ class Condensed:
             restoring_force=lambda d: ca.mtimes(K, d) + stack * d,
             pose=lambda d: ca.mtimes(J, d), limits=limits,
         )  # fmt: skip
+
+
+def _right_handed(frame: Matrix) -> Matrix:
+    """A frame whose z axis completes x and y: that of a mirrored flexure is seen in its image of z otherwise."""
+    return ca.horzcat(frame[:, :2], ca.cross(frame[:, 0], frame[:, 1]))
+
+
+REFLECTED = ca.diag(ca.DM([-1, -1, 1, 1, 1, -1]))  # of a twist seen in the x-y plane's mirror; of a wrench its negative
 
 
 def _unit(direction: Direction) -> Matrix:

@@ -256,3 +256,21 @@ def c24(R: Scalar, t: Scalar, b: Scalar, E: Scalar) -> Scalar:
     """
     q = (t / (2 * R)) ** 0.5
     return 1 / (E * b * (0.0010 + 0.4256 * q + 0.0824 * q**2))
+
+
+# Out of the plane: Euler-Bernoulli over the profile t(x) = t + 2R - 2 sqrt(R^2 - x^2), whose two integrals are closed
+
+
+def out_of_plane(R: Scalar, t: Scalar, b: Scalar, E: Scalar, G: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """theta_y/M_y, delta_z/F_z and theta_y/F_z at the free end (R, 0).
+
+    theta_y/M_y = 12 I_0/(E b^3), delta_z/F_z = 12 (R^2 I_0 + I_2)/(E b^3) + 6/5 I_0/(G b), theta_y/F_z = -R theta_y/M_y, with
+    I_0 = int dx/t = S(R, t) of C.3 and I_2 = int x^2 dx/t = R^2/2 (gamma (2 + pi gamma - 4 sqrt(k) A) - pi/2). Source: beam theory
+    as C.1-C.4, of the section b t(x) that bends about its thickness b.
+    """
+    beta, k, A = _paros(R, t)
+    gamma = 1 + beta
+    I_0 = _stretch_paros(R, t)
+    I_2 = R**2 / 2 * (gamma * (2 + ca.pi * gamma - 4 * k**0.5 * A) - ca.pi / 2)
+    turn = 12 * I_0 / (E * b**3)
+    return turn, 12 * (R**2 * I_0 + I_2) / (E * b**3) + 6 / 5 * I_0 / (G * b), -R * turn
