@@ -13,7 +13,7 @@ from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices.mechanism_model import Condensed, freedoms, natural_frequencies
 from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.meso_hexapod import matrices as meso_matrices
-from ctrlgen.devices.rrr_stage import hinge_compliance, stage
+from ctrlgen.devices.rrr_stage import stage
 from ctrlgen.model.assembly import movable
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics import meso_hexapod as meso
@@ -92,7 +92,7 @@ def with_values(device):
 
 
 def rrr_text(device) -> str:
-    """S3's 3-RRR stage: two links an arm, three hinges an arm, the arm copied by a pattern; out of the plane anything stiff."""
+    """S3's 3-RRR stage: two links an arm, three hinges an arm, the arm copied by a pattern."""
     p, g = device.values(), device.values().lengths
     R3 = p.hinge3.R
     centre = np.array([g.l1 - g.l6, g.l4])  # of the platform, seen from Point 1
@@ -100,6 +100,7 @@ def rrr_text(device) -> str:
     point_2 = point_3 - [0, 2 * R3 + g.l2]
     lines = [
         HEAD,
+        f'[[material]]\nname = "sheet"\nyoung = {number(p.material.young, "Pa")}\npoisson = "{p.material.poisson!r}"\n',
         '[[pattern]]\nname = "arm"\ntimes = 3\nangles = ["0 deg", "-120 deg", "120 deg"]\n',
         '[[body]]\nname = "platform"\n',
     ]
@@ -109,14 +110,14 @@ def rrr_text(device) -> str:
         ("hinge2", "lower", "upper", point_2, (0, 1, 0)),
         ("hinge3", "upper", "platform", point_3, (0, 1, 0)),
     ):
-        C = dm(hinge_compliance(device, name, p))  # (dx, dy, dalpha) per (F_x, F_y, M_z)
-        across = (0, 1, 0) if along[0] else (-1, 0, 0)
+        hinge, across = device.hinges[name], (0, 1, 0) if along[0] else (-1, 0, 0)
+        equations = ", ".join(f'{key} = "{group}"' for key, group in hinge.equations.items())
+        shear = "" if hinge.shear_factor is None else f', shear_factor = "{hinge.shear_factor.si!r}"'
         lines.append(
-            f'[[element]]\nkind = "compliance"\nname = "{name}"\npattern = "arm"\nfrom = "{first}"\nto = "{second}"\n'
+            f'[[element]]\nkind = "hinge"\nname = "{name}"\npattern = "arm"\nfrom = "{first}"\nto = "{second}"\nmaterial = "sheet"\n'
             f"at = {place([*(point - centre), 0.0])}\nalong = {vector(along)}\nacross = {vector(across)}\n"
-            f'theta_x_per_M_x = "0.1 rad/(N*m)"\ntheta_y_per_M_y = "0.1 rad/(N*m)"\ndelta_z_per_F_z = "1e-7 m/N"\n'
-            f"theta_z_per_M_z = {number(C[2, 2], 'rad/(N*m)')}\ndelta_x_per_F_x = {number(C[0, 0], 'm/N')}\n"
-            f"delta_y_per_F_y = {number(C[1, 1], 'm/N')}\ntheta_z_per_F_y = {number(C[1, 2], 'rad/N')}\n"
+            f'hinge = {{ kind = "circular", R = {number(hinge.R.si, "m")}, t = {number(hinge.t.si, "m")}, '
+            f'b = {number(p.material.width, "m")}, equation = {{ {equations} }}, outside = "{hinge.outside}"{shear} }}\n'
         )
     lines.append(
         f'[[actuator]]\nname = "stack"\npattern = "arm"\nkind = "force"\non = "lower"\n'
