@@ -16,7 +16,7 @@ from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.diagnosis.estimation.error_model import ErrorModel, error_model
 from ctrlgen.diagnosis.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.simulator import Simulator
+from ctrlgen.diagnosis.estimation.simulator import RecentSimulators, Simulator
 from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, STATISTICS
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
@@ -96,7 +96,7 @@ class Fit:
 class Fitter:
     """Fits structures to one recording under the noise of its channels and the discrepancy `errors` of the models fitted.
 
-    Without `errors` there is noise alone. Compiled simulators are kept in `cache`, which copies share, and optima in the
+    Without `errors` there is noise alone. The compiled simulators used last are kept in `cache`, which copies share, and optima in the
     `checkpoint` where there is one.
     """
 
@@ -104,7 +104,7 @@ class Fitter:
     noise: Noise
     checkpoint: Checkpoint | None = None
     errors: ErrorModel | None = None
-    cache: dict = field(default_factory=dict)
+    cache: dict = field(default_factory=RecentSimulators)
 
     @property
     def error(self) -> ErrorModel:

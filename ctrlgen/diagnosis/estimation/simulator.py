@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -237,6 +238,24 @@ class Simulator:
         if not self.poses:
             return u, np.vstack([u[1:], u[-1:]]), ambient
         return np.vstack([u[:1], u[:-1]]), u, ambient
+
+
+class RecentSimulators(dict[Any, Simulator]):
+    """Simulators by what they simulate; of more than `SIMULATION.kept` the one used longest ago is forgotten."""
+
+    def __getitem__(self, key: Any) -> Simulator:
+        found = self.pop(key)
+        super().__setitem__(key, found)  # now the last one
+        return found
+
+    def __setitem__(self, key: Any, simulator: Simulator) -> None:
+        super().__setitem__(key, simulator)
+        while len(self) > SIMULATION.kept:
+            del self[next(iter(self))]
+
+    def copy(self) -> RecentSimulators:
+        """Another one with the same simulators."""
+        return RecentSimulators(self)
 
 
 class Linearised:

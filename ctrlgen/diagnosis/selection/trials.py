@@ -79,7 +79,7 @@ class Trials:
             branch.jobs, branch.step = 1, (lambda _: None)
             if any(simulator.model.inertial for simulator in self.fitter.cache.values()):
                 # steps in time are expanded about the numbers of the structure that was first in need of them
-                branch.fitter = replace(self.fitter, cache=dict(self.fitter.cache))
+                branch.fitter = replace(self.fitter, cache=self.fitter.cache.copy())
             branch.fitted, branch.screens, branch.refused, branch.failed = dict(self.fitted), dict(self.screens), [], []
             result = function(branch, item)
             new = {key: value for key, value in branch.fitted.items() if self.fitted.get(key) is not value}

@@ -140,6 +140,9 @@ class OutlierSettings:
 class SimulationSettings:
     """Simulation of a record with its sensitivities."""
 
+    kept: int = 64
+    """Compiled simulators kept at a time. One of a hexapod takes 20 MB, and a search uses five hundred; with 64 it builds a tenth
+    more of them than without a limit."""
     start_newton_steps: int = 12
     """Newton steps from home to the first displacement in balance, unrolled. Later samples start from the one before."""
     newton_steps: int = 4
