@@ -74,6 +74,10 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
     internal = tuple(i for i in range(x.numel()) if x[i].element_hash() not in found)
     held, at_rest = (ca.vertcat(NONE, *(v[i] for i in internal)) for v in (x, ca.SX(ca.DM(model.rest))))
     equations = ca.substitute(equations, held, at_rest)
+    if ca.sprank(ca.jacobian(equations, unknowns).sparsity()) < equations.numel():
+        kinds = ", ".join(sorted({e.kind for e in model.device.effect if e.states}))
+        what = f"of the device ({kinds}) keep the drive from moving the {follow} near rest: there is no inverse; leave them out"
+        raise InputError(model.name, [Fault("effect", what)])
     known = ExpansionPoint.of(
         (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (u, 0 * model.u_scale, model.u_scale),
         (ca.vec(target), np.zeros(target.numel()), np.zeros(target.numel())),

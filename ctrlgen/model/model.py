@@ -89,6 +89,14 @@ class Model:
             rows[i] = self.x[i]
         return rows
 
+    @cached_property
+    def starting(self) -> ca.SX:
+        """(n_x,) zero where an open path starts: settled, states that change once a sample one sample after zero, clocks at zero."""
+        rows, stepped = self.settling[:], list(self.stepped)
+        for i, value in self.stepped.items():
+            rows[i] = self.x[i] - ca.substitute(value, self.x[stepped], ca.SX.zeros(len(stepped)))
+        return rows
+
     @property
     def ambient_symbol(self) -> ca.SX:
         """`ambient` as an argument of a function: its symbol, or where it is zero a symbol that nothing depends on."""

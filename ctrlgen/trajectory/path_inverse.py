@@ -131,6 +131,12 @@ class PathInverse:
         x, z, u = self._at_rest(target[None])
         return x[0], z[0], u[0]
 
+    def slope(self, target: np.ndarray) -> np.ndarray:
+        """(n_axes, channels) d displacement / d target at rest there."""
+        m, r = self.model, ca.SX.sym("target", len(target))
+        z = self.static.displacement(ca.DM(m.rest), ca.DM.zeros(m.z.numel()), r)
+        return ca.Function("slope", [r], [ca.jacobian(z, r)])(target).full()
+
     def _at_rest(self, command: np.ndarray) -> list[np.ndarray]:
         """x, z and u of the equilibria at each command."""
         return [v.full().T for v in self._equilibria.map(len(command))(command.T)]
