@@ -222,6 +222,16 @@ class Scenario:
         return n
 
 
+def online_targets(scenario: Scenario, model: Model) -> np.ndarray:
+    """(n, m) what the online controller is given to follow the scenario: the samples; with inertia position, then derivatives, at the
+    middle of each sample, during which the drive is held. Raises InputError."""
+    if not model.inertial:
+        return scenario.command(model)
+    samples = np.arange(len(scenario.command(model)))
+    motion = scenario.motion(model, samples + 0.5)
+    return np.hstack([motion.position, *motion.derivatives])
+
+
 def load_scenario(path: Path | str, device: Device | Path | str | None = None) -> Scenario:
     """The scenario in a folder (its scenario.toml) or in a TOML file, with its device. Raises InputError.
 
