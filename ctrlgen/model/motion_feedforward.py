@@ -23,17 +23,19 @@ from ctrlgen.model.model import Model, Signal
 @dataclass(frozen=True)
 class MotionController(Controller):
     """One device with inertia, one followed signal, one sample time. A target is (channels * (order + 1),): first the followed
-    signal, then its first derivative by time, and so on."""
+    signal, then its first derivative by time, and so on. Raises InputError for a device with states that a target does not determine,
+    such as memories of effects."""
+
+    def __post_init__(self) -> None:
+        if self.dynamics.internal:
+            kinds = ", ".join(sorted({e.kind for e in self.model.device.effect if e.states})) or "the device's own"
+            what = f"has states that the motion does not determine ({kinds}): C cannot compute its drive online; solve the path instead"
+            raise InputError(self.model.name, [Fault("device", what)])
 
     @cached_property
     def dynamics(self) -> InverseDynamics:
-        """The inverse dynamics. Raises InputError for effects with memories, which a target does not determine."""
-        found = inverse_dynamics(self.nominal, self.follow)
-        if found.internal:
-            kinds = ", ".join(sorted({e.kind for e in self.model.device.effect if e.states})) or "a state of its own"
-            what = f"has memories that a target does not determine ({kinds}): no online controller is generated; solve the path instead"
-            raise InputError(self.model.name, [Fault("effect", what)])
-        return found
+        """The inverse dynamics."""
+        return inverse_dynamics(self.nominal, self.follow)
 
     @cached_property
     def moving(self) -> None:

@@ -30,10 +30,13 @@ NEARER = 2  # further solutions with internal states, each kept near the one bef
 
 
 class InertialInverse:
-    """The inverse of a model with inertia along motions of its signal `follow`, one sample every `sample_time` [s]."""
+    """The inverse of a model with inertia along motions of its signal `follow`, one sample every `sample_time` [s].
 
-    def __init__(self, model: Model, follow: str, sample_time: float) -> None:
-        self.model, self.follow, self.sample_time = model, follow, sample_time
+    `approximate`: in continuous time only, with internal states at rest, for searches.
+    """
+
+    def __init__(self, model: Model, follow: str, sample_time: float, approximate: bool = False) -> None:
+        self.model, self.follow, self.sample_time, self.approximate = model, follow, sample_time, approximate
         self.dynamics: InverseDynamics = inverse_dynamics(model, follow)
 
     @property
@@ -43,8 +46,8 @@ class InertialInverse:
 
     @cached_property
     def without_memories(self) -> InertialInverse:
-        """The same of the device without the effects that have memories."""
-        return self._without(lambda effect: bool(effect.states)) if self.remembers else self
+        """The same of the device without the effects that have memories, approximate."""
+        return self._without(lambda effect: bool(effect.states), approximate=True) if self.remembers else self
 
     @cached_property
     def _sampled(self) -> SampledInverse:
@@ -117,8 +120,8 @@ class InertialInverse:
         return [v.full().T for v in self.dynamics.kernel.map(len(command))(samples)]
 
     def _exact(self, u: np.ndarray) -> bool:
-        """Whether the drives in continuous time are all that the motion takes."""
-        return not self.remembers and bool(np.all(np.isfinite(u)))
+        """Whether the drives in continuous time are all that the motion takes, or all that is asked for."""
+        return (self.approximate or not self.remembers) and bool(np.all(np.isfinite(u)))
 
     def _begin(self, command: Motion) -> list[np.ndarray]:
         """The same; where an effect has no inverse in closed form, of the device without effects, their states at rest."""
@@ -131,11 +134,11 @@ class InertialInverse:
         memories = np.tile(m.rest[own : m.x.numel() - n_v], (len(command), 1))
         return [np.hstack([x[:, :own], memories, x[:, own:]]), z, u]
 
-    def _without(self, left_out: Callable[[Effect], bool]) -> InertialInverse:
+    def _without(self, left_out: Callable[[Effect], bool], approximate: bool = False) -> InertialInverse:
         device = self.model.device
         kept = tuple(e for e in device.effect if not left_out(e))
         plain = build_model(device.model_copy(update={"effect": kept}), sample_time=self.sample_time)
-        return InertialInverse(plain, self.follow, self.sample_time)
+        return InertialInverse(plain, self.follow, self.sample_time, approximate)
 
     @cached_property
     def _equilibrium(self) -> ca.Function:
