@@ -16,7 +16,9 @@ from scipy.integrate import solve_ivp
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
+from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
+from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.model.simulation import simulate
 
 MASS, DAMPING, STIFFNESS, CUBIC, FORCE, LAG = 0.5, 30.0, 2e5, 1e13, 10.0, 1e-3
@@ -307,3 +309,57 @@ def test_check_says_whether_the_path_can_be_followed(tmp_path):
     scenario(tmp_path, str(AXIS_FILE), LINE, duration="2 ms")
     done = run("check", tmp_path)
     assert done.returncode != 0 and "times slower" in done.stdout + done.stderr
+
+
+TOO_FAST = {  # path of the two axes, what is said
+    "circle": (PATHS["circle"].replace("turns = 4", "turns = 80"), "the path is too fast"),
+    "circle from rest": (PATHS["circle from rest"] + "\nturns = 50", "the path is too fast"),
+    "circle too large": (PATHS["circle"].replace("60 um", "5 mm"), "its stroke ends there"),
+    "circle off the range": (PATHS["circle"] + '\ncentre = { x = "90 um" }', "its stroke ends there"),
+    "raster": (PATHS["raster"].replace("lines = 3", "lines = 60"), "the path is too fast"),
+    "spiral": (PATHS["spiral"].replace("turns = 3", "turns = 60"), "the path is too fast"),
+    "spiral too large": (PATHS["spiral"].replace("40 um", "600 um"), "its stroke ends there"),
+    "lissajous": (PATHS["lissajous"].replace("[3, 2]", "[90, 70]"), "the path is too fast"),
+}
+
+
+@pytest.mark.parametrize("name", TOO_FAST)
+def test_every_path_that_cannot_be_followed_is_explained_with_one_that_can(tmp_path, name):
+    path, says = TOO_FAST[name]
+    with pytest.raises(Unreachable, match="the path can be followed") as caught:
+        solved(tmp_path, stage(), path, duration="0.2 s")
+    assert says in str(caught.value) and caught.value.infeasibility.alternatives
+
+
+# C
+
+
+def test_the_online_drive_is_that_of_the_equations_and_limits_are_kept():
+    device = coil(state={"current": ("-1.5 V", "1.5 V")})
+    controller = controller_of(build_model(device), "pose", 1e-3)
+    rest = controller.rest()
+    d, v, a, jerk = 20e-6, 1e-3, 0.5, 30.0
+    force = MASS * a + DAMPING * v + STIFFNESS * d + CUBIC * d**3
+    slope = MASS * jerk + DAMPING * a + STIFFNESS * v + 3 * CUBIC * d**2 * v
+    plain = controller.step(rest, np.array([d, v, a, jerk]))
+    assert plain.status == 0 and plain.drive == pytest.approx([(force + LAG * slope) / FORCE], rel=1e-12)
+    quick = controller.step(rest, np.array([0, 0, 0, 1e6]))  # 0.5 kg 1e6 m/s^3 1 ms / 10 N/V = 50 V
+    assert quick.status == ControllerStatus.DRIVE and quick.drive == pytest.approx([4.0])
+    heavy = controller.step(rest, np.array([d, 0, 40.0, 0]))  # 20 N would take 2.4 V of the current's 1.5 V
+    still = controller.step(rest, np.array([d, 0, 0, 0]), settle=True)
+    assert heavy.status == ControllerStatus.STATE and heavy.drive == pytest.approx(still.drive)
+    far = controller.step(rest, np.array([150e-6, 1e-3, 0, 0]))
+    assert ControllerStatus.DISPLACEMENT in far.status and np.abs(far.drive) <= 4.0
+    assert controller.step(rest, np.array([d, np.nan, 0, 0])).status == ControllerStatus.INPUT
+
+
+def test_the_c_computes_what_the_model_does(tmp_path, compiler):
+    device = coil(state={"current": ("-1.5 V", "1.5 V")}, limits={"flexure_force": (lambda d, p: p.k * d.axis, "15 N")})
+    outcome = ctrlgen.run(scenario(tmp_path, device, LINE), tmp_path / "out")
+    assert outcome.comparison.rows and not [row for row in outcome.comparison.rows if not row.passed]
+
+
+def test_a_device_with_memories_gets_no_c_and_the_law_is_named(tmp_path):
+    it = scenario(tmp_path, with_effect(tmp_path, "creep", EFFECTS["creep"]), LINE)
+    with pytest.raises(InputError, match=r"creep.*cannot compute its drive online"):
+        ctrlgen.generate(it, build_model(it.device), tmp_path / "c")

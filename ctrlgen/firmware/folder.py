@@ -26,7 +26,7 @@ from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.vectors import played_vectors, vectors
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import controller_of
-from ctrlgen.trajectory.scenario import Scenario, online_targets
+from ctrlgen.trajectory.scenario import Scenario, motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 PIECES = ("online", "player", "selftest", "vectors")
@@ -69,7 +69,8 @@ def generate(
     """
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     played = solution if scenario.sample_time else None
-    targets = online_targets(scenario, model)
+    command = scenario.command(model) if solution is None else solution.command
+    targets = motion_targets(scenario, model) if model.inertial else command
     names = {piece: {real: f"{scenario.name}_{piece}_{real.suffix}" for real in Real} for piece in PIECES}
     compression = compress(played) if played else {}
     contexts, written = {}, []
@@ -77,7 +78,7 @@ def generate(
         of: dict[str, Any] = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
         online = online_context(scenario, controller, real, of["online"])
         samples = {} if played is None else player_context(played, compression[real], of["player"])
-        reference = vectors(controller, targets, real) | played_vectors(compression.get(real), len(targets))
+        reference = vectors(controller, targets, real) | played_vectors(compression.get(real), len(command))
         contexts[real] = samples | online | of | reference | {"solved": solution is not None}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:

@@ -123,7 +123,7 @@ class SampledInverse:
             previous = size
         raise SolverError(
             f"no drive held from sample to sample was found: Newton's method still changes it by {previous:.1g} of its size after "
-            f"{MOST_STEPS} steps{_blamed(self.model)}; raise sample_rate, or leave out effects whose force jumps"
+            f"{MOST_STEPS} steps{_blamed(self.model)}; raise sample_rate, make the path slower, or leave out effects whose force jumps"
         )
 
 

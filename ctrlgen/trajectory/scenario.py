@@ -222,11 +222,9 @@ class Scenario:
         return n
 
 
-def online_targets(scenario: Scenario, model: Model) -> np.ndarray:
-    """(n, m) what the online controller is given to follow the scenario: the samples; with inertia position, then derivatives, at the
-    middle of each sample, during which the drive is held. Raises InputError."""
-    if not model.inertial:
-        return scenario.command(model)
+def motion_targets(scenario: Scenario, model: Model) -> np.ndarray:
+    """(n, channels * (order + 1)) what the online controller of a device with inertia is given to follow the scenario: position, then
+    derivatives, at the middle of the time for which each drive is held. Raises InputError."""
     samples = np.arange(len(scenario.command(model)))
     motion = scenario.motion(model, samples + 0.5)
     return np.hstack([motion.position, *motion.derivatives])

@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.model.simulation import simulate, trace
-from ctrlgen.trajectory.scenario import online_targets
+from ctrlgen.trajectory.scenario import motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
@@ -31,7 +31,7 @@ class ReferenceAnswers:
         self.start = (solution.trace.x[0], solution.trace.z[0])
         last = solution.command[:1] if self.scenario.closed else solution.command[-1:]
         self.path = np.vstack([solution.command, last])
-        self.command = online_targets(self.scenario, self.model) if self.model.inertial else self.path[1:]
+        self.command = motion_targets(self.scenario, self.model) if self.model.inertial else self.path[1:]
         self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets()
         self.chased = self._answers(self.hostile, self.controller.rest())
