@@ -260,6 +260,44 @@ def test_laws_of_the_device_file_are_in_the_drive(tmp_path, kind):
     assert np.abs(reached[:-1] - solution.command).max() < GOAL * TRAVEL
 
 
+def two_masses(pose):
+    """A driven mass of 0.5 kg that carries one of 0.1 kg on a spring, a mode at 350 Hz; what is followed is `pose`."""
+    return ctrlgen.user_device(
+        "two_masses",
+        parameters={
+            "m": "0.5 kg", "n": "0.1 kg", "c": "30 N*s/m", "e": "2 N*s/m", "k": "0.2 N/um", "q": "0.4 N/um", "f": "10 N/V",
+        },
+        axes={"base": "200 um", "tip": "200 um"}, drive={"coil": "4 V"}, reading={"axis": "100 um"}, pose=pose,
+        force=lambda u, p: [p.f * u.coil, 0],
+        restoring_force=lambda d, p: [p.k * d.base + p.q * (d.base - d.tip), p.q * (d.tip - d.base)],
+        damping_force=lambda v, p: [p.c * v.base + p.e * (v.base - v.tip), p.e * (v.tip - v.base)],
+        mass=lambda p: [p.m, p.n],
+    )  # fmt: skip
+
+
+MODES = {  # pose, relative degree, share of the travel that may be missed
+    # zero at -q/e: inside the unit circle once sampled, forgotten at once
+    "tip": (lambda d, p: d.tip, 3, GOAL),
+    # zeros of the tip held by its spring: its vibration outlasts the path, and is weighed against the path's last samples
+    "base": (lambda d, p: d.base, 2, 1e-6),
+    # zeros -n s^2 + e s + q = 0, one of them at +2000/s: what the drive would have to do before the start is missing
+    "non-minimum phase": (lambda d, p: 2 * d.tip - d.base, 2, 1e-5),
+}
+
+
+@pytest.mark.parametrize("name", MODES)
+def test_a_stage_with_a_flexible_mode_follows_and_comes_to_rest(tmp_path, name):
+    pose, degree, missed = MODES[name]
+    device = two_masses(pose)
+    assert relative_degrees(build_model(device), "pose") == (degree,)
+    solution = solved(tmp_path, device, LINE, rate="10 kHz", duration="50 ms")
+    drives = np.vstack([solution.drive, np.tile(solution.drive[-1:], (500, 1))])
+    start = solution.trace.x[0], solution.trace.z[0]
+    reached = simulate(solution.model, drives, solution.scenario.sample_time, *start).signals["pose"][:, 0]
+    path = np.append(solution.command[:, 0], np.full(501, solution.command[-1, 0]))
+    assert np.abs(reached - path).max() < missed * TRAVEL
+
+
 def test_dry_friction_is_overcome_by_the_drive(tmp_path):
     plain = solved(tmp_path, str(AXIS_FILE), LINE)
     rubbing = solved(tmp_path, with_effect(tmp_path, "coulomb", EFFECTS["coulomb"]), LINE)

@@ -9,7 +9,7 @@ for channel i after rho_i times, its relative degree: 2 for a force on the mass,
     h_i,k(y) = r_i^(k),  k = 0 ... rho_i - 1,      h_i,rho_i(y, u) = r_i^(rho_i)
 
 are solved for states and drive by `ctrlgen.model.inverse.solve_by_blocks`. States that no such equation determines (memories
-of effects, an integrator of a feedback loop) are internal: here they stay at rest, and `ctrlgen.trajectory.sampled_inverse`
+of effects, flexible modes, an integrator of a feedback loop) are internal: here they stay at rest, and `ctrlgen.trajectory.sampled_inverse`
 finds them. Source: A. Isidori, Nonlinear Control Systems, 3rd ed. (1995), section 5.1.
 """
 
@@ -31,7 +31,7 @@ NONE = ca.SX(0, 1)  # a vector without components
 class InverseDynamics:
     """`kernel` (channels, order + 1), the target and its derivatives by time [SI], -> x (n_x,), z (n_axes,), u (n_u,).
 
-    `degrees`: the relative degree of each channel; `order` the largest. `internal`: places in x of the states that the target
+    `degrees`: the relative degree of each channel; `order` the largest. `internal`: places in (x, z) of the states that the target
     does not determine; the kernel leaves them at rest.
     """
 
@@ -71,8 +71,9 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
         raise InputError(model.name, [Fault("drive", f"{what}; follow the displacement, or fewer channels")])
     unknowns = candidates[chosen]
     found = {symbol.element_hash() for symbol in ca.vertsplit(unknowns)}
-    internal = tuple(i for i in range(x.numel()) if x[i].element_hash() not in found)
-    held, at_rest = (ca.vertcat(NONE, *(v[i] for i in internal)) for v in (x, ca.SX(ca.DM(model.rest))))
+    y, rest = ca.vertcat(x, z), ca.SX(ca.DM(np.concatenate([model.rest, np.zeros(z.numel())])))
+    internal = tuple(i for i in range(y.numel()) if y[i].element_hash() not in found)
+    held, at_rest = (ca.vertcat(NONE, *(v[i] for i in internal)) for v in (y, rest))
     equations = ca.substitute(equations, held, at_rest)
     if ca.sprank(ca.jacobian(equations, unknowns).sparsity()) < equations.numel():
         kinds = ", ".join(sorted({e.kind for e in model.device.effect if e.states}))
@@ -83,8 +84,7 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
         (ca.vec(target), np.zeros(target.numel()), np.zeros(target.numel())),
     )  # fmt: skip
     solution = solve_by_blocks(known, equations, unknowns)
-    result = [ca.substitute(e, unknowns, solution) for e in (x, z, u)]
-    result[0] = ca.substitute(result[0], held, at_rest)
+    result = [ca.substitute(ca.substitute(e, unknowns, solution), held, at_rest) for e in (x, z, u)]
     kernel = ca.Function("inverse_dynamics", [target], result, ["target"], ["x", "z", "u"], {"cse": True})
     return InverseDynamics(kernel, degrees, internal)
 

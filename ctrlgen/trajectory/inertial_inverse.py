@@ -69,17 +69,25 @@ class InertialInverse:
         """The drives that lead along the samples of `command` while each is held. Raises SolverError where none are found."""
         x, z, u = self._begin(command)
         exact = self._exact(self._continuous(command)[2])
-        following = np.roll(u, -1, axis=0) if closed else np.vstack([u[1:], u[-1:]])
         begin = np.hstack([x, z])
         if not exact and not closed:
             begin[0] = np.concatenate(self.at_rest(command.position[0])[:2])
-        if self.remembers:
-            begin = self._sampled.remembered(begin, u, self.dynamics.internal, LAPS if closed else 1)
-        found = self._sampled.solve(command.position, begin, (u + following) / 2, closed, exact)
+            held = self.at_rest(command.position[-1])[2]
+            u[-1] = np.where(np.isfinite(held), held, u[-1])
+        if self._memories:
+            begin = self._sampled.remembered(begin, u, self._memories, LAPS if closed else 1)
+        following = np.roll(u, -1, axis=0) if closed else np.vstack([u[1:], u[-1:]])
+        settles = not self._memories  # else what holds the end still changes
+        found = self._sampled.solve(command.position, begin, (u + following) / 2, closed, settles)
         for _ in range(0 if exact else NEARER):
-            begin = np.hstack([found.x, found.z])
-            found = self._sampled.solve(command.position, begin, found.u, closed, False)
+            found = self._sampled.solve(command.position, np.hstack([found.x, found.z]), found.u, closed, settles)
         return found
+
+    @property
+    def _memories(self) -> tuple[int, ...]:
+        """The internal states of effects; the others are of the mechanics, the actuators or a loop."""
+        m = self.model
+        return tuple(i for i in self.dynamics.internal if m.n_states <= i < m.x.numel() - m.v.numel())
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x (n_x,), z (n_axes,) and u (n_u,) of the equilibrium at `target` (channels,); not finite where there is none."""

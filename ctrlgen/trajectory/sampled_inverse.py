@@ -32,8 +32,8 @@ DRIVE_WEIGHT = (
 )
 MOST_STEPS = 30  # of Newton's method; smooth forces take three to six
 CONVERGED = 1e-13  # typical sizes of a step: rounding
-STALLED = 1e-9  # typical sizes: a step that grows again below it is rounding
-HELD_AFTER = 16  # samples at rest after the end of an open path that count like those of the path: vibration left there is an error
+STALLED = 1e-7  # typical sizes: a step that grows again below it is rounding
+HELD_AFTER = 16  # samples at rest after an open path, and no less than a quarter of it, count like its own: vibration there is an error
 HALVINGS = 10  # of a step that does not come nearer
 
 
@@ -95,25 +95,25 @@ class SampledInverse:
     ) -> SampledTrajectory:
         """The drives that lead along `path` (n, channels) [SI], begun at the states and displacements `begin` (n, n_x + n_axes), near
         the `drives` (n, n_u). An open path starts at begin[0]; where `end_given`, its last drive stays what it is, that which holds the
-        end. Raises SolverError where Newton's method does not converge, as with forces that jump."""
+        end, and the device is to stay there. Raises SolverError where Newton's method does not converge, as with forces that jump."""
         y, u, target = begin / self.y_scale, drives / self.u_scale, path / self.output_scale
-        near = u.copy()
-        n, held = len(u), HELD_AFTER if end_given and not closed else 0
+        n = len(u)
+        held = max(HELD_AFTER, n // 4) if end_given and not closed else 0
         after = 0 if closed else 1 + held  # samples that the last drive leads to
         y, target = np.vstack([y, *[y[-1:]] * after]), np.vstack([target, *[target[-1:]] * after])
-        u, near = (np.vstack([v, *[v[-1:]] * held]) for v in (u, near))
+        u = np.vstack([u, *[u[-1:]] * held])
         given = _given(y, u, closed, 1 + held if end_given else 0)
+        problem = _Problem(*self._functions, target, u, closed)
         previous = np.inf
         for iteration in range(1, MOST_STEPS + 1):
-            system = _Linearised(*self._functions, y, u, target, near, closed)
+            system = _Linearised(problem, y, u)
             dy, du = system.step(given)
             size = max(np.abs(dy).max(), np.abs(du).max())
             if not np.isfinite(size):
                 break
             share = 1.0
             while size > STALLED and share > 2.0**-HALVINGS:
-                tried = _Linearised(*self._functions, y + share * dy, u + share * du, target, near, closed)
-                if tried.merit < system.merit:
+                if _Linearised(problem, y + share * dy, u + share * du).merit < system.merit:
                     break
                 share /= 2
             y, u = y + share * dy, u + share * du
@@ -127,18 +127,28 @@ class SampledInverse:
         )
 
 
-class _Linearised:
-    """The problem at one trajectory y (n or n + 1, n_y), u (n, n_u): its residuals and slopes, scaled."""
+@dataclass(frozen=True)
+class _Problem:
+    """What is solved, scaled: the functions of one sample, the `target` (n or n + 1, channels), the drives (n, n_u) to stay `near`."""
 
-    def __init__(
-        self, step: ca.Function, output: ca.Function, y: np.ndarray, u: np.ndarray, target: np.ndarray, near: np.ndarray, closed: bool,
-    ) -> None:  # fmt: skip
+    step: ca.Function
+    output: ca.Function
+    target: np.ndarray
+    near: np.ndarray
+    closed: bool
+
+
+class _Linearised:
+    """The problem at one trajectory y (n or n + 1, n_y), u (n, n_u): its residuals and slopes."""
+
+    def __init__(self, problem: _Problem, y: np.ndarray, u: np.ndarray) -> None:
+        step, output, closed = problem.step, problem.output, problem.closed
         n, self.n_y, self.n_u = len(u), y.shape[1], u.shape[1]
         after, A, B = step.map(n)(y[:n].T, u.T)
         h, C = output.map(len(y))(y.T)
         following = np.roll(y, -1, axis=0) if closed else y[1:]
         self.defect = after.full().T - following
-        self.error, self.off = h.full().T - target, DRIVE_WEIGHT * (u - near)
+        self.error, self.off = h.full().T - problem.target, DRIVE_WEIGHT * (u - problem.near)
         A, B, C = (_blocks(step, 1, A, n), _blocks(step, 2, B, n), _blocks(output, 1, C, len(y)))
         shift = sp.eye(n, len(y), k=1, format="lil")
         if closed:
