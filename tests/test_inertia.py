@@ -306,8 +306,11 @@ def test_dry_friction_is_overcome_by_the_drive(tmp_path):
 
 
 def test_a_law_without_an_inverse_is_named(tmp_path):
-    with pytest.raises((InputError, SolverError), match="backlash"):
+    with pytest.raises(SolverError, match=r"no drive held .*the device has backlash"):
         solved(tmp_path, with_effect(tmp_path, "backlash", 'gap = "1 um"'), LINE)
+    device = ctrlgen.load_device(tmp_path / "device.toml")
+    with pytest.raises(InputError, match=r"effect: .*backlash.* there is no inverse"):
+        inverse_dynamics(build_model(device, sample_time=2e-4), "pose")
 
 
 # Limits

@@ -26,7 +26,6 @@ from ctrlgen.trajectory.violations import violations
 
 MOST_EQUILIBRIUM_STEPS = 50  # of Newton's method, from the device without effects
 LAPS = 3  # of a closed path, after which memories are near enough to where they repeat to begin there
-NEARER = 2  # further solutions with internal states, each kept near the one before instead of near a drive that knew none of them
 
 
 class InertialInverse:
@@ -78,10 +77,7 @@ class InertialInverse:
             begin = self._sampled.remembered(begin, u, self._memories, LAPS if closed else 1)
         following = np.roll(u, -1, axis=0) if closed else np.vstack([u[1:], u[-1:]])
         settles = not self._memories  # else what holds the end still changes
-        found = self._sampled.solve(command.position, begin, (u + following) / 2, closed, settles)
-        for _ in range(0 if exact else NEARER):
-            found = self._sampled.solve(command.position, np.hstack([found.x, found.z]), found.u, closed, settles)
-        return found
+        return self._sampled.solve(command.position, begin, (u + following) / 2, closed, settles)
 
     @property
     def _memories(self) -> tuple[int, ...]:

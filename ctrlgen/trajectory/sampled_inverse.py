@@ -27,9 +27,7 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.model.discretisation import one_step_map
 from ctrlgen.model.model import Model
 
-DRIVE_WEIGHT = (
-    1e-6  # w: a drive that moves the stage by less than a millionth of what the full drive does is left as it is
-)
+DRIVE_WEIGHT = 1e-6  # w: below a millionth of what the full drive moves, a drive is left as it is
 MOST_STEPS = 30  # of Newton's method; smooth forces take three to six
 CONVERGED = 1e-13  # typical sizes of a step: rounding
 STALLED = 1e-7  # typical sizes: a step that grows again below it is rounding

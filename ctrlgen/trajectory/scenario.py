@@ -26,9 +26,7 @@ from ctrlgen.trajectory.paths import PathKind, Poses
 FILE = "scenario.toml"
 MOST_SAMPLES = 1_000_000  # of one path: what memory holds
 WHOLE = 1e-6  # of the number of samples, by which rate times duration may be off a whole one: durations are written with six digits
-SMOOTHER = (
-    1  # derivatives more than the drive follows: it then starts without a bend too, and a held drive comes nearer to it
-)
+SMOOTHER = 1  # derivatives more than the drive follows: it then starts without a bend too
 RESOLVED = 0.5  # of the largest value of a derivative, by which it may change from one listed sample to the next
 
 
