@@ -6,6 +6,7 @@ m a + c v + k d + k3 d^3 = f i,  tau i' = u - i.
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from command_line import ctrlgen as run
@@ -404,3 +405,18 @@ def test_a_device_with_memories_gets_no_c_and_the_law_is_named(tmp_path):
     it = scenario(tmp_path, with_effect(tmp_path, "creep", EFFECTS["creep"]), LINE)
     with pytest.raises(InputError, match=r"creep.*cannot compute its drive online"):
         ctrlgen.generate(it, build_model(it.device), tmp_path / "c")
+
+
+def test_a_pendulum_is_led_to_45_degrees_and_its_c_agrees(tmp_path, compiler):
+    pendulum = ctrlgen.user_device(
+        "pendulum",
+        parameters={"inertia": "2 kg*cm^2", "weight": "20 mN*m", "damping": "4e-4 N*m*s", "motor": "15 mN*m/V"},
+        drive={"motor": "2 V"}, axes={"swing": "60 deg"}, mass=lambda p: p.inertia,
+        force=lambda u, p: p.motor * u.motor,
+        restoring_force=lambda d, p: p.weight * ca.sin(d.swing),
+        damping_force=lambda v, p: p.damping * v.swing,
+    )  # fmt: skip
+    path = 'kind = "line"\nend = { swing = "45 deg" }'
+    outcome = ctrlgen.run(scenario(tmp_path, pendulum, path, rate="1 kHz", duration="0.5 s"), tmp_path / "out")
+    assert outcome.passed
+    assert outcome.solution.drive[-1] == pytest.approx([20e-3 * np.sin(np.pi / 4) / 15e-3], rel=1e-9)

@@ -171,6 +171,12 @@ def _rows(
         if channels and plain.size:
             at_rest = _equilibria(ref, settled[plain])
             span = slice(channels[0], channels[-1] + 1)
+            if (
+                unit == "rad" and real is Real.FLOAT
+            ):  # an axis that turns by degrees has more to round than a platform's tilt
+                limit = max(
+                    limit, ROUNDINGS * float(np.finfo(np.float32).eps) * np.abs(ref.positions[plain][:, span]).max()
+                )
             add(
                 "random targets, online C -> model - target",
                 ref.scenario.file.follow,
@@ -246,7 +252,10 @@ def _equilibria(ref: ReferenceAnswers, answers: np.ndarray) -> np.ndarray:
     states, places = ca.vertsplit(w, [0, len(m.rest), len(scale)])
     at = ca.substitute([scaled], [x, z], [states * m.x_scale + m.rest, places * m.z_scale])[0]
     newton = newton_solver("rest", at, w, u, step_below=1e-12, most_steps=60)
-    roots = newton.map(len(drives))(np.ones((len(scale), len(drives))), drives.T).full().T
+    start = np.ones((len(drives), len(scale)))
+    if m.inertial:  # several displacements may balance one force, as of a pendulum: the one meant
+        start[:, len(m.rest) :] = answers[:, 1 + n : 1 + 2 * n] / m.z_scale
+    roots = newton.map(len(drives))(start.T, drives.T).full().T
     states, displacements = roots[:, : len(m.rest)] * m.x_scale + m.rest, roots[:, len(m.rest) :] * m.z_scale
     return trace(m, np.zeros(len(drives)), states, displacements, drives).signals[ref.scenario.file.follow]
 
