@@ -351,6 +351,8 @@ def test_check_says_whether_the_path_can_be_followed(tmp_path):
     scenario(tmp_path, str(AXIS_FILE), LINE, duration="2 ms")
     done = run("check", tmp_path)
     assert done.returncode != 0 and "times slower" in done.stdout + done.stderr
+    scenario(tmp_path, with_effect(tmp_path, "backlash", 'gap = "1 um"'), LINE)
+    assert "no drive was found" in run("check", tmp_path).stdout
 
 
 TOO_FAST = {  # path of the two axes, what is said

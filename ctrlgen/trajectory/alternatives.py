@@ -31,15 +31,7 @@ INSIDE = 1e-4  # of an axis' range that a shifted path stays inside of it: round
 
 @dataclass(frozen=True)
 class Alternative:
-    """A path that can be followed: `what` it is compared with the commanded one, and its samples (n, channels) [SI]."""
-
-    what: str
-    command: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Found:
-    """One that a search found, before all samples confirm it."""
+    """A path that can be followed: `what` it is compared with the commanded one, and its `command`."""
 
     what: str
     command: Command
@@ -100,9 +92,9 @@ class Alternatives:
         """Those that exist of a slower, a shifted and a smaller one; where none does, one that is smaller and shifted."""
         alone = [a for a in map(self._searched, (self._slower, self._shifted, self._smaller)) if a]
         both = None if alone else self._searched(self._smaller_and_shifted)
-        return tuple(Alternative(a.what, samples_of(a.command)) for a in (*alone, *([both] if both else [])))
+        return (*alone, *([both] if both else []))
 
-    def _searched(self, search: Callable[[], _Found | None]) -> _Found | None:
+    def _searched(self, search: Callable[[], Alternative | None]) -> Alternative | None:
         """What a search finds in a few places and all samples confirm; looking at all of them, and with a margin for memories, where
         they do not."""
         for self.everywhere, self.margin in ((False, 0.0), (True, 0.0), *((False, share) for share in MARGINS)):
@@ -118,7 +110,7 @@ class Alternatives:
         chosen = np.unique(np.minimum((self.places * n).round().astype(int), n - 1))
         return self.inverse.keeps_limits(command, self.closed, None if self.everywhere else chosen, self.margin)
 
-    def _slower(self) -> _Found | None:
+    def _slower(self) -> Alternative | None:
         if self.slowed is None:
             return None
         slowed = self.slowed
@@ -129,7 +121,7 @@ class Alternatives:
         factor = np.ceil(100 * _least(lambda f: self._follows(slowed(f)), enough / 2, enough)) / 100
         command = slowed(float(factor))
         duration = show(len(command) * (self.inverse.sample_time or 0.0), "s")
-        return _Found(f'{factor:g} times slower (duration = "{duration}")', command)
+        return Alternative(f'{factor:g} times slower (duration = "{duration}")', command)
 
     def _middle(self) -> np.ndarray:
         samples = samples_of(self.command)
@@ -142,17 +134,17 @@ class Alternatives:
     def _has_extent(self) -> bool:
         return bool(np.ptp(samples_of(self.command), axis=0).max() > 0)
 
-    def _smaller(self) -> _Found | None:
+    def _smaller(self) -> Alternative | None:
         if not self._has_extent or not self._follows(self._scaled(SMALLEST_SCALE)):
             return None
         share = _largest_share(lambda s: self._follows(self._scaled(s)))
-        return _Found(_scaled_to(share), self._scaled(share))
+        return Alternative(_scaled_to(share), self._scaled(share))
 
-    def _shifted(self) -> _Found | None:
+    def _shifted(self) -> Alternative | None:
         shift, _ = self._shift(self.command)
-        return None if shift is None else _Found(self._shifted_by(shift), self.command + shift)
+        return None if shift is None else Alternative(self._shifted_by(shift), self.command + shift)
 
-    def _smaller_and_shifted(self) -> _Found | None:
+    def _smaller_and_shifted(self) -> Alternative | None:
         """The largest path about its own middle that follows once it is shifted the way in which the smallest one does."""
         if not self._has_extent:
             return None
@@ -163,7 +155,7 @@ class Alternatives:
         shift, _ = self._shift(self._scaled(share), way)
         if shift is None:
             return None
-        return _Found(f"{_scaled_to(share)} and {self._shifted_by(shift)}", self._scaled(share) + shift)
+        return Alternative(f"{_scaled_to(share)} and {self._shifted_by(shift)}", self._scaled(share) + shift)
 
     def _shift(self, command: Command, way: np.ndarray | None = None) -> tuple[np.ndarray | None, np.ndarray | None]:
         """The least shift of `command` (channels,) and its direction: along `way` where that is given, else along one channel; where

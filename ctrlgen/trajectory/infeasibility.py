@@ -66,7 +66,7 @@ def unreachable(
             "  no shifted, smaller or slower path was found that can be followed; command smaller motions near home"
         )
     return Unreachable(
-        "\n".join(lines), Infeasibility(samples, worst, wanted, nearest, {a.what: a.command for a in found})
+        "\n".join(lines), Infeasibility(samples, worst, wanted, nearest, {a.what: samples_of(a.command) for a in found})
     )
 
 

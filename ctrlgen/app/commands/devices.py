@@ -79,6 +79,8 @@ def check(
         unsettled = (
             "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
         )
+        if model.inertial:
+            unsettled = "no drive was found in the first place: solve it to know why"
         out.print(
             "the path can be followed within every limit" if needed.exact else unsettled, markup=False, soft_wrap=True
         )
