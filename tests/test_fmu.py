@@ -417,16 +417,20 @@ integral_gain = "1e4 V/(m*s)"
 @pytest.mark.parametrize(
     "more", ["", HYSTERETIC, STICKING, CONTROLLED], ids=["bare", "hysteresis", "dry friction", "in closed loop"]
 )
-def test_a_plant_with_inertia_moves_as_the_model_and_has_no_controller(more, compiler, tmp_path, rng):
+def test_a_plant_with_inertia_moves_as_the_model_and_has_a_controller_where_its_motion_says_all(
+    more, compiler, tmp_path, rng
+):
     (tmp_path / "axis").mkdir()
     scenario = axis_scenario(tmp_path / "axis", more)
     made = write_fmus(scenario, tmp_path / "out")
-    assert [path.name for path in made.paths] == ["axis_plant.fmu"] and "inertia" in made.remark
-    assert validate_fmu(str(made.paths[0])) == []
+    controller = [] if more else ["axis_controller.fmu"]
+    assert [path.name for path in made.paths] == [*controller, "axis_plant.fmu"]
+    assert ("no controller" in made.remark) == bool(more)
+    assert all(validate_fmu(str(path)) == [] for path in made.paths)
     model = build_model(scenario.device)
     drives = 0.3 * rng.normal(size=(200, 1)) * model.u_scale
     expected = simulate(model, drives, scenario.sample_time).signals["pose"]
-    with opened(made.paths[0], tmp_path / "unit") as unit:
+    with opened(made.paths[-1], tmp_path / "unit") as unit:
         ours = run_plant(unit, drives, ["pose"])["pose"]
     assert np.ptp(expected) > 1e-7 and apart(ours, expected) < 1e-12
 

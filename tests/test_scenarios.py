@@ -10,7 +10,7 @@ import pytest
 from conftest import SCENARIOS
 from result_files import faults
 
-from ctrlgen import InputError, Unreachable, build_model, load_scenario, run, solve
+from ctrlgen import InputError, Unreachable, load_scenario, run
 from ctrlgen.trajectory.metrics import expectations, metric
 
 ALL = sorted(path.parent.name for path in SCENARIOS.glob("*/scenario.toml"))
@@ -93,14 +93,3 @@ def test_an_expectation_that_is_missed_is_reported(circle):
     file = circle.scenario.file.model_copy(update={"expect": (bad,)})
     with pytest.raises(InputError, match="wrong unit"):
         expectations(replace(circle, scenario=replace(circle.scenario, file=file)))
-
-
-def test_a_path_for_a_stage_with_inertia_is_refused_before_anything_is_solved(tmp_path):
-    file = tmp_path / "line.toml"
-    file.write_text(
-        f'title = "line"\ndevice = "{SCENARIOS / "devices" / "flexure_axis.toml"}"\nsample_rate = "1 kHz"\nduration = "1 s"\n'
-        '[path]\nkind = "line"\nend = { axis = "20 um" }\n'
-    )
-    scenario = load_scenario(file)
-    with pytest.raises(InputError, match=r"has inertia.*not be led along a path"):
-        solve(scenario, build_model(scenario.device))

@@ -42,10 +42,17 @@ def print_solution(outcome: pipeline.Outcome) -> None:
     scenario = solution.scenario
     rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
     out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
+    solved = f"{solution.solver} {solution.iterations} iterations"
     out.print(
-        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, IPOPT {solution.iterations} iterations",
-        soft_wrap=True,
+        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, {solved}", soft_wrap=True
     )
+    if solution.between_samples is not None:
+        signal = solution.model.signals[scenario.file.follow]
+        error = np.abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)
+        for channel, unit, at, between in zip(
+            signal.channels, signal.units, error, solution.between_samples, strict=True
+        ):
+            out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
     table = table_of(
         ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
     )

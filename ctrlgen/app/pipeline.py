@@ -21,8 +21,8 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting import plots, report
 from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import Build
+from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.metrics import ExpectationResult, expectations
-from ctrlgen.trajectory.paths import Frame
 from ctrlgen.trajectory.scenario import Scenario, load_scenario
 from ctrlgen.trajectory.solution import Solution, solve
 from ctrlgen.trajectory.workspace import Ball, Workspace

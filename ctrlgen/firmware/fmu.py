@@ -28,7 +28,7 @@ from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.plant import Plant, plant_of, write_plant
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.firmware.toolchains import compile_c, find_compilers
-from ctrlgen.model.feedforward import Controller
+from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
@@ -100,8 +100,9 @@ class _Unit:
 def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
     """Writes `{scenario}_controller.fmu` and `{scenario}_plant.fmu` to the folder `out`, for FMI `fmi` (3 or 2).
 
-    With binaries for this computer where a C compiler is found, and the sources in any case. A device with inertia
-    gets no controller. Raises InputError for a scenario without a sample rate, ToolError where a compiler refuses.
+    With binaries for this computer where a C compiler is found, and the sources in any case. A device with inertia that has states
+    which its motion does not determine gets no controller. Raises InputError for a scenario without a sample rate, ToolError where a
+    compiler refuses.
     """
     if fmi not in VERSIONS:
         raise InputError("--fmi", [Fault(str(fmi), "is not a supported FMI version; use 3 or 2")])
@@ -115,12 +116,12 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
         compiler, remark = None, f"sources only, no binary: {error}"
     with whole_folder(Path(out)) as draft, tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         units = [_plant_unit(scenario, plant, Path(scratch))]
-        if plant.inertial:
-            remark = " ".join(
-                (remark, "no controller: the device has inertia, which the feedforward controller cannot invert")
-            )
-        else:
+        try:
             units.insert(0, _controller_unit(scenario, plant, Path(scratch)))
+        except InputError as error:
+            if not plant.inertial:
+                raise
+            remark = f"{remark} no controller: {'; '.join(fault.what for fault in error.faults)}"
         names = [_write_unit(scenario, plant, unit, fmi, Path(scratch), compiler, draft) for unit in units]
     binary = None if compiler is None else _platform(fmi)[0]
     return Fmus(tuple(Path(out) / name for name in names), binary, remark.strip())
@@ -128,12 +129,12 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
 
 def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
-    controller = Controller(plant.model, scenario.file.follow, plant.sample_time)
+    controller = controller_of(plant.model, scenario.file.follow, plant.sample_time)
     m, core = controller.nominal, f"{scenario.name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"{core}.{end}")
-    followed, drive, displacement = m.signals[scenario.file.follow], m.signals["drive"], m.signals["displacement"]
+    followed, drive, displacement = controller.target, m.signals["drive"], m.signals["displacement"]
     inputs = _variables("target", followed, "input", "discrete", 1, np.zeros(len(followed.channels)))
     low, high = m.u_bounds
     outputs = _variables("drive", drive, "output", "discrete", 1 + len(inputs), bounds=(low, high))

@@ -24,9 +24,9 @@ from ctrlgen.firmware.package import write_package
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.vectors import played_vectors, vectors
-from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.model import Model
-from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.model.motion_feedforward import controller_of
+from ctrlgen.trajectory.scenario import Scenario, motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 PIECES = ("online", "player", "selftest", "vectors")
@@ -67,9 +67,10 @@ def generate(
 
     `figures` (name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives) are put beside the README.
     """
-    controller = Controller(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     played = solution if scenario.sample_time else None
     command = scenario.command(model) if solution is None else solution.command
+    targets = motion_targets(scenario, model) if model.inertial else command
     names = {piece: {real: f"{scenario.name}_{piece}_{real.suffix}" for real in Real} for piece in PIECES}
     compression = compress(played) if played else {}
     contexts, written = {}, []
@@ -77,7 +78,7 @@ def generate(
         of: dict[str, Any] = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
         online = online_context(scenario, controller, real, of["online"])
         samples = {} if played is None else player_context(played, compression[real], of["player"])
-        reference = vectors(controller, command, real) | played_vectors(compression.get(real), len(command))
+        reference = vectors(controller, targets, real) | played_vectors(compression.get(real), len(command))
         contexts[real] = samples | online | of | reference | {"solved": solution is not None}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:
@@ -106,7 +107,7 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real,
         "n": len(model.axes),
         "nx": model.x.numel(),
         "n_s": model.n_states,
-        "m": len(model.signals[scenario.file.follow].channels),
+        "m": len(controller_of(model, scenario.file.follow, scenario.sample_time).target.channels),
         "rate": scenario.sample_time is not None,
     }
     write("harness.c", context, path)

@@ -12,10 +12,12 @@ from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
 from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
 FLOAT_SLACK = 4e-6  # as SLACK of the controller, in float: four roundings of a temperature, 0.4 mK
+UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none beside one that has; its square is still a float
 
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
@@ -25,7 +27,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     kernels: dict[str, Kernel] = {}  # by body, so that a function shared by settle and step is printed once
 
     (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
-    s_low, s_high = x_low[: model.n_states], x_high[: model.n_states]
+    s_low, s_high = np.maximum(x_low[: model.n_states], -UNLIMITED), np.minimum(x_high[: model.n_states], UNLIMITED)
     ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
     }  # fmt: skip
@@ -54,13 +56,16 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
                 {"x", "z"} & set(named[kernel].arguments) for kernel in ("state", "drive") if kernel in named
             )
             modes.append({"name": name, "z": z, "uses_state": uses_state, **named})
+    motion = {}
+    if isinstance(controller, MotionController):
+        motion = {name: printed(kernel, f"motion_{name}") for name, kernel in controller.motion.items()}
     balance = printed(controller.static.settle, "balance_displacement")
     ratio = printed(controller.composite_ratio, "composite_ratio") if controller.guarded_limits else None
     nearest = printed(controller.nearest, "nearest_displacement")
     bound = printed(controller.composite_bound, "composite_bound") if controller.composite_bound else None
     slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     z_slack, s_slack, u_slack = slack.slacks
-    drive, follow = model.signals["drive"], model.signals[scenario.file.follow]
+    drive, follow = model.signals["drive"], controller.target
     last = modes[-1]
     advance = [] if model.x.numel() == model.n_states else ["advance"]
     step_cost = sum(
@@ -76,6 +81,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         + (last["advance"].operations if "advance" in last and not advance else 0)
         + once_more * (SECANT_STEPS + 3)
     )
+    if motion:  # what breaks a limit is answered by settling
+        step_cost = sum(kernel.operations for kernel in motion.values())
+        worst_cost += step_cost
     called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
     (z_centre, z_half), (s_centre, s_half), (u_centre, u_half) = (
         _middles(low, high, real) for low, high in ((z_low, z_high), (s_low, s_high), (u_low, u_high))
@@ -90,7 +98,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
         "elementary": elementary_text(called, real), "bound": bound, "nearest": nearest,
-        "kernels": list(kernels.values()), "modes": modes, "ratio": ratio,
+        "kernels": list(kernels.values()), "modes": modes, "motion": motion, "ratio": ratio,
         "balance": balance, "secant_steps": SECANT_STEPS, "secant_fraction": SECANT_FRACTION,
         "composite_rounds": controller.composite_rounds,
         "ratio_uses_state": ratio is not None and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,

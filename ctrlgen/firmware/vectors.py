@@ -24,14 +24,14 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     """
     controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     rng = np.random.default_rng(0)
-    scale = np.array(controller.model.signals[controller.follow].scale)
+    scale = np.array(controller.target.scale)
     beyond = rng.normal(size=(16, command.shape[1])) * 40 * scale
     targets = [*command[:VECTORS], *beyond, np.full(command.shape[1], 1e9)]
     rows, tolerance, state = [], 0.0, controller.rest()
     rounding = 4 * real.epsilon
     for k, target in enumerate(targets):
         target = np.array(target, dtype=np.float32).astype(float) if real is Real.FLOAT else target
-        settle = k == 0 or k >= len(targets) - len(beyond) - 1 or controller.moving is None
+        settle = k == 0 or k >= len(targets) - len(beyond) - 1 or controller.sample_time is None
         before, step = state, controller.step(state, target, settle=settle)
         state = step.state
         # rounding may make the line search accept another trial in float: only the status is compared there
@@ -40,10 +40,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
             {"target": target, "drive": step.drive, "status": int(step.status), "settle": settle, "exact": exact}
         )
         if exact and not step.status & ControllerStatus.INPUT:
-            kernel = (controller.static if settle or controller.moving is None else controller.moving).drive
-            reached = (step.displacement, step.actuator_state)
-            off = kernel(*before, *(value * (1 + rounding) for value in reached)) - kernel(*before, *reached)
-            tolerance = max(tolerance, float(np.max(np.abs(off.full()))))
+            tolerance = max(tolerance, controller.drive_rounding(before, target, step, settle, rounding))
     tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
     return {"rows": rows, "tolerance": tolerance, "unusable": UNUSABLE * command.shape[1]}
 

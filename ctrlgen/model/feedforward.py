@@ -16,7 +16,7 @@ import numpy as np
 
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
-from ctrlgen.model.model import Limit, Model
+from ctrlgen.model.model import Limit, Model, Signal
 from ctrlgen.numerics.interval_arithmetic import bounds
 
 SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
@@ -173,10 +173,30 @@ class Controller:
                 return True
         return False
 
+    @property
+    def target(self) -> Signal:
+        """What a target holds."""
+        return self.model.signals[self.follow]
+
     @cached_property
     def input_limits(self) -> np.ndarray:
         """(channels,) largest |target| that is accepted as a command: 1e5 typical sizes, far outside any range."""
-        return 1e5 * np.array(self.model.signals[self.follow].scale)
+        return 1e5 * np.array(self.target.scale)
+
+    def drive_rounding(
+        self,
+        before: tuple[np.ndarray, np.ndarray],
+        target: np.ndarray,
+        step: ControllerStep,
+        settle: bool,
+        share: float,
+    ) -> float:
+        """By how much the drives of a `step` from the state `before` to `target` change where displacement and actuator state do
+        by this `share` of themselves."""
+        kernel = (self.static if settle or self.moving is None else self.moving).drive
+        reached = (step.displacement, step.actuator_state)
+        off = kernel(*before, *(value * (1 + share) for value in reached)) - kernel(*before, *reached)
+        return float(np.max(np.abs(off.full())))
 
     @cached_property
     def safe_drive(self) -> np.ndarray:
@@ -213,7 +233,7 @@ class Controller:
         z_slack, _, u_slack = self.slacks
         wanted, status = _row(k.displacement(x, z, target)), ControllerStatus(0)
         if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
-            if not np.all(np.abs(target) <= self.input_limits):
+            if not np.all(np.abs(target) <= self.input_limits[: len(target)]):
                 return self._without_target(k, x, z)
             beyond = wanted
             wanted, hit = _clamp(beyond, *m.z_bounds, z_slack)

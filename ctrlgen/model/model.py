@@ -82,11 +82,19 @@ class Model:
 
     @cached_property
     def settling(self) -> ca.SX:
-        """(n_x,) zero at an equilibrium: the rates; for states that change once a sample and clocks, which have no equilibrium,
-        the states themselves."""
-        rows = self.rates[:]
-        for i in (*self.stepped, *self.clocks):
+        """(n_x,) zero at an equilibrium: the rates; for velocities, whose rates are the balance, and for states that change once a
+        sample and clocks, which have no equilibrium, the states themselves."""
+        rows, first = self.rates[:], self.x.numel() - self.v.numel()
+        for i in (*self.stepped, *self.clocks, *range(first, self.x.numel())):
             rows[i] = self.x[i]
+        return rows
+
+    @cached_property
+    def starting(self) -> ca.SX:
+        """(n_x,) zero where an open path starts: settled, states that change once a sample one sample after zero, clocks at zero."""
+        rows, stepped = self.settling[:], list(self.stepped)
+        for i, value in self.stepped.items():
+            rows[i] = self.x[i] - ca.substitute(value, self.x[stepped], ca.SX.zeros(len(stepped)))
         return rows
 
     @property

@@ -12,7 +12,8 @@ from ctrlgen.core.units import base_unit, from_si, show
 from ctrlgen.firmware.compression import INSTRUCTION_BUDGET
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.model.feedforward import Controller, ControllerStatus
+from ctrlgen.model.feedforward import ControllerStatus
+from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.reporting.report import passed, summary
 from ctrlgen.trajectory.metrics import ExpectationResult
 from ctrlgen.trajectory.solution import Solution
@@ -127,9 +128,9 @@ def record(build: Build) -> dict[str, Any]:
 def interface(build: Build) -> dict[str, Any]:
     """The arguments and results of the C, in SI, and the values that its status can have."""
     model, scenario = build.solution.model, build.solution.scenario
-    controller = Controller(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     m = controller.nominal
-    follow, drive, state = m.signals[scenario.file.follow], m.signals["drive"], m.signals.get("state")
+    follow, drive, state = controller.target, m.signals["drive"], m.signals.get("state")
 
     def channels(signal: Any) -> list[str]:
         return [f"{c} [{base_unit(u)}]" for c, u in zip(signal.channels, signal.units, strict=True)]

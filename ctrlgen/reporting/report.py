@@ -13,6 +13,7 @@ import numpy as np
 
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import from_si
+from ctrlgen.devices import Signal
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.result_schemas import origin
@@ -54,7 +55,7 @@ def summary(
 ) -> dict[str, Any]:
     """What summary.json holds: plain numbers in the stated units; nothing that changes from run to run."""
     scenario = solution.scenario
-    error = solution.trace.signals[scenario.file.follow] - solution.command
+    error = np.abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)
     signal = solution.model.signals[scenario.file.follow]
     return {
         **origin(scenario.digest),
@@ -67,10 +68,8 @@ def summary(
         "closed": scenario.closed,
         "ipopt_iterations": solution.iterations,
         "limits_added": list(solution.rows_added),
-        "tracking_error": {
-            f"{channel} [{unit}]": float(from_si(np.abs(error[:, i]).max(), unit))
-            for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
-        },
+        "tracking_error": _by_channel(signal, error),
+        "error_between_samples": None if (between := solution.between_samples) is None else _by_channel(signal, between),
         "margins": [_margin(m, solution) for m in solution.margins],
         "tightest": solution.tightest.limit.name,
         "expected": [
@@ -88,6 +87,12 @@ def summary(
         "compilers_not_run": list(comparison.missing) if comparison else [],
         "comparison": [{**vars(row), "passed": row.passed} for row in comparison.rows] if comparison else [],
     }  # fmt: skip
+
+
+def _by_channel(signal: Signal, values: np.ndarray) -> dict[str, float]:
+    """'channel [unit]' -> value in that unit."""
+    channels = zip(signal.channels, signal.units, values, strict=True)
+    return {f"{channel} [{unit}]": float(from_si(value, unit)) for channel, unit, value in channels}
 
 
 def passed(comparison: Comparison | None, expected: tuple[ExpectationResult, ...]) -> bool:

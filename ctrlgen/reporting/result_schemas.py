@@ -133,9 +133,12 @@ class Summary(Origin):
     samples: int = Field(description="Samples of the trajectory.")
     sample_rate_Hz: Number = Field(description="Samples a second [Hz]; null for settled poses.")
     closed: bool = Field(description="Whether the trajectory ends where it begins.")
-    ipopt_iterations: int = Field(description="Iterations of IPOPT.")
+    ipopt_iterations: int = Field(description="Iterations of IPOPT; of Newton's method for a device with inertia.")
     limits_added: list[str] = Field(description="Composite limits that were added because a first solution broke them.")
     tracking_error: dict[str, float] = Field(description="Largest distance from the command, by 'channel [unit]'.")
+    error_between_samples: dict[str, float] | None = Field(
+        description="The same between samples, under held drives; null for a device without inertia."
+    )
     margins: list[MarginRow] = Field(description="One row a limit.")
     tightest: str = Field(description="Name of the limit with the smallest share left.")
     expected: list[ExpectedRow] = Field(description="One row an expectation of the scenario.")

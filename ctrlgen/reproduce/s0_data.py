@@ -18,7 +18,7 @@ from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import MesoHexapod
 from ctrlgen.physics import meso_hexapod
 from ctrlgen.recordings.pose_errors import CHANNELS
-from ctrlgen.trajectory.paths import Frame, read_poses
+from ctrlgen.trajectory.frame import Frame, read_poses
 
 SCENARIOS = shipped("scenarios")
 FRAME = Frame(CHANNELS, ("rad",) * 3 + ("um",) * 3)

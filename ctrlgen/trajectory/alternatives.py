@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import from_si, show
-from ctrlgen.model.model import Signal
-from ctrlgen.trajectory.path_inverse import PathInverse
+from ctrlgen.model.model import Model, Signal
+from ctrlgen.trajectory.motion import Command, samples_of, scaled
+from ctrlgen.trajectory.path_inverse import PERIODS, InverseTrajectory
 
 SHARES = 2.0 ** -np.arange(7, -1, -1)  # of the way to the end of an admissible range, where a shift is tried
 HALVINGS = 9  # of an interval: a shift or a scale to a five-hundredth
@@ -29,22 +31,52 @@ INSIDE = 1e-4  # of an axis' range that a shifted path stays inside of it: round
 
 @dataclass(frozen=True)
 class Alternative:
-    """A path that can be followed: `what` it is compared with the commanded one, and its samples (n, channels) [SI]."""
+    """A path that can be followed: `what` it is compared with the commanded one, and its `command`."""
 
     what: str
-    command: np.ndarray
+    command: Command
+
+
+class Inverse(Protocol):
+    """What is asked of the inverse of a path: `PathInverse`, or `InertialInverse` of a device with inertia."""
+
+    @property
+    def model(self) -> Model:
+        """Of what it is the inverse."""
+
+    @property
+    def sample_time(self) -> float | None:
+        """Seconds between samples; None between equilibria."""
+
+    @property
+    def without_memories(self) -> Inverse:
+        """The same of the device without the effects that have memories."""
+
+    def trajectory(self, command: Any, closed: bool) -> InverseTrajectory:
+        """What a path takes."""
+
+    def keeps_limits(
+        self, command: Any, closed: bool, chosen: np.ndarray | None = None, margin: float = 0.0, periods: int = PERIODS
+    ) -> bool:
+        """Whether it can be followed."""
+
+    def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x, z and u of an equilibrium."""
+
+    def slope(self, target: np.ndarray) -> np.ndarray:
+        """(n_axes, channels) d displacement / d target at rest."""
 
 
 class Alternatives:
-    """The paths nearest to `command` (n, channels) [SI] that can be followed.
+    """The paths nearest to `command` that can be followed.
 
     `slowed` gives the command that takes a number of times as long, None where the samples are equilibria or listed; `worst` are
     the samples at which limits are broken most.
     """
 
     def __init__(
-        self, inverse: PathInverse, signal: Signal, command: np.ndarray, closed: bool,
-        slowed: Callable[[float], np.ndarray] | None, worst: Sequence[int],
+        self, inverse: Inverse, signal: Signal, command: Command, closed: bool,
+        slowed: Callable[[float], Command] | None, worst: Sequence[int],
     ) -> None:  # fmt: skip
         self.confirming, self.inverse = inverse, inverse.without_memories
         self.signal, self.command, self.closed, self.slowed = signal, command, closed, slowed
@@ -73,7 +105,7 @@ class Alternatives:
                 return None
         return None
 
-    def _follows(self, command: np.ndarray) -> bool:
+    def _follows(self, command: Command) -> bool:
         n = len(command)
         chosen = np.unique(np.minimum((self.places * n).round().astype(int), n - 1))
         return self.inverse.keeps_limits(command, self.closed, None if self.everywhere else chosen, self.margin)
@@ -92,15 +124,15 @@ class Alternatives:
         return Alternative(f'{factor:g} times slower (duration = "{duration}")', command)
 
     def _middle(self) -> np.ndarray:
-        return (self.command.min(axis=0) + self.command.max(axis=0)) / 2
+        samples = samples_of(self.command)
+        return (samples.min(axis=0) + samples.max(axis=0)) / 2
 
-    def _scaled(self, share: float) -> np.ndarray:
-        middle = self._middle()
-        return middle + share * (self.command - middle)
+    def _scaled(self, share: float) -> Command:
+        return scaled(self.command, share, self._middle())
 
     @property
     def _has_extent(self) -> bool:
-        return bool(np.ptp(self.command, axis=0).max() > 0)
+        return bool(np.ptp(samples_of(self.command), axis=0).max() > 0)
 
     def _smaller(self) -> Alternative | None:
         if not self._has_extent or not self._follows(self._scaled(SMALLEST_SCALE)):
@@ -125,7 +157,7 @@ class Alternatives:
             return None
         return Alternative(f"{_scaled_to(share)} and {self._shifted_by(shift)}", self._scaled(share) + shift)
 
-    def _shift(self, command: np.ndarray, way: np.ndarray | None = None) -> tuple[np.ndarray | None, np.ndarray | None]:
+    def _shift(self, command: Command, way: np.ndarray | None = None) -> tuple[np.ndarray | None, np.ndarray | None]:
         """The least shift of `command` (channels,) and its direction: along `way` where that is given, else along one channel; where
         none of them does, along all of them as the least shift into range says."""
         ways = list(np.diag(self.scale)) if way is None else [way]
@@ -141,7 +173,7 @@ class Alternatives:
         parts = [f"{c} = {'+' if v > 0 else ''}{show(v, u)}" for c, u, v, size in rows if abs(v) > 1e-6 * size]
         return f"shifted by {', '.join(parts)}"
 
-    def _along(self, command: np.ndarray, direction: np.ndarray) -> np.ndarray | None:
+    def _along(self, command: Command, direction: np.ndarray) -> np.ndarray | None:
         """The least shift along `direction` (channels,) with which `command` can be followed, rounded to be shown."""
         low, high = self._room(command)
         slope = self.slope @ direction
@@ -181,7 +213,7 @@ class Alternatives:
                 rounded[i] = np.sign(value) * np.ceil(abs(value / one) / step * (1 - 1e-9)) * step * one
         return rounded
 
-    def _room(self, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _room(self, command: Command) -> tuple[np.ndarray, np.ndarray]:
         """By how much each displacement must at least and may at most be moved to be in range at every sample."""
         z = self.inverse.trajectory(command, self.closed).z
         low, high = self.inverse.model.z_bounds
@@ -191,12 +223,9 @@ class Alternatives:
     @cached_property
     def slope(self) -> np.ndarray:
         """(n_axes, channels) d displacement / d command at the middle of the path."""
-        m, k = self.inverse.model, self.inverse.static
-        target = ca.SX.sym("target", len(self.scale))
-        z = k.displacement(ca.DM(m.rest), ca.DM.zeros(m.z.numel()), target)
-        return ca.Function("slope", [target], [ca.jacobian(z, target)])(self._middle()).full()
+        return self.inverse.slope(self._middle())
 
-    def _least_shift(self, command: np.ndarray) -> np.ndarray | None:
+    def _least_shift(self, command: Command) -> np.ndarray | None:
         """The least shift in typical sizes that brings every displacement into range, to first order; None where there is none."""
         low, high = self._room(command)
         if np.any(low > high):

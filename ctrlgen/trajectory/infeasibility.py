@@ -9,9 +9,10 @@ import numpy as np
 from ctrlgen.core.errors import Infeasibility, SolverError, Unreachable
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.model import Model, Signal
-from ctrlgen.trajectory.alternatives import Alternatives
+from ctrlgen.trajectory.alternatives import Alternatives, Inverse
+from ctrlgen.trajectory.motion import Command, samples_of
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
-from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse
+from ctrlgen.trajectory.path_inverse import InverseTrajectory
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.violations import Violation, violations
 
@@ -23,11 +24,11 @@ SHOWN_CAUSES = 8  # limits that it lists
 
 
 def unreachable(
-    scenario: Scenario, inverse: PathInverse, command: np.ndarray, needed: InverseTrajectory, certain: bool = False
+    scenario: Scenario, inverse: Inverse, command: Command, needed: InverseTrajectory, certain: bool = False
 ) -> Unreachable | None:
     """The error that names the samples, the actuators and limits, by how much, and what can be followed instead; None where
     what is `needed` breaks no limit, or perhaps none, unless it is `certain` from elsewhere that the path cannot be followed."""
-    model, n = inverse.model, len(command)
+    model, n, wanted = inverse.model, len(command), samples_of(command)
     causes = primary(model, violations(model, needed.x, needed.z, needed.u))
     if not needed.exact and not certain:
         # of what may still change, or is out of the equations' range, only displacements far enough out of theirs
@@ -41,9 +42,9 @@ def unreachable(
     at = _moment(scenario)
     lines = [
         f"cannot follow {len(samples)} of {n} samples ({_runs(samples)}); the worst is sample {worst}{at(worst)}: "
-        f"{_point(signal, command[worst])}"
+        f"{_point(signal, wanted[worst])}"
     ]
-    x, z, u = inverse.at_rest(command[worst])
+    x, z, u = inverse.at_rest(wanted[worst])
     held = violations(model, x[None], z[None], u[None])
     listed, also = _grouped(model, causes)
     lines += [
@@ -53,7 +54,7 @@ def unreachable(
     ]
     if len(listed) > SHOWN_CAUSES:
         lines.append(f"  and {len(listed) - SHOWN_CAUSES} more limits")
-    nearest = _nearest_pose(model, scenario.file.follow, command[worst]) if held else None
+    nearest = _nearest_pose(model, scenario.file.follow, wanted[worst]) if held else None
     if nearest is not None:
         lines.append(f"  nearest pose of that sample that can be held: {_point(signal, nearest)}")
     slowed = None if scenario.sample_time is None else scenario.slowed(model)
@@ -65,7 +66,7 @@ def unreachable(
             "  no shifted, smaller or slower path was found that can be followed; command smaller motions near home"
         )
     return Unreachable(
-        "\n".join(lines), Infeasibility(samples, worst, command, nearest, {a.what: a.command for a in found})
+        "\n".join(lines), Infeasibility(samples, worst, wanted, nearest, {a.what: samples_of(a.command) for a in found})
     )
 
 

@@ -91,15 +91,6 @@ class TrajectoryProgramme:
         function = ca.Function("sample", [x, z, v, u, s, x_1, commanded], [ca.vertcat(*rows)], {"cse": True})
         return function, np.concatenate(low), np.concatenate(high)
 
-    @property
-    def _settled(self) -> ca.Function:
-        """(x, z, u, p) -> zero where an open path starts: settled, sampled memories one sample after zero, clocks at zero."""
-        m = self.model
-        rows, stepped = m.settling[:], list(m.stepped)
-        for i, value in m.stepped.items():
-            rows[i] = m.x[i] - ca.substitute(value, m.x[stepped], ca.SX.zeros(len(stepped)))
-        return ca.Function("settled", [m.x, m.z, m.u, m.p], [rows])
-
     def run(self, limits: Sequence[Limit], begin: InverseTrajectory | None = None) -> OptimisationResult:
         """IPOPT's solution with the composite `limits` as rows, begun at what the path needs where that is given.
 
@@ -118,7 +109,7 @@ class TrajectoryProgramme:
             u_start, x_end = ca.MX.sym("u0", self.sizes[2]), ca.MX.sym("x1", self.sizes[0])
             U_before, X_next = ca.horzcat(u_start, U[:, :-1]), ca.horzcat(X[:, 1:], x_end)
             extra = [u_start, x_end]
-            settled = self._settled(
+            settled = ca.Function("settled", [m.x, m.z, m.u, m.p], [m.starting])(
                 X[:, 0] * m.x_scale + m.rest, Z[:, 0] * m.z_scale, u_start * m.u_scale, ca.DM(m.p_nominal)
             )
             extra_rows = [settled / m.x_scale, x_end[: m.n_states] - X[: m.n_states, -1]]

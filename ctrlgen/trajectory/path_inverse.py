@@ -61,7 +61,7 @@ def count_faults(model: Model, follow: str) -> list[Fault]:
         ways = "; ".join(_direction(signal, way) for way in _reached(model, signal).T)
         what = f"has {drives} drives for {channels} channels of the {follow}; near home it moves only along {ways}"
         return [Fault("device", f"{model.name} {what}; follow a signal of {drives} channels, or add drives")]
-    if channels != axes:
+    if channels != axes and not model.inertial:  # with inertia the other axes are flexible modes, which follow
         return [
             Fault(
                 "follow",
@@ -130,6 +130,12 @@ class PathInverse:
         """x (n_x,), z (n_axes,) and u (n_u,) of the equilibrium at `target` (channels,)."""
         x, z, u = self._at_rest(target[None])
         return x[0], z[0], u[0]
+
+    def slope(self, target: np.ndarray) -> np.ndarray:
+        """(n_axes, channels) d displacement / d target at rest there."""
+        m, r = self.model, ca.SX.sym("target", len(target))
+        z = self.static.displacement(ca.DM(m.rest), ca.DM.zeros(m.z.numel()), r)
+        return ca.Function("slope", [r], [ca.jacobian(z, r)])(target).full()
 
     def _at_rest(self, command: np.ndarray) -> list[np.ndarray]:
         """x, z and u of the equilibria at each command."""

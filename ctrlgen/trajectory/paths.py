@@ -1,27 +1,30 @@
-"""Paths: commanded samples of the platform's pose or of the stages' displacements.
+"""Paths: commanded samples of the platform's pose or of the stages' displacements, with their derivatives where a device needs them.
 
-Each kind of path turns its parameters into an array of samples; in a `closed` one the first sample follows the last.
-Motion between rest points follows the minimum-jerk law
-s(t) = 10 t^3 - 15 t^4 + 6 t^5 (T. Flash, N. Hogan, J. Neurosci. 5 (1985) 1688).
+Each kind of path states its curve once; samples are its values, derivatives are those of the same expression. In a `closed` one
+the first sample follows the last. Motion between rest points follows the polynomial of least degree, 2 p + 1, whose first p
+derivatives are zero at both; p = 2 is minimum jerk (T. Flash, N. Hogan, J. Neurosci. 5 (1985) 1688).
 """
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from math import comb
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
+import casadi as ca
 import numpy as np
 from pydantic import AfterValidator, Field
 from pydantic.json_schema import SkipJsonSchema
+from scipy.interpolate import make_interp_spline
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.files import read_text
-from ctrlgen.core.units import In, Quantity, parse, read_quantity, same_dimension, written_unit
+from ctrlgen.core.units import In, Quantity, read_quantity, same_dimension, written_unit
 from ctrlgen.devices.base import Section
+from ctrlgen.trajectory.frame import Frame, Point, read_poses
+
+MINIMUM_JERK = 2  # derivatives that are zero at a rest point, where nothing else is stated
+PERIODIC = 99  # continuous derivatives of a curve without rest points: more than any device needs
 
 
 def _length_or_angle(given: Quantity) -> Quantity:
@@ -33,88 +36,94 @@ def _length_or_angle(given: Quantity) -> Quantity:
 Size = Annotated[
     Quantity, In(None, positive=True), AfterValidator(_length_or_angle)
 ]  # as the channels that it is along
-Point = dict[str, str | int | float]
 
 
-@dataclass(frozen=True)
-class Frame:
-    """The channels a path is commanded in: names and the unit of each."""
+def smooth_step(s: Any, p: int) -> Any:
+    """From 0 at s = 0 to 1 at s = 1 with p derivatives zero at both ends: sum_i C(2p+1, i) s^i (1 - s)^(2p+1-i), i = p+1 ... 2p+1.
 
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
-
-    def point(self, given: Point, where: str) -> np.ndarray:
-        """{'delta_z': '20 um'} as an SI vector; channels not named are zero. Raises InputError."""
-        vector, faults = np.zeros(len(self.channels)), []
-        for name, text in given.items():
-            if name not in self.channels:
-                faults.append(Fault(f"{where}.{name}", f"is not a channel; known: {', '.join(self.channels)}"))
-                continue
-            i = self.channels.index(name)
-            try:
-                vector[i] = parse(text, self.units[i])
-            except ValueError as error:
-                faults.append(Fault(f"{where}.{name}", str(error)))
-        if faults:
-            raise InputError("path", faults)
-        return vector
-
-    def pose(self, text: str, option: str) -> np.ndarray:
-        """'delta_x=5um,delta_z=20um', as given to a command's `option`, as an SI vector. Raises InputError."""
-        pairs = [part.partition("=") for part in text.split(",") if part.strip()]
-        if any(not value for _, _, value in pairs):
-            example = "write channel=value, separated by commas, such as delta_x=5um,delta_z=20um"
-            raise InputError(option, [Fault(text, example)])
-        try:
-            return self.point({name.strip(): value.strip() for name, _, value in pairs}, "")
-        except InputError as error:
-            raise InputError(option, [Fault(f.where.removeprefix("."), f.what) for f in error.faults]) from None
-
-    def directions(self, names: Sequence[str], where: str) -> np.ndarray:
-        """Unit vectors of the named channels, (n, channels). Raises InputError for unknown channels and for those of different
-        dimensions."""
-        for name in names:
-            if name not in self.channels:
-                raise InputError(
-                    "path", [Fault(where, f"{name!r} is not a channel; known: {', '.join(self.channels)}")]
-                )
-        if len(set(names)) != len(names):
-            raise InputError("path", [Fault(where, "names the same channel twice; name two different ones")])
-        units = [self.units[self.channels.index(name)] for name in names]
-        if not all(same_dimension(unit, units[0]) for unit in units):
-            what = " and ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
-            raise InputError("path", [Fault(where, f"{what} are not of one dimension; name two lengths or two angles")])
-        return np.eye(len(self.channels))[[self.channels.index(name) for name in names]]
-
-    def size(self, given: Quantity, channel: str, where: str) -> float:
-        """A size along a channel in SI. Raises InputError where its dimension is not that of the channel."""
-        unit = self.units[self.channels.index(channel)]
-        if not same_dimension(written_unit(given.text), unit):
-            what = (
-                f'{given.text!r} is not of the dimension of {channel}; write a number with a unit, such as "1 {unit}"'
-            )
-            raise InputError("path", [Fault(where, what)])
-        return given.si
-
-
-def minimum_jerk(s: np.ndarray) -> np.ndarray:
-    """10 s^3 - 15 s^4 + 6 s^5 on 0 <= s <= 1."""
-    return s**3 * (10 - 15 * s + 6 * s**2)
+    `s` is an array or a symbol. In this form no terms cancel.
+    """
+    degree = 2 * p + 1
+    return sum(comb(degree, i) * s**i * (1 - s) ** (degree - i) for i in range(p + 1, degree + 1))
 
 
 class Path_(Section):
-    """Base of the paths; `samples(frame, n)` gives n samples, (n, channels) in SI, and raises InputError."""
+    """Base of the paths. Positions along a path are counted in samples, 0 ... n - 1, and need not be whole."""
 
-    closed: ClassVar[bool] = False
+    @property
+    def closed(self) -> bool:
+        """Whether the first sample follows the last one."""
+        return False
+
+    @property
+    def continuous(self) -> int:
+        """How many derivatives are continuous, where the path rests before it begins and after it ends; not known of listed samples."""
+        return PERIODIC
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
+        """n samples, (n, channels) in SI. Raises InputError."""
+        return self.derivatives(frame, n, 0, np.arange(n))[0]
+
+    def derivatives(self, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
+        """(order + 1, len(at), channels) [SI, per sample^k]: the path of n samples and its derivatives at the positions `at`; a path
+        that ends stays at its last sample. Raises InputError."""
         raise NotImplementedError
 
 
-class Circle(Path_):
+class Smooth_(Path_):
+    """Base of the paths with a law of time."""
+
+    smooth: Annotated[int, Field(ge=1, le=6)] | None = None
+    """Derivatives that are zero at each rest point: 1 velocity, 2 acceleration, 3 jerk, 4 snap. Left out: 2 (minimum jerk); for a
+    device with inertia as many as its drive follows, so that the drive neither jumps nor bends there."""
+
+    @property
+    def continuous(self) -> int:
+        """Those that are zero at the rest points."""
+        return MINIMUM_JERK if self.smooth is None else self.smooth
+
+
+class Curve_(Smooth_):
+    """Base of the paths that are one formula of the position along them."""
+
+    def curve(self, frame: Frame, k: Any, n: int) -> list[Any]:
+        """Each channel [SI] at the position `k`, an array or a symbol, of a path of n samples."""
+        raise NotImplementedError
+
+    def _law(self, k: Any, n: int) -> Any:
+        """The share of the path that is behind: from rest to rest."""
+        return smooth_step(k / (n - 1), self.continuous)
+
+    def derivatives(self, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
+        """The curve, and its derivatives by CasADi."""
+        at = at if self.closed else np.clip(at, 0, n - 1)
+        values = np.column_stack([np.broadcast_to(v, at.shape) for v in self.curve(frame, at, n)])
+        if not order:
+            return values[None]
+        return np.stack([values, *_derivatives(lambda k: ca.vertcat(*self.curve(frame, k, n)), order, at)])
+
+
+class Periodic_(Curve_):
+    """Base of the closed curves."""
+
+    from_rest: bool = False
+    """Starts and ends at rest, once along the curve with the smooth law of time. Otherwise the motion is periodic: it starts and ends
+    at speed, in the steady motion."""
+
+    @property
+    def closed(self) -> bool:
+        """Periodic unless it starts from rest."""
+        return not self.from_rest
+
+    @property
+    def continuous(self) -> int:
+        """All where there is no rest point."""
+        return super().continuous if self.from_rest else PERIODIC
+
+
+class Circle(Periodic_):
     """centre + (diameter/2) (cos w t, sin w t) in `plane`, `turns` whole turns; starts on the first channel's side."""
 
-    closed: ClassVar[bool] = True
     kind: Literal["circle"]
     """A circle."""
     diameter: Size
@@ -126,17 +135,37 @@ class Circle(Path_):
     turns: Annotated[int, Field(ge=1, le=1000)] = 1
     """Whole turns in the duration."""
 
-    def samples(self, frame: Frame, n: int) -> np.ndarray:
-        angle = 2 * np.pi * self.turns * np.arange(n) / n
+    def curve(self, frame: Frame, k: Any, n: int) -> list[Any]:
+        """The circle."""
+        angle = 2 * np.pi * self.turns * k / n if self.closed else 2 * np.pi * self.turns * self._law(k, n)
         first, second = frame.directions(self.plane, "plane")
         radius = frame.size(self.diameter, self.plane[0], "diameter") / 2
-        return frame.point(self.centre, "centre") + radius * (
-            np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second)
-        )
+        return _in_plane(frame.point(self.centre, "centre"), first, second, radius * _cos(angle), radius * _sin(angle))
 
 
-class Line(Path_):
-    """From `start` to `end`: minimum jerk in time, or evenly spaced where the scenario is static."""
+class Legs_(Smooth_):
+    """Base of the paths that are straight from rest point to rest point."""
+
+    def corners(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+        """The rest points (m, channels) [SI] and when they are reached, in any unit of time. Raises InputError."""
+        raise NotImplementedError
+
+    def derivatives(self, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
+        """The law of time on each leg."""
+        corners, times = self.corners(frame)
+        per_sample = (times[-1] - times[0]) / (n - 1)
+        t = times[0] + per_sample * np.clip(at, 0, n - 1)
+        leg = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
+        lasts, p = times[leg + 1] - times[leg], self.continuous
+        s = (t - times[leg]) / lasts
+        laws = [smooth_step(s, p), *(d[:, 0] for d in _derivatives(lambda s: smooth_step(s, p), order, s))]
+        way = corners[leg + 1] - corners[leg]
+        tables = [(law * (per_sample / lasts) ** k)[:, None] * way for k, law in enumerate(laws)]
+        return np.stack([corners[leg] + tables[0], *tables[1:]])
+
+
+class Line(Legs_):
+    """From `start` to `end`, at rest at both; or evenly spaced."""
 
     kind: Literal["line"]
     """A straight line."""
@@ -145,17 +174,20 @@ class Line(Path_):
     end: Point
     """Last pose, as channels with units; channels left out are zero."""
     even: bool = False
-    """Samples evenly spaced; otherwise they follow the minimum-jerk law, at rest at both ends."""
+    """Samples evenly spaced; otherwise they follow the smooth law of time, at rest at both ends."""
 
-    def samples(self, frame: Frame, n: int) -> np.ndarray:
-        s = np.linspace(0, 1, n)
-        s = s if self.even else minimum_jerk(s)
-        start, end = frame.point(self.start, "start"), frame.point(self.end, "end")
-        return start + np.outer(s, end - start)
+    @property
+    def continuous(self) -> int:
+        """None where the samples are evenly spaced: the velocity jumps."""
+        return 0 if self.even else super().continuous
+
+    def corners(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+        """The two ends."""
+        return np.array([frame.point(self.start, "start"), frame.point(self.end, "end")]), np.array([0.0, 1.0])
 
 
-class Raster(Path_):
-    """`lines` parallel lines `length` long, `spacing` apart, back and forth, at rest in every corner.
+class Raster(Legs_):
+    """Parallel lines `length` long, `spacing` apart, back and forth, at rest in every corner.
 
     A step to the next line takes `step_share` of the time of a line.
     """
@@ -175,7 +207,8 @@ class Raster(Path_):
     step_share: Annotated[float, Field(gt=0, le=1)] = 0.2
     """Time of a step to the next line as a share of the time of a line."""
 
-    def samples(self, frame: Frame, n: int) -> np.ndarray:
+    def corners(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+        """The ends of the lines."""
         fast, slow = frame.directions(self.plane, "plane")
         length = frame.size(self.length, self.plane[0], "length")
         spacing = frame.size(self.spacing, self.plane[1], "spacing")
@@ -186,11 +219,11 @@ class Raster(Path_):
             for side in ends:
                 corners.append(side * length * fast + level * slow)
             times += [times[-1] + 1.0, times[-1] + 1.0 + self.step_share]
-        return frame.point(self.centre, "centre") + _through(np.array(corners), np.array(times[:-1]), n)
+        return frame.point(self.centre, "centre") + np.array(corners), np.array(times[:-1])
 
 
-class Spiral(Path_):
-    """Archimedean, from the centre outwards: r = (diameter/2) s, angle = 2 pi turns s, s minimum jerk."""
+class Spiral(Curve_):
+    """Archimedean, from the centre outwards: r = (diameter/2) s, angle = 2 pi turns s, s by the smooth law of time."""
 
     kind: Literal["spiral"]
     """An Archimedean spiral."""
@@ -203,21 +236,17 @@ class Spiral(Path_):
     plane: tuple[str, str] = ("delta_x", "delta_y")
     """Two channels of one dimension that span the plane of the path, first and second."""
 
-    def samples(self, frame: Frame, n: int) -> np.ndarray:
-        s = minimum_jerk(np.linspace(0, 1, n))
+    def curve(self, frame: Frame, k: Any, n: int) -> list[Any]:
+        """The spiral."""
+        s = self._law(k, n)
         first, second = frame.directions(self.plane, "plane")
         radius, angle = frame.size(self.diameter, self.plane[0], "diameter") / 2 * s, 2 * np.pi * self.turns * s
-        return (
-            frame.point(self.centre, "centre")
-            + np.outer(radius * np.cos(angle), first)
-            + np.outer(radius * np.sin(angle), second)
-        )
+        return _in_plane(frame.point(self.centre, "centre"), first, second, radius * _cos(angle), radius * _sin(angle))
 
 
-class Lissajous(Path_):
+class Lissajous(Periodic_):
     """centre + (a_1 sin(2 pi f_1 t/T + phase), a_2 sin(2 pi f_2 t/T)): f_1 and f_2 whole periods in the duration."""
 
-    closed: ClassVar[bool] = True
     kind: Literal["lissajous"]
     """A Lissajous figure."""
     amplitudes: tuple[Size, Size]
@@ -231,17 +260,22 @@ class Lissajous(Path_):
     plane: tuple[str, str] = ("delta_x", "delta_y")
     """Two channels of one dimension that span the plane of the path, first and second."""
 
-    def samples(self, frame: Frame, n: int) -> np.ndarray:
-        t = np.arange(n) / n
-        rows = frame.directions(self.plane, "plane")
+    def curve(self, frame: Frame, k: Any, n: int) -> list[Any]:
+        """The figure."""
+        t = self._law(k, n) if self.from_rest else k / n
+        first, second = frame.directions(self.plane, "plane")
         a_1, a_2 = (frame.size(a, at, "amplitudes") for a, at in zip(self.amplitudes, self.plane, strict=True))
-        first = a_1 * np.sin(2 * np.pi * self.periods[0] * t + self.phase.si)
-        second = a_2 * np.sin(2 * np.pi * self.periods[1] * t)
-        return frame.point(self.centre, "centre") + np.outer(first, rows[0]) + np.outer(second, rows[1])
+        along = a_1 * _sin(2 * np.pi * self.periods[0] * t + self.phase.si)
+        across = a_2 * _sin(2 * np.pi * self.periods[1] * t)
+        return _in_plane(frame.point(self.centre, "centre"), first, second, along, across)
 
 
 class Poses(Path_):
-    """Samples listed in the scenario (`points`) or in a CSV file (`file`), one row per sample."""
+    """Samples listed in the scenario (`points`) or in a CSV file (`file`), one row per sample.
+
+    Between samples, and for derivatives, the path is the spline of degree 2 p + 1 through them whose first p derivatives are zero at
+    both ends, p the derivatives that are needed.
+    """
 
     kind: Literal["poses"]
     """Listed samples."""
@@ -253,83 +287,50 @@ class Poses(Path_):
     """Where `file` is looked for; set by the program."""
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
+        """The samples as listed; `n` is not read."""
         if bool(self.points) == bool(self.file):
-            raise InputError(
-                "path",
-                [
-                    Fault(
-                        "points",
-                        "give either points or file, not both" if self.points else "is missing; give points or file",
-                    )
-                ],
-            )
+            what = "give points or file, not both" if self.points else "is missing; give points or file"
+            raise InputError("path", [Fault("points", what)])
         if self.points:
             return np.array([frame.point(point, f"points[{i}]") for i, point in enumerate(self.points)])
         return read_poses(self.folder / self.file, frame)
+
+    def derivatives(self, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
+        """The spline."""
+        listed = self.samples(frame, n)
+        still = [(k, np.zeros(listed.shape[1])) for k in range(1, order + 1)]
+        if len(listed) < 2 * order + 2:
+            what = f"has {len(listed)} samples; their {order}. derivative takes {2 * order + 2} or more: add samples"
+            raise InputError("path", [Fault("points", what)])
+        spline = make_interp_spline(np.arange(len(listed)), listed, 2 * order + 1, bc_type=(still, still))
+        return np.stack([spline(np.clip(at, 0, len(listed) - 1), k) for k in range(order + 1)])
 
 
 PathKind = Annotated[Circle | Line | Raster | Spiral | Lissajous | Poses, Field(discriminator="kind")]
 
 
-def _through(corners: np.ndarray, times: np.ndarray, n: int) -> np.ndarray:
-    """(n, channels): from corner to corner, at `times`, with minimum jerk and at rest in each of the `corners`."""
-    t = np.linspace(times[0], times[-1], n)
-    leg = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
-    s = minimum_jerk((t - times[leg]) / (times[leg + 1] - times[leg]))
-    return corners[leg] + s[:, None] * (corners[leg + 1] - corners[leg])
+def _in_plane(centre: np.ndarray, first: np.ndarray, second: np.ndarray, along: Any, across: Any) -> list[Any]:
+    """Each channel of centre + along first + across second."""
+    return [
+        c + (along * a + across * b) for c, a, b in zip(centre.tolist(), first.tolist(), second.tolist(), strict=True)
+    ]
 
 
-def read_poses(path: Path, frame: Frame) -> np.ndarray:
-    """A CSV of samples as (n, channels) in SI. Raises InputError listing every bad cell by line and column."""
-    try:
-        lines = list(csv.reader(io.StringIO(read_text(path))))
-    except csv.Error as error:
-        raise InputError(
-            path, [Fault("file", f"is no CSV: {error}; write a header row and one row a sample")]
-        ) from None
-    rows = [(line, row) for line, row in enumerate(lines, start=1) if any(cell.strip() for cell in row)]
-    if len(rows) < 2:
-        raise InputError(path, [Fault("file", "has no samples; write a header row and one row per sample")])
-    columns: list[tuple[int, str, str]] = []
-    faults = []
-    for text in rows[0][1]:
-        name, _, unit = text.strip().partition("[")
-        name, unit = name.strip(), unit.rstrip("] ").strip()
-        if name not in frame.channels:
-            faults.append(
-                Fault("line 1", f"column {text.strip()!r} is not a channel; known: {', '.join(frame.channels)}")
-            )
-            continue
-        index = frame.channels.index(name)
-        if index in [known for known, _, _ in columns]:
-            faults.append(Fault("line 1", f"column {name!r} occurs twice; keep one"))
-        try:
-            parse(f"0 {unit}", frame.units[index])
-        except ValueError:
-            faults.append(
-                Fault("line 1", f'column {text.strip()!r} needs a unit; write "{name} [{frame.units[index]}]"')
-            )
-        columns.append((index, unit, name))
-    if faults:
-        raise InputError(path, faults)
-    values = np.zeros((len(rows) - 1, len(frame.channels)))
-    for k, (line, row) in enumerate(rows[1:]):
-        if len(row) != len(columns):
-            faults.append(
-                Fault(
-                    f"line {line}", f"has {len(row)} cells, the header has {len(columns)}; give one number per column"
-                )
-            )
-            continue
-        for (index, unit, name), cell in zip(columns, row, strict=True):
-            try:
-                values[k, index] = parse(f"{cell.strip()} {unit}", frame.units[index])
-            except ValueError:
-                faults.append(
-                    Fault(
-                        f"line {line}, {name}", f"{cell.strip()!r} is not a finite number; write one or remove the row"
-                    )
-                )
-    if faults:
-        raise InputError(path, faults[:20] + ([Fault("…", f"and {len(faults) - 20} more")] if len(faults) > 20 else []))
-    return values
+def _cos(angle: Any) -> Any:
+    return ca.cos(angle) if isinstance(angle, ca.SX) else np.cos(angle)
+
+
+def _sin(angle: Any) -> Any:
+    return ca.sin(angle) if isinstance(angle, ca.SX) else np.sin(angle)
+
+
+def _derivatives(curve: Callable[[Any], Any], order: int, at: np.ndarray) -> list[np.ndarray]:
+    """The first `order` derivatives (len(at), channels) of a curve of one variable."""
+    s = ca.SX.sym("s")
+    orders = [ca.SX(curve(s))]
+    for _ in range(order):
+        orders.append(ca.jacobian(orders[-1], s))
+    if not order:
+        return []
+    values = ca.Function("derivatives", [s], [ca.horzcat(*orders[1:])]).map(len(at))(at[None]).full()
+    return [values[:, k::order].T for k in range(order)]

@@ -17,12 +17,17 @@ from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.units import In, Quantity, read_quantity, show, written_unit
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.base import Section
+from ctrlgen.model.inverse_dynamics import relative_degrees
 from ctrlgen.model.model import Model
-from ctrlgen.trajectory.paths import Frame, PathKind, Poses
+from ctrlgen.trajectory.frame import Frame
+from ctrlgen.trajectory.motion import Command, Motion
+from ctrlgen.trajectory.paths import PathKind, Poses
 
 FILE = "scenario.toml"
 MOST_SAMPLES = 1_000_000  # of one path: what memory holds
 WHOLE = 1e-6  # of the number of samples, by which rate times duration may be off a whole one: durations are written with six digits
+SMOOTHER = 1  # derivatives more than the drive follows: it then starts without a bend too
+RESOLVED = 0.5  # of the largest value of a derivative, by which it may change from one listed sample to the next
 
 
 class Expectation(Section):
@@ -121,49 +126,85 @@ class Scenario:
     @property
     def closed(self) -> bool:
         """Whether the path is periodic: its first sample follows the last one."""
-        return self.sample_time is not None and type(self.file.path).closed
+        return self.sample_time is not None and self.file.path.closed
 
-    def slowed(self, model: Model) -> Callable[[float], np.ndarray] | None:
-        """How many times as long -> the commanded samples (n, channels) [SI] of the same path; None for one that is not shaped by a
-        formula."""
+    def slowed(self, model: Model) -> Callable[[float], Command] | None:
+        """How many times as long -> the target of the same path; None for one that is not shaped by a formula."""
         if isinstance(self.file.path, Poses) or self.file.duration is None or self.file.sample_rate is None:
             return None
         n, rate = len(self.command(model)), self.file.sample_rate
 
-        def command(times: float) -> np.ndarray:
+        def target(times: float) -> Command:
             samples = min(round(times * n), MOST_SAMPLES)
             longer = read_quantity("s", f"{samples / rate.si!r} s")
-            return replace(self, file=self.file.model_copy(update={"duration": longer})).command(model)
+            return replace(self, file=self.file.model_copy(update={"duration": longer})).target(model)
 
-        return command
+        return target
 
     def command(self, model: Model) -> np.ndarray:
         """The commanded samples (n, channels) of the followed signal, SI. Raises InputError."""
-        signal = model.signals[self.file.follow]
-        frame = Frame(signal.channels, signal.units)
+        samples = self._on_path(model, lambda path, frame, n: path.samples(frame, n))
+        if self.sample_time and len(samples) < 2:
+            what = "has one sample, but motion in time needs two or more; for one pose leave out sample_rate"
+            raise InputError(self.path, [Fault("path", what)])
+        return samples
+
+    def target(self, model: Model) -> Command:
+        """What is to be followed: the samples, with their derivatives where the model has inertia. Raises InputError."""
+        return self.motion(model) if model.inertial else self.command(model)
+
+    def motion(self, model: Model, at: np.ndarray | None = None) -> Motion:
+        """The path with as many derivatives by time as the drive of a `model` with inertia needs, at the samples or at the positions
+        `at`, counted in samples. Raises InputError where the path has fewer, or has no sample time."""
+        if self.sample_time is None:
+            what = f'is missing: {model.name} has inertia, what it needs depends on time; write sample_rate = "1 kHz" and duration'
+            raise InputError(self.path, [Fault("sample_rate", what)])
+        samples, order = self.command(model), max(relative_degrees(model, self.file.follow))
+        self._check_smoothness(model, samples, order)
+        places = np.arange(len(samples)) if at is None else at
+        tables = self._on_path(model, lambda path, frame, n: path.derivatives(frame, n, order, places))
+        rates = self.sample_time ** -np.arange(1.0, order + 1)
+        return Motion(tables[0], tables[1:] * rates[:, None, None])
+
+    def _check_smoothness(self, model: Model, samples: np.ndarray, order: int) -> None:
+        """Refuses a path whose derivative of this order jumps, so that the drive would."""
+        path = self._path(model)
+        if isinstance(path, Poses):
+            still = np.vstack([samples[:1].repeat(order + 1, axis=0), samples, samples[-1:].repeat(order + 1, axis=0)])
+            largest, change = (np.abs(np.diff(still, k, axis=0)).max(axis=0) for k in (order, order + 1))
+            if np.any(change > RESOLVED * largest):
+                what = (
+                    f"is too coarse or not smooth: its {order}. derivative, which the drive of {model.name} follows, changes by more "
+                    "than half from one sample to the next; begin and end at rest, and give smoother or more samples with all digits"
+                )
+                raise InputError(self.path, [Fault("path", what)])
+        elif path.continuous < order:
+            key = "even" if getattr(path, "even", False) else "smooth"
+            remedy = "leave it out" if key == "even" else f"write smooth = {order} or more, or leave it out"
+            what = f"makes derivative {path.continuous + 1} jump at rest points; the drive of {model.name} follows {order}: {remedy}"
+            raise InputError(self.path, [Fault(f"path.{key}", what)])
+
+    def _path(self, model: Model) -> PathKind:
+        """The path, where it leaves that open as smooth as the drive of the device needs."""
         path = self.file.path
         if isinstance(path, Poses):
-            path = path.model_copy(update={"folder": self.path.parent})
+            return path.model_copy(update={"folder": self.path.parent})
+        if model.inertial and path.smooth is None:
+            return path.model_copy(update={"smooth": max(relative_degrees(model, self.file.follow)) + SMOOTHER})
+        return path
+
+    def _on_path(self, model: Model, evaluate: Callable[[PathKind, Frame, int], np.ndarray]) -> np.ndarray:
+        """What `evaluate` (path, frame, number of samples) gives, the path's faults with their places in the file."""
+        signal = model.signals[self.file.follow]
         n = self.file.points or 0
         if self.file.sample_rate and self.file.duration:
             n = self._sample_count(self.file.sample_rate, self.file.duration)
         try:
-            samples = path.samples(frame, n)
+            return evaluate(self._path(model), Frame(signal.channels, signal.units), n)
         except InputError as error:
             if error.source != "path":
                 raise
             raise InputError(self.path, [Fault(f"path.{f.where}", f.what) for f in error.faults]) from None
-        if self.sample_time and len(samples) < 2:
-            raise InputError(
-                self.path,
-                [
-                    Fault(
-                        "path",
-                        "has one sample, but motion in time needs two or more; for one pose leave out sample_rate",
-                    )
-                ],
-            )
-        return samples
 
     def _sample_count(self, rate: Quantity, duration: Quantity) -> int:
         """Rate times duration as a whole number. Raises InputError where it is none, or not one that a path can have."""
@@ -177,6 +218,14 @@ class Scenario:
         if what:
             raise InputError(self.path, [Fault("duration", what)])
         return n
+
+
+def motion_targets(scenario: Scenario, model: Model) -> np.ndarray:
+    """(n, channels * (order + 1)) what the online controller of a device with inertia is given to follow the scenario: position, then
+    derivatives, at the middle of the time for which each drive is held. Raises InputError."""
+    samples = np.arange(len(scenario.command(model)))
+    motion = scenario.motion(model, samples + 0.5)
+    return np.hstack([motion.position, *motion.derivatives])
 
 
 def load_scenario(path: Path | str, device: Device | Path | str | None = None) -> Scenario:

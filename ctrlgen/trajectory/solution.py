@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.units import show
+from ctrlgen.model.discretisation import one_step_map
 from ctrlgen.model.model import Limit, Model
-from ctrlgen.model.simulation import Trace
+from ctrlgen.model.simulation import Trace, simulate
+from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
-from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
+from ctrlgen.trajectory.motion import Motion
+from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
 from ctrlgen.trajectory.scenario import Scenario
 
-INERTIA = "has inertia: it can be simulated, diagnosed and exported as a plant, but not be led along a path yet"
+LOOKED_AT_BETWEEN = 4  # parts of a sample at whose ends the motion between samples is looked at
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,8 @@ class Margin:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solved scenario, SI. `trace` holds the samples; `drive` (n, axes) acts from sample k to k + 1."""
+    """A solved scenario, SI. `trace` holds the samples; `drive` (n, axes) acts from sample k to k + 1. `iterations` of IPOPT, or with
+    inertia of Newton's method; `between_samples` (channels,) is the largest distance from the path between samples, with inertia."""
 
     scenario: Scenario
     model: Model
@@ -47,6 +53,12 @@ class Solution:
     margins: tuple[Margin, ...]
     iterations: int
     rows_added: tuple[str, ...]
+    between_samples: np.ndarray | None = None
+
+    @property
+    def solver(self) -> str:
+        """What `iterations` counts."""
+        return "Newton's method" if self.model.inertial else "IPOPT"
 
     @property
     def tightest(self) -> Margin:
@@ -56,16 +68,8 @@ class Solution:
 
 def check_feasibility(scenario: Scenario, model: Model, command: np.ndarray) -> tuple[PathInverse, InverseTrajectory]:
     """The inverse of `command` (n, channels) [SI] and what it needs, without IPOPT. Raises Unreachable where that breaks a limit, and
-    InputError for a device that cannot be inverted, with inertia or too many or few drives, or a closed path of one that changes with
-    time."""
-    if model.inertial:
-        what = f"{model.name} {INERTIA}; name a device that is in balance at every moment"
-        raise InputError(scenario.path, [Fault("device", what)])
-    if model.clocks and scenario.closed:
-        what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
-        raise InputError(scenario.path, [Fault("path", what)])
-    if faults := count_faults(model, scenario.file.follow):
-        raise InputError(scenario.path, faults)
+    InputError for a device that cannot be inverted, with too many or few drives, or a closed path of one that changes with time."""
+    _check_invertible(scenario, model)
     inverse = PathInverse(model, scenario.file.follow, scenario.sample_time)
     needed = inverse.trajectory(command, scenario.closed)
     if (error := unreachable(scenario, inverse, command, needed)) is not None:
@@ -73,14 +77,84 @@ def check_feasibility(scenario: Scenario, model: Model, command: np.ndarray) -> 
     return inverse, needed
 
 
+def check_motion(scenario: Scenario, model: Model) -> tuple[InertialInverse, Motion, InverseTrajectory]:
+    """The inverse of a device with inertia, the commanded motion and what it needs. Raises as `check_feasibility`, and InputError for
+    a path that is not as smooth as the drive needs."""
+    _check_invertible(scenario, model)
+    motion = scenario.motion(model)
+    inverse = InertialInverse(model, scenario.file.follow, scenario.sample_time or 0.0)
+    needed = inverse.trajectory(motion, scenario.closed)
+    if (error := unreachable(scenario, inverse, motion, needed)) is not None:
+        raise error
+    return inverse, motion, needed
+
+
+def _check_invertible(scenario: Scenario, model: Model) -> None:
+    if model.clocks and scenario.closed:
+        what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
+        raise InputError(scenario.path, [Fault("path", what)])
+    if faults := count_faults(model, scenario.file.follow):
+        raise InputError(scenario.path, faults)
+
+
 def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
-    """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where IPOPT fails, and
-    InputError for a device with inertia or a closed path of one that changes with time.
+    """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where none are found, and
+    InputError for a device that cannot be inverted, a path that is not smooth enough for one with inertia, or a closed path of one
+    that changes with time.
 
     The inverse of the path says sample by sample what it takes. Where that breaks a limit the path cannot be followed; where it
-    keeps all of them it is the solution, from which IPOPT begins, and the answer where IPOPT ends elsewhere. `progress` is called
-    before each run of IPOPT.
+    keeps all of them it is the solution, from which IPOPT begins, and the answer where IPOPT ends elsewhere. With inertia it is what
+    the drives are near that are held from sample to sample. `progress` is called before each run of IPOPT.
     """
+    return (_solve_inertial if model.inertial else _solve_balanced)(scenario, model, progress)
+
+
+def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], None]) -> Solution:
+    """By the sampled inverse; the trace is that of the model driven so by the shipped integrator."""
+    inverse, motion, _ = check_motion(scenario, model)
+    progress(f"sampled inverse, {len(motion)} samples")
+    found = inverse.sampled(motion, scenario.closed)
+    u = np.clip(found.u, *model.u_bounds)  # what NEGLIGIBLE lets pass is rounding
+    needed = InverseTrajectory(found.x, found.z, found.u, found.u[0], True)
+    if (error := unreachable(scenario, inverse, motion, needed)) is not None:
+        raise error
+    reached = simulate(model, u, inverse.sample_time, found.x[0], found.z[0])
+    n = len(motion)
+    samples = Trace(reached.time[:n], {k: v[:n] for k, v in reached.signals.items()}, reached.x[:n], reached.z[:n])
+    off = np.linalg.norm(
+        (samples.signals[scenario.file.follow] - motion.position) / model.signals[scenario.file.follow].scale, axis=1
+    )
+    if not off.max() <= FEASIBILITY_TOLERANCE:
+        raise SolverError(
+            f"drives held for {show(inverse.sample_time, 's')} follow the path only to {off.max():.1g} of its typical size, worst at "
+            f"sample {int(off.argmax())}; raise sample_rate, or make the path slower or smoother"
+        )
+    margins = tuple(_margins(model, samples.x, samples.z, u))
+    between = error_between_samples(scenario, model, samples, u)
+    return Solution(scenario, model, motion.position, samples, u, margins, found.iterations, (), between)
+
+
+def error_between_samples(scenario: Scenario, model: Model, samples: Trace, u: np.ndarray) -> np.ndarray:
+    """(channels,) the largest distance [SI] of the followed signal from the path between the samples of a device with inertia, under
+    drives u (n, n_u) that are held: at `LOOKED_AT_BETWEEN` moments of each sample, by steps of the shipped integrator."""
+    h, n, p = scenario.sample_time or 0.0, len(u), np.tile(model.p_nominal[:, None], (1, len(u)))
+    worst = np.zeros(samples.signals[scenario.file.follow].shape[1])
+    for k in range(1, LOOKED_AT_BETWEEN):
+        share = k / LOOKED_AT_BETWEEN
+        after = one_step_map(model, share * h)
+        signal = ca.substitute(
+            model.signals[scenario.file.follow].expr, ca.vertcat(model.x, model.z), ca.vertcat(after.x, after.z)
+        )
+        reached = ca.Function("between", [model.x, model.z, model.u, model.p], [signal]).map(n)(
+            samples.x.T, samples.z.T, u.T, p
+        )
+        wanted = scenario.motion(model, np.arange(n) + share).position
+        worst = np.maximum(worst, np.abs(reached.full().T - wanted).max(axis=0))
+    return worst
+
+
+def _solve_balanced(scenario: Scenario, model: Model, progress: Callable[[str], None]) -> Solution:
+    """By IPOPT, begun at the inverse of the path."""
     command = scenario.command(model)
     inverse, needed = check_feasibility(scenario, model, command)
 
@@ -103,14 +177,14 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
             )
         result, rows = programme.exact(needed), []
     added = tuple(limit.name for limit in rows)
-    margins = tuple(_margins(model, result))
+    margins = tuple(_margins(model, result.x, result.z, result.u))
     return Solution(scenario, model, command, result.trace, result.u, margins, result.iterations, added)
 
 
-def _margins(model: Model, result: OptimisationResult) -> list[Margin]:
+def _margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> list[Margin]:
     """One Margin per limit: the smallest distance to its nearer side."""
-    n = len(result.u)
-    values = model.evaluate_limits.map(n)(result.x.T, result.z.T, result.u.T, np.tile(model.p_nominal[:, None], (1, n)))
+    n = len(u)
+    values = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
     margins = []
     for limit, value in zip(model.limits, values, strict=True):
         table = value.full().T

@@ -25,6 +25,7 @@ from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.firmware.toolchains import COMPILERS, find_compilers
 from ctrlgen.model.feedforward import SECANT_FRACTION, ControllerStatus
 from ctrlgen.model.model import Model
+from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.numerics.newton import newton_solver
 from ctrlgen.trajectory.solution import Solution
@@ -170,10 +171,16 @@ def _rows(
         if channels and plain.size:
             at_rest = _equilibria(ref, settled[plain])
             span = slice(channels[0], channels[-1] + 1)
+            if (
+                unit == "rad" and real is Real.FLOAT
+            ):  # an axis that turns by degrees has more to round than a platform's tilt
+                limit = max(
+                    limit, ROUNDINGS * float(np.finfo(np.float32).eps) * np.abs(ref.positions[plain][:, span]).max()
+                )
             add(
                 "random targets, online C -> model - target",
                 ref.scenario.file.follow,
-                at_rest - ref.random[plain],
+                at_rest - ref.positions[plain],
                 limit,
                 span,
             )
@@ -182,22 +189,24 @@ def _rows(
         chased = run_host(program, "follow", ref.hostile, width, cold)
         if real is Real.DOUBLE:  # in float the line searches accept other trials, and the states drift apart
             against_casadi("hostile sequence, online C - CasADi", chased, ref.chased, ties=True)
-        what = "hostile sequence -> model: excess over a limit"
-        allowed = EXCESS_LIMIT[real] if m.x.numel() == m.n_states else EXCESS_LIMIT_WITH_MEMORY
-        excess = _excess(m, chased[:, 1 : 1 + n], ref.sample_time, cold[0])
-        rows.append(_row(build, what, "share of its bound", "1", excess, allowed))
+        if not m.inertial:  # where jumping targets take a mass, no drive can decide any more
+            what = "hostile sequence -> model: excess over a limit"
+            allowed = EXCESS_LIMIT[real] if m.x.numel() == m.n_states else EXCESS_LIMIT_WITH_MEMORY
+            excess = _excess(m, chased[:, 1 : 1 + n], ref.sample_time, cold[0])
+            rows.append(_row(build, what, "share of its bound", "1", excess, allowed))
 
     solved, online = ref.solution.drive, followed[:, 1 : 1 + n]
-    limit = 1e-8 * m.u_scale.max()  # ten times IPOPT's own tolerance
-    if real is Real.FLOAT:
-        limit = max(limit, _float_limit(m, "drive", np.abs(solved).max(), ref))
-    add("scenario, online C - IPOPT", "drive", online - solved, limit)
+    if not m.inertial:  # there the solved drives make up for being held, which those of the online C do not
+        limit = 1e-8 * m.u_scale.max()  # ten times IPOPT's own tolerance
+        if real is Real.FLOAT:
+            limit = max(limit, _float_limit(m, "drive", np.abs(solved).max(), ref))
+        add("scenario, online C - IPOPT", "drive", online - solved, limit)
 
     role = ref.scenario.file.follow
     for what, drives in _drive_sets(program, ref, online):
         off = reached(ref, drives, followed) - ref.path
         angle, length = (
-            (ANGLE_LIMIT[real], LENGTH_LIMIT[real])
+            (max(ANGLE_LIMIT[real], ref.held_error), max(LENGTH_LIMIT[real], ref.held_error))
             if what == "online C"
             else (compressed.ANGLE_TOLERANCE, compressed.LENGTH_TOLERANCE)
         )
@@ -211,7 +220,7 @@ def _rows(
         k = np.arange(len(solved))
         played = run_host(program, "sample", k, n)[:, 1:]
         add("player C - its curve", "drive", played - compression.drives(k), near)
-        add("player C - IPOPT", "drive", played - solved, (compression.chosen.drive or 0.0) + near)
+        add(f"player C - {ref.solution.solver}", "drive", played - solved, (compression.chosen.drive or 0.0) + near)
         times = (k[:-1] + 0.75) * ref.sample_time  # a quarter of the way from middle to middle
         quarter = run_host(program, "at", times, n)[:, 1:] - compression.drives(k[:-1], np.full(len(k) - 1, 0.25))
         # the time itself is rounded: that much of the steepest change from sample to sample
@@ -243,7 +252,10 @@ def _equilibria(ref: ReferenceAnswers, answers: np.ndarray) -> np.ndarray:
     states, places = ca.vertsplit(w, [0, len(m.rest), len(scale)])
     at = ca.substitute([scaled], [x, z], [states * m.x_scale + m.rest, places * m.z_scale])[0]
     newton = newton_solver("rest", at, w, u, step_below=1e-12, most_steps=60)
-    roots = newton.map(len(drives))(np.ones((len(scale), len(drives))), drives.T).full().T
+    start = np.ones((len(drives), len(scale)))
+    if m.inertial:  # several displacements may balance one force, as of a pendulum: the one meant
+        start[:, len(m.rest) :] = answers[:, 1 + n : 1 + 2 * n] / m.z_scale
+    roots = newton.map(len(drives))(start.T, drives.T).full().T
     states, displacements = roots[:, : len(m.rest)] * m.x_scale + m.rest, roots[:, len(m.rest) :] * m.z_scale
     return trace(m, np.zeros(len(drives)), states, displacements, drives).signals[ref.scenario.file.follow]
 
@@ -283,6 +295,9 @@ def _float_limit(model: Model, role: str, size: float, ref: ReferenceAnswers) ->
     if role != "drive":
         return ROUNDINGS * eps * size
     n, off = len(model.axes), 1 + ROUNDINGS / 2 * eps
+    if isinstance(ref.controller, MotionController):
+        rounded = (ref.controller.drive_sensitivity(target) for target in ref.command[::37])
+        return max(max(rounded) * ROUNDINGS / 2 * eps, ROUNDINGS * eps * size)
     kernels = ref.controller.moving or ref.controller.static
     worst = 0.0
     for before, row in zip(ref.followed[:-1:37], ref.followed[1::37], strict=False):

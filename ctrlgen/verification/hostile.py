@@ -19,8 +19,9 @@ import numpy as np
 from ctrlgen.firmware.cprint import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import write
-from ctrlgen.model.feedforward import Controller, ControllerStatus
+from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.model import Model
+from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
 
@@ -73,7 +74,7 @@ def check_hostile(
 
 
 def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
-    controller = Controller(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     nominal = controller.nominal
     bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT
     bits |= (ControllerStatus.STATE if nominal.n_states else bits) | (

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import casadi as ca
 import numpy as np
 
-from ctrlgen.model.feedforward import Controller
-from ctrlgen.model.simulation import trace
+from ctrlgen.model.motion_feedforward import controller_of
+from ctrlgen.model.simulation import simulate, trace
+from ctrlgen.trajectory.scenario import motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
@@ -17,7 +20,7 @@ class ReferenceAnswers:
 
     def __init__(self, solution: Solution) -> None:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
-        self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
+        self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
         self.random = self._random_targets()
         self.settled = self._answers(self.random, None)
         self.command, self.path = solution.command, solution.command
@@ -28,7 +31,7 @@ class ReferenceAnswers:
         self.start = (solution.trace.x[0], solution.trace.z[0])
         last = solution.command[:1] if self.scenario.closed else solution.command[-1:]
         self.path = np.vstack([solution.command, last])
-        self.command = self.path[1:]
+        self.command = motion_targets(self.scenario, self.model) if self.model.inertial else self.path[1:]
         self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets()
         self.chased = self._answers(self.hostile, self.controller.rest())
@@ -40,14 +43,24 @@ class ReferenceAnswers:
             raise ValueError(f"{self.scenario.name} is static: its samples are not in time")
         return self.scenario.sample_time
 
+    @cached_property
+    def held_error(self) -> float:
+        """What online drives may leave in the followed signal [SI] because each is held for a sample: twice what those of CasADi leave,
+        with inertia; 0 without."""
+        if not self.model.inertial:
+            return 0.0
+        drives = self.followed[:, 1 : 1 + self.solution.drive.shape[1]]
+        moved = simulate(self.model, drives, self.sample_time, *self.start).signals[self.scenario.file.follow]
+        return 2 * float(np.abs(moved - self.path).max())
+
     @property
     def cancelling(self) -> float:
         """The largest sum [m] of the terms whose difference is the displacement of a random target."""
         kernel, rest = self.controller.static.displacement, self.model.rest
-        target = ca.MX.sym("target", self.random.shape[1])
+        target = ca.MX.sym("target", self.positions.shape[1])
         slope = ca.jacobian(kernel(rest, 0 * self.model.z_scale, target), target)
         size = np.abs(ca.Function("slope", [target], [slope])(0).full())
-        return float(np.max(np.abs(self.random) @ size.T))
+        return float(np.max(np.abs(self.positions) @ size.T))
 
     def _random_targets(self) -> np.ndarray:
         """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""
@@ -61,12 +74,21 @@ class ReferenceAnswers:
         signal = self.scenario.file.follow
         reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
         anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
-        return np.vstack([reachable, anywhere])
+        positions = np.vstack([reachable, anywhere])
+        still = np.zeros((len(positions), len(self.controller.target.channels) - positions.shape[1]))
+        return np.hstack([positions, still])
+
+    @property
+    def positions(self) -> np.ndarray:
+        """The random targets without derivatives, (n, channels)."""
+        return self.random[:, : len(self.model.signals[self.scenario.file.follow].channels)]
 
     def _hostile_targets(self) -> np.ndarray:
         """A sequence of jumps between reachable and absurd targets, with some that are not numbers."""
         rng = np.random.default_rng(21)
         targets = rng.permutation(self.random)[: RANDOM_TARGETS // 8].repeat(2, axis=0)
+        first = self.positions.shape[1]
+        targets[:, first:] = rng.normal(size=targets[:, first:].shape) * self.controller.target.scale[first:]
         targets[::7] *= 10 ** rng.uniform(0, 3, (len(targets[::7]), 1))
         targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
         return targets

@@ -22,9 +22,9 @@ from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.schema import FILE as RECORDING
-from ctrlgen.trajectory.paths import Frame
+from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.scenario import load_scenario
-from ctrlgen.trajectory.solution import INERTIA, check_feasibility
+from ctrlgen.trajectory.solution import check_feasibility, check_motion
 
 
 @app.command()
@@ -66,11 +66,11 @@ def check(
         model = build_model(scenario.device)
         command = scenario.command(model)
         out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
-        if model.inertial:
-            out.print(f"{scenario.device.name} {INERTIA}", markup=False)
-            return
         try:
-            _, needed = check_feasibility(scenario, model, command)
+            if model.inertial:
+                *_, needed = check_motion(scenario, model)
+            else:
+                _, needed = check_feasibility(scenario, model, command)
         except Unreachable as error:
             if scenario.file.outcome == "solved":
                 raise
@@ -79,6 +79,8 @@ def check(
         unsettled = (
             "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
         )
+        if model.inertial:
+            unsettled = "no drive was found in the first place: solve it to know why"
         out.print(
             "the path can be followed within every limit" if needed.exact else unsettled, markup=False, soft_wrap=True
         )
