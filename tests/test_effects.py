@@ -27,7 +27,7 @@ from ctrlgen.effects import Channel, Effect, Param, Place
 from ctrlgen.firmware.cprint import Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.toolchains import FLAGS
-from ctrlgen.model.effect_terms import available, channels
+from ctrlgen.model.effect_terms import available, channels, partner_channels
 
 TESTED = {
     "kind": "tested_axis", "name": "tested", "title": "an axis under test", "source": "round numbers",
@@ -65,8 +65,7 @@ def place_of(effect: type[Effect]) -> tuple[dict, list[Channel]]:
         physics = device.physics(device.values())
         places = channels(physics, effect.place)
         if effect.pairs:
-            others = places if effect.partner_place is None else channels(physics, effect.partner_place)
-            places = [w.paired_with(other) for w in places for other in others]
+            places = [w.paired_with(other) for w in places for other in partner_channels(physics, effect)]
         places = [w for w in places if effect.applies_to(w)]
         if places and effect.requires <= available(physics, SAMPLE_TIME):
             return table, places

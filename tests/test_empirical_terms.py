@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -30,6 +31,10 @@ stroke = "10 mm"
 speed = "100 mm/s"
 force = "60 N"
 """
+PAIR = (
+    'kind = "tested_axes"\nname = "pair"\ntitle = "two axes in a test machine"\nsource = "round numbers"\n'
+    + "".join(f'[[axis]]\nname = "{name}"\n' + TESTED.partition("[mechanics]\n")[2] for name in "ab")
+)
 H, N, NOISE = 1e-2, 1500, 5e-9
 T = H * np.arange(N)
 FIT = 8e-5 * np.sin(2 * np.pi * 0.3 * T) * np.cos(2 * np.pi * 0.043 * T) + 1e-5 * np.sin(2 * np.pi * 1.3 * T)
@@ -69,13 +74,17 @@ def bumps(d: np.ndarray) -> np.ndarray:
     return d + 1e-7 * np.sum(e, axis=0)
 
 
-@cache
-def diagnosed(law, also_held_out: bool = True, laws: tuple[str, ...] = ("sensor_gain",)):
-    device = validate(
+def servo() -> Device:
+    return validate(
         Device.library["servo"],
         {"kind": "servo", "name": "servo", "title": "t", "source": "s", "travel": "100 um"},
         "d",
     )
+
+
+@cache
+def diagnosed(law, also_held_out: bool = True, laws: tuple[str, ...] = ("sensor_gain",)):
+    device = servo()
     readings = law(FIT), law(HELD) if also_held_out else HELD
     return ctrlgen.diagnose(
         device, recording(device, "reading.axis", "um", NOISE, (FIT, HELD), readings), laws=laws, jobs=0
@@ -109,6 +118,42 @@ def test_a_function_that_no_law_reaches_is_written_into_the_device_file_and_pred
 
 def test_a_function_that_the_held_out_record_does_not_show_is_not_written():
     assert diagnosed(bumps, also_held_out=False).empirical_terms == ()
+
+
+def test_where_what_is_left_is_within_the_tolerance_nothing_is_written():
+    device = servo()
+    given = replace(
+        recording(device, "reading.axis", "um", NOISE, (FIT, HELD), (bumps(FIT), bumps(HELD))), tolerance=(1e-6,)
+    )
+    found = ctrlgen.diagnose(device, given, laws=("sensor_gain",), jobs=0)
+    assert found.verdict in ("consistent", "explained") and found.empirical_terms == ()
+
+
+def test_a_wrong_unit_is_not_corrected_by_a_smoother():
+    device = servo()
+    given = recording(device, "reading.axis", "um", NOISE, (FIT, HELD), (1000 * FIT, 1000 * HELD))
+    found = ctrlgen.diagnose(device, given, laws=("coupling",), jobs=0)
+    assert found.verdict == "unexplained" and found.empirical_terms == ()
+
+
+def test_a_channel_that_a_term_does_not_move_has_no_say_in_it_and_a_second_diagnosis_adds_nothing(tmp_path):
+    """Bumps of a scale on the first of two axes, of which the second is exact; then the device that the first answer wrote."""
+    device = device_of(tmp_path, PAIR)
+    rng, parts = np.random.default_rng(0), []
+    for both, role in (((FIT, HELD), "fit"), ((HELD, FIT), "hold_out")):
+        z = 100 * np.column_stack(both)
+        v = np.gradient(z, H, axis=0)
+        a = np.gradient(v, H, axis=0)
+        y = 2 * a + 30 * v + 5e3 * z + 0.02 * rng.standard_normal(z.shape)
+        y[:, 0] += 1e6 * (bumps(both[0]) - both[0])
+        parts.append(record(np.hstack([z, v, a]), y, role, h=H))
+    channels = ("reading.a", "reading.b")
+    given = Recording("t", device.name, "series", channels, ("N", "N"), (0.02, 0.02), tuple(parts), ())
+    first = ctrlgen.diagnose(device, given, laws=("sensor_gain",), jobs=0)
+    (term,) = first.empirical_terms
+    assert (term.effect.at, term.effect.of) == ("a", "a") and term.share > 0.97
+    again = ctrlgen.diagnose(device_of(tmp_path, next_text(first, PAIR)), given, laws=("sensor_gain",), jobs=0)
+    assert again.empirical_terms == ()
 
 
 def test_where_the_laws_leave_noise_nothing_is_written():

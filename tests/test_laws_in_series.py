@@ -70,6 +70,31 @@ def test_a_play_before_a_tested_axis_carries_no_force_while_it_is_crossed():
     assert crossing.sum() > 40 and np.abs(read[crossing]).max() < 2e-3 * 5e3 * 5e-3
 
 
+@pytest.mark.parametrize("rounded", [1e-9, 1e-4])
+def test_a_play_that_touches_carries_the_whole_force_at_rest(rounded):
+    """Pulled 5 mm through a gap of 3 mm and held there, and read in steps of 0.1 mm as an encoder gives: k w all the time."""
+    device = made(TESTED, {"kind": "backlash", "at": "axis", "gap": "3 mm"})
+    z = np.round(np.minimum(2.5e-2 * H * np.arange(60), 5e-3) / rounded) * rounded
+    none = np.zeros_like(z)
+    simulator = Simulator(device, (), ("reading.force",), H)
+    read = simulator.simulate(record(np.column_stack([z, none, none]), none, "fit", h=H), np.zeros(0))[:, 0]
+    held = z > 2e-3
+    wanted = 5e3 * (z - 1.5e-3)[held]
+    assert np.abs(read[held] - wanted).max() < 2e-3 * 17.5  # a thousandth of the motion inside the gap
+
+
+def test_creep_behind_a_tested_axis_is_damped_as_its_own_motion_is():
+    """At a hold the creeping goes on: k d + c d' with d' = g (z - lag)/tau."""
+    device = made(TESTED, {"kind": "creep", "at": "axis", "gain": "2", "tau": "100 ms", "slow": "0"})
+    z = np.full(30, 2e-3)
+    none = np.zeros_like(z)
+    simulator = Simulator(device, (), ("reading.force",), H)
+    read = simulator.simulate(record(np.column_stack([z, none, none]), none, "fit", h=H), np.zeros(0))[:, 0]
+    lag = 2e-3 * (1 - np.exp(-H * np.arange(30) / 0.1))
+    d, speed = 2e-3 + 2 * lag, 2 * (2e-3 - lag) / 0.1
+    assert read == pytest.approx(5e3 * d + 30 * speed - 2 * speed / 0.1, rel=1e-3)
+
+
 def test_a_lever_before_a_tested_axis_takes_force_and_motion_by_its_ratio():
     """d = 1.1 z: the machine feels 1.1 (m 1.1 a + c 1.1 v + k 1.1 z), as energy demands."""
     model = build_model(made(TESTED, {"kind": "lever_ratio", "at": "axis", "gain": "0.1"}))

@@ -603,7 +603,8 @@ def test_a_circular_hinge_is_that_of_its_equations_in_the_plane_and_of_beam_theo
     assert C[1, 4] == pytest.approx(12 * I_0 / (E * b**3), rel=1e-9)
     assert C[5, 4] == C[1, 2] == pytest.approx(-R * 12 * I_0 / (E * b**3), rel=1e-9)
     assert C[5, 2] == pytest.approx(12 * (R**2 * I_0 + I_2) / (E * b**3) + 1.2 * I_0 / (G * b), rel=1e-9)
-    assert C[0, 3] == pytest.approx(3 * I_3 / (G * b), rel=0.03)  # a neck much thinner than wide
+    assert C[0, 3] < min(3 * I_3 / (G * b), 12 * (C[4, 1] - R**2 * alpha) * 1.01 / b**2)  # either way of yielding alone
+    assert C[0, 3] < 0.1 * alpha
     assert dm(c.stiffness)[0, 0] == pytest.approx(1 / (C[4, 1] + 2 * 30e-3 * C[4, 5] + (30e-3) ** 2 * alpha), rel=1e-9)
 
 
@@ -639,6 +640,17 @@ def test_the_rotations_of_hinges_in_a_row_add_up(tmp_path):
     c = Condensed(*with_values(device))
     turns = [dm(c.rotation(k))[0, 0] for k in (0, 1)]
     assert min(turns) > 0 and sum(turns) == pytest.approx(dm(c.twists[device.bodies.index("plate")])[2, 0], rel=1e-9)
+
+
+def test_two_hinges_on_one_line_leave_one_rotation_whichever_way_they_are_drawn(tmp_path):
+    """Their necks stand one above the other at x = 0."""
+    for x, along in ((2, "1, 0, 0"), (-2, "-1, 0, 0")):
+        text = hinged(1.0).replace('"32 mm", "0 mm", "0 mm"', '"30 mm", "0 mm", "0 mm"')
+        first = HINGE.format(name="notch", first="ground", to="plate", x=2, along="1, 0, 0", limit=1.0)
+        assert first in text
+        second = HINGE.format(name="above", first="ground", to="plate", x=x, along=along, limit=1.0)
+        second = second.replace(f'at = ["{x} mm", "0 mm", "0 mm"]', f'at = ["{x} mm", "0 mm", "20 mm"]')
+        assert freedoms(loaded(tmp_path, text.replace(first, first + second))) == (1, 5)
 
 
 def test_a_mirrored_half_is_the_same_as_both_halves_written_out(tmp_path):

@@ -49,7 +49,7 @@ class Material(Section):
     poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
     """Poisson's ratio."""
     stress_limit: Annotated[Quantity, In("MPa", positive=True)] | None = None
-    """Largest stress at the ends of its blades and wires; a limit where it is given."""
+    """Largest stress in its blades, wires and struts and in the necks of its hinges; a limit where it is given."""
 
 
 class Pattern(Section):
@@ -58,7 +58,7 @@ class Pattern(Section):
     name: Name
     """By which they name it; copy k of a body NAME is called NAME_k, from 1."""
     times: Annotated[int, Field(ge=2, le=100)] | None = None
-    """How many there are, the first as written; of a mirror: two."""
+    """How many there are, the first as written; left out for a mirror."""
     angles: tuple[Annotated[Quantity, In("deg")], ...] = ()
     """Angle of each copy; left out: evenly spaced over a turn."""
     mirror: Literal["x", "y", "z"] | None = None
@@ -228,6 +228,7 @@ class Mechanism(Device):
             faults += self._unmoved()
         if faults:
             raise ValueError("; ".join(faults))
+        _ = self.channel_scale  # that of the file: a copy with other numbers keeps it
         return self
 
     def _unmoved(self) -> list[str]:
@@ -327,7 +328,8 @@ class Mechanism(Device):
 
     @cached_property
     def channel_scale(self) -> tuple[float, ...]:
-        """A typical size [rad, m] of each channel that is followed: what all actuators at their travel make of it as described."""
+        """A typical size [rad, m] of each channel that is followed: what all actuators at the largest travel make of it, as the
+        file describes it."""
         reach = np.abs(self._output_motion).sum(axis=1) * max(a.travel.si for a in self.actuator)
         return tuple(float(reach[TWIST.index(c)]) for c in self.output.channels)
 

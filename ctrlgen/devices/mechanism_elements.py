@@ -75,6 +75,10 @@ class Joining(Section):
         """Distance between its ends [m]; None where it says none."""
         return None
 
+    def pivot(self, p: SimpleNamespace) -> Any:
+        """How far from its free end toward the fixed one the point lies at which it holds its ideal directions [m]."""
+        return 0.0
+
     @property
     def thin(self) -> Direction:
         """`across`, or what stands for it."""
@@ -240,16 +244,27 @@ class CircularHinge(Flexible):
         return self
 
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
-        """[C] about the free end (6, 6): in the plane by S2's equations, out of it by beam theory, torsion by the neck's J/I_z."""
+        """[C] about the free end (6, 6): in the plane by S2's equations, out of it by beam theory.
+
+        Torsion by Saint-Venant's stiffness with the neck's J/I_z, and beside it, of a hinge deeper than its neck is long, by strips
+        across the depth that bend with their ends held, b^2/(12 C), C their deflection per force: an estimate, not compared with
+        finite elements.
+        """
         h = self.hinge.geometry(p.hinge, E=m.young, nu=m.poisson)
         plane = self.hinge.planar(p.hinge, E=m.young, nu=m.poisson)
         turn, across, coupled = circular_hinge.out_of_plane(h.R, h.t, h.b, h.E, h.G)
-        twist = plane[2, 2] * h.E / (h.G * flexure.torsion_ratio(h.t, h.b))
+        held = circular_hinge.locked(h.R, h.t, h.b, h.E, h.G)
+        saint_venant = h.G * flexure.torsion_ratio(h.t, h.b) / (h.E * plane[2, 2])
+        twist = 1 / (saint_venant + h.b**2 / (12 * held))
         return _of_entries((twist, turn, plane[2, 2]), (plane[0, 0], plane[1, 1], across), plane[2, 1], coupled)
 
     def reach(self, p: SimpleNamespace) -> Any:
         """Its length 2 R."""
         return 2 * p.hinge.R
+
+    def pivot(self, p: SimpleNamespace) -> Any:
+        """Its neck turns, R from its end."""
+        return p.hinge.R
 
     def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
         """The neck, where bending about z is K = (1 + t/2R)^(9/20) times that of a straight bar.

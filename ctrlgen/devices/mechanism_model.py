@@ -281,7 +281,8 @@ def freedoms(device: Drawing) -> tuple[int, int]:
     yields = [turn[:, None] * ca.DM(ca.evalf(ca.SX(C))).full()[:, swap] * turn for C in c.compliances]
     largest = max(float(np.linalg.eigvalsh((C + C.T) / 2).max()) for C in yields)
     for k, e in enumerate(device.placed_elements):
-        local = inverse_adjoint(c.frames[k], c.ends[k])  # twist in the element's frame, at its free end
+        pivot = c.ends[k] - e.section.pivot(c.p.element[e.index]) * c.frames[k][:, 0]
+        local = inverse_adjoint(c.frames[k], pivot)  # twist in the element's frame
         own = e.section.constrained(yields[k], largest) * turn
         A = np.zeros((len(own), 6 * count))
         held = own @ ca.DM(ca.evalf(ca.SX(local))).full()

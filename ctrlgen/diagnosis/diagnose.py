@@ -40,7 +40,7 @@ from ctrlgen.diagnosis.selection.result import Diagnosis, findings, held_out_err
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import FAILURES
-from ctrlgen.diagnosis.selection.verdict import in_another_unit, verdict
+from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, in_another_unit, verdict
 from ctrlgen.diagnosis.settings import NOISE, NOISE_UPDATE, SIMULATION
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
@@ -94,12 +94,14 @@ def _diagnose(
     tests = run_residual_tests(search.fitter, search.chosen.fit)
     attribution = attribute(search.fitter, search.nominal, search.chosen, seed, jobs)
     detected = (*live.findings, *directly_detected_findings(search, effects))
-    answer = verdict(search, tests, attribution, bool(detected), in_another_unit(search))
+    unit_is_wrong = in_another_unit(search)
+    answer = verdict(search, tests, attribution, bool(detected), unit_is_wrong)
     step("supporting analyses")
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
-    left, failed = _empirical_terms(search, tests.passed, shares)
+    enough = unit_is_wrong or answer in (CONSISTENT, EXPLAINED)
+    left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed, *failed)
     return Diagnosis(
@@ -122,11 +124,9 @@ def _diagnose(
 
 
 def _empirical_terms(
-    search: SearchResult, explained: bool, shares: ResidualShares | None
+    search: SearchResult, shares: ResidualShares | None
 ) -> tuple[tuple[EmpiricalTerm, ...], tuple[str, ...]]:
     """Smoothers of what is left, and a note where they cannot be had: no finding depends on them."""
-    if explained:
-        return (), ()
     try:
         return empirical_terms(search.fitter, search.chosen.fit, shares), ()
     except FAILURES as error:

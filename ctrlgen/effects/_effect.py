@@ -32,7 +32,8 @@ class Effect:
 
     value, rate [1/s], second_rate [1/s^2]: the signal of this channel, before the effects of the same order at this place, and
         its derivatives; rate and second_rate are None where the motion does not give them, second_rate is for `update` only
-    all, index, partner: that signal for every channel as a vector, the index of this channel, and that of the other of a pair
+    all, index, partner: that signal for every channel as a vector, the index of this channel, and that of the other of a pair (at
+        `partner_place`, where the law names one)
     scale, travel: typical sizes of the signal and of the stage displacement
     the effect's own states, by name
     ambient [K]: rise of the surroundings' temperature; sample_time [s]

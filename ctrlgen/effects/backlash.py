@@ -6,12 +6,15 @@ from ctrlgen.effects import Effect, Param, Place, State
 from ctrlgen.effects._play_operators import beginning
 from ctrlgen.effects._reversal_points import reversal_point
 
+TOUCH = 1e-9  # typical travels from a side of the gap that count as touching it: at rest the sides stay in contact
+
 
 class Backlash(Effect):
     """w = max(min(w, d + b/2), d - b/2), Delta d = 0.999 (w - d): the driven side stands still until b is crossed.
 
     The gap is entered where the motion reversed, also between two samples. Inside the gap a thousandth of the motion is
-    transmitted, so that an inverse exists. Holds where friction keeps the driven side at rest inside the gap.
+    transmitted, so that an inverse exists. Holds where friction keeps the driven side at rest inside the gap; a driven side that a
+    spring pulls back follows the flank instead.
     """
 
     place = Place.DISPLACEMENT
@@ -29,8 +32,9 @@ class Backlash(Effect):
         return 0.999 * (s.w + beginning(s, p.gap / 2) - s.displacement)
 
     def update(self, s, p):
-        first = beginning(s, p.gap / 2)
+        first, touch = beginning(s, p.gap / 2), TOUCH * s.travel
         w = s.w + first
         for d in (reversal_point(s, s.d, s.v), s.displacement):
-            w = ca.fmax(ca.fmin(w, d + p.gap / 2), d - p.gap / 2)
+            low, high = d - p.gap / 2, d + p.gap / 2
+            w = ca.if_else(w > high - touch, high, ca.if_else(w < low + touch, low, w))
         return {"w": w - first, "d": s.displacement, "v": 0 if s.velocity is None else s.velocity}

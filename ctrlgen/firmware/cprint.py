@@ -115,7 +115,7 @@ def print_function(
     results += [(i, real.literal(0.0)) for i in range(function.size1_out(0)) if i not in written]
     lines = _read(printer.lines, [f"    result[{i}] = {text};" for i, text in sorted(results)])
     body = "\n".join(lines)
-    arguments = tuple(name for name in function.name_in() if f"{name}[" in body)
+    arguments = tuple(name for name in function.name_in() if re.search(rf"\b{name}\[", body))
     parameters = ", ".join(
         [
             *(f"const {real.value} {a}[{function.size1_in(a)}]" for a in arguments),

@@ -233,15 +233,18 @@ def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) 
 def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
     """Motion imposed, force read: the displacements are the first components of the drive.
 
-    What stands behind the displacement effects moves by d(z) with d' = J v, J = dd/dz; by virtual work its force F takes J' F of
-    the machine: none while a play is crossed.
+    What stands behind the displacement effects moves by d(z, m), m their memories, with d' = J v + (dd/dm) m', J = dd/dz; by virtual
+    work its force F takes J' F of the machine: none while a play is crossed.
     """
     n = len(physics.axes)
     drive = terms.added(Place.DRIVE, physics.drive.expr)
     v, a = drive[n : 2 * n], drive[2 * n :]
     displacement = terms.added(Place.DISPLACEMENT, z)
-    velocity = ca.jtimes(displacement, z, v)
-    acceleration = ca.jtimes(displacement, z, a) + ca.jtimes(velocity, z, v)
+    carried = [m for m in terms.members if m.effect.place is Place.DISPLACEMENT]
+    memories = [(m.states[s.name], m.rates[s.name]) for m in carried for s in m.effect.states if not s.stepped]
+    memory, rate = (ca.vertcat(NONE, *part) for part in (zip(*memories, strict=True) if memories else ((), ())))
+    velocity = ca.jtimes(displacement, z, v) + ca.jtimes(displacement, memory, rate)
+    acceleration = ca.jtimes(displacement, z, a) + ca.jtimes(velocity, z, v) + ca.jtimes(velocity, memory, rate)
     motion = ca.vertcat(displacement, velocity, acceleration)
     behind = physics.force(motion, displacement) + physics.restoring_force(displacement)
     needed = ca.jtimes(displacement, z, behind, True)

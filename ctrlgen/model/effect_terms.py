@@ -95,7 +95,7 @@ class EffectTerms:
         chosen = range(len(names)) if effect.at == "all" else [i for i, c in enumerate(names) if c == effect.at]
         if not chosen:
             self.faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(names)}, all"))
-        partners = places if effect.partner_place is None else channels(self.physics, effect.partner_place)
+        partners = partner_channels(self.physics, effect)
         others = [channel.name for channel in partners]
         if effect.of is not None and effect.of not in others:
             self.faults.append(Fault(f"effect[{k}].of", f"{effect.of!r} is not one of {', '.join(others)}"))
@@ -156,7 +156,7 @@ class EffectTerms:
         s.rate = s.second_rate = None
         if at_platform and isinstance(self.physics, InertialPhysics):
             z, v = self.displacement, self.velocity
-            s.rate = ca.jtimes(s.value, z, v)
+            s.rate = ca.jtimes(s.value, z, v) + ca.jtimes(s.value, v, self.acceleration)
             s.second_rate = ca.jtimes(s.rate, z, v) + ca.jtimes(s.rate, v, self.acceleration)
         channel = channels(self.physics, place)[s.index]
         s.scale, s.travel = channel.scale, channel.travel_scale
@@ -212,6 +212,11 @@ def channels(physics: DevicePhysics, place: Place) -> list[Channel]:
         }[place]
         rows = ((axis, unit, scale) for axis in physics.axes)
     return [Channel(*row, physics.travel_unit, physics.displacement_scale) for row in rows]
+
+
+def partner_channels(physics: DevicePhysics, law: Effect | type[Effect]) -> list[Channel]:
+    """The channels that may be the other one, `of`, of a law of pairs."""
+    return channels(physics, law.partner_place or law.place)
 
 
 def available(physics: DevicePhysics, sample_time: float | None = None) -> frozenset[str]:

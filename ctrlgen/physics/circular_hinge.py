@@ -274,3 +274,8 @@ def out_of_plane(R: Scalar, t: Scalar, b: Scalar, E: Scalar, G: Scalar) -> tuple
     I_2 = R**2 / 2 * (gamma * (2 + ca.pi * gamma - 4 * k**0.5 * A) - ca.pi / 2)
     turn = 12 * I_0 / (E * b**3)
     return turn, 12 * (R**2 * I_0 + I_2) / (E * b**3) + 6 / 5 * I_0 / (G * b), -R * turn
+
+
+def locked(R: Scalar, t: Scalar, b: Scalar, E: Scalar, G: Scalar) -> Scalar:
+    """delta_y/F_y with the rotation of the end locked: C.2 - R^2 C.1, and the shear of C.4 with the factor 6/5."""
+    return c2(R, t, b, E) - R**2 * c1(R, t, b, E) + 6 / 5 * c4(R, t, b, G)

@@ -27,7 +27,7 @@ from ctrlgen.diagnosis.hypotheses.hypotheses import (
 from ctrlgen.diagnosis.settings import FIT
 from ctrlgen.effects import Channel, Param
 from ctrlgen.model.assembly import movable
-from ctrlgen.model.effect_terms import channels
+from ctrlgen.model.effect_terms import channels, partner_channels
 from ctrlgen.recordings.recording import Recording, Timing
 
 
@@ -124,8 +124,7 @@ class Structure:
         own = next(iter(every.values())) if cause.at == "all" else every[cause.at]
         if cause.of is None:
             return own
-        others = every if law.partner_place is None else {c.name: c for c in channels(physics, law.partner_place)}
-        return own.paired_with(others[cause.of])
+        return own.paired_with(next(c for c in partner_channels(physics, law) if c.name == cause.of))
 
     @cached_property
     def device_with_causes(self) -> Device:

@@ -15,7 +15,7 @@ from ctrlgen.devices.base import Section
 from ctrlgen.diagnosis.hypotheses.priors import DEFAULT, LawPrior, prior_of
 from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Channel, Effect, Param, Place
-from ctrlgen.model.effect_terms import available, channels
+from ctrlgen.model.effect_terms import available, channels, partner_channels
 
 DOMAIN = {
     Place.DRIVE: "actuator", Place.HEAT: "actuator", Place.FORCE: "stage", Place.DISPLACEMENT: "stage",
@@ -169,7 +169,7 @@ def _of_law(
         places = [channel for channel in places if channel.name in seen]
     if law.pairs:
         for k, channel in enumerate(places):
-            for j, other in enumerate(channels(physics, law.place)):
+            for j, other in enumerate(partner_channels(physics, law)):
                 if law.applies_to(channel.paired_with(other)) and not (law.symmetric and j < k):
                     yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, other.name, highest=highest)
         return

@@ -276,8 +276,8 @@ def refusals(diagnosis: Diagnosis) -> list[str]:
 def empirical_sentences(diagnosis: Diagnosis) -> list[str]:
     """Of every empirical term what it is a function of, how much it takes away, and that it names no cause."""
     return [
-        f"Beside the findings device.next.toml holds an empirical term, {t.effect.kind} at {t.effect.at} of {t.effect.of}: a function of "
-        f"{FUNCTIONS[t.effect.kind]} takes away {100 * t.share:.0f} % of what is left in {short(t.channel)} on the held-out records "
+        f"device.next.toml also holds an empirical term ({t.effect.kind}): a function of {FUNCTIONS[t.effect.kind]} of axis {t.effect.of}, "
+        f"added to {t.effect.at}, takes away {100 * t.share:.0f} % of what is left in {short(t.channel)} on the held-out records "
         f"({number(t.rms_before, 3)} -> {number(t.rms_after, 3)} {t.unit}). It names no cause and holds inside the recorded range."
         for t in diagnosis.empirical_terms
     ]

@@ -2,7 +2,7 @@
 
 Parameters change in place and keep their comments; each states the source of its new value and its old value. Effects are
 appended under a comment with the recording, the verdict and the held-out errors. The file gives the model that the chosen
-fit predicts with.
+fit predicts with, and beside it the empirical terms, whose own errors the comment tells.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
             document["effect"].append(_inline(table))
         effects = []
     text = document.as_string().rstrip("\n") + "\n"
-    if changed or effects or diagnosis.findings:
+    if changed or effects or diagnosis.findings or diagnosis.empirical_terms:
         text += "\n" + _header(diagnosis, changed)
     return text + "".join(_table(table) for table in effects)
 

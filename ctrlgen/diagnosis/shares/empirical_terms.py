@@ -122,6 +122,8 @@ def _axis(table: SharesTable, channel: ChannelShares, kind: Kind) -> str | None:
     named = {Kind.DRIVE: Kind.POSITION, Kind.DRIVE_HISTORY: Kind.TRAVEL_HISTORY}.get(kind, kind)
     left: dict[str, float] = {}
     for block in table.design.of_kind(named, channel.own):
+        if kind is Kind.OTHER_AXIS and block.kind is not Kind.POSITION:
+            continue
         X = np.column_stack([np.ones(usable.sum()), block.values[usable]])
         rest = y[usable] - X @ np.linalg.lstsq(X, y[usable], rcond=1e-8)[0]
         for axis in block.axes:
@@ -134,9 +136,11 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
     records = fitter.fit_records
     begun = [fitter.begun(fit, r) for r in records]
     e = [np.where(r.valid, r.observed - read, 0.0) for r, (_, read) in zip(records, begun, strict=True)]
-    y = np.nan_to_num(
+    whole = np.nan_to_num(
         np.concatenate([fitter.error.whiten(v, r.valid).ravel() for v, r in zip(e, records, strict=True)])
     )
+    corner = np.concatenate([np.tile(fitter.error.corner, len(r.valid)) for r in records])
+    trust = np.minimum(1.0, corner / np.maximum(np.abs(whole), 1e-300))  # as in a fit, spikes bend nothing
     best, least = fit, np.inf
     for numbers in smoother.trials:
         structure = fit.restarted.with_cause(smoother.cause, numbers)
@@ -151,7 +155,8 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
             fitter.error.whiten(Y, r.valid).reshape(-1, len(weights)) for Y, r in zip(slopes, records, strict=True)
         ]
         X = np.nan_to_num(np.vstack(white))
-        c, left = ridge_regression(X, y)
+        seen = np.abs(X).max(axis=1) > 0  # channels and samples that the term moves
+        c, left = ridge_regression(trust[seen, None] * X[seen], trust[seen] * whole[seen])
         if left < least:
             theta[weights] = np.clip(c, [free[k].low for k in weights], [free[k].high for k in weights])
             found = fit.restarted.with_cause(smoother.cause, numbers | {free[k].name: float(theta[k]) for k in weights})
@@ -165,8 +170,8 @@ def ridge_regression(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
 
         V = |y - X c|^2/(1 - tr H/N)^2,  H = X (X'X + lambda)^-1 X',
 
-    N = |y|^2 the independent samples, as y is whitened. G. H. Golub, M. Heath, G. Wahba, Technometrics 21 (1979) 215: generalised
-    cross-validation.
+    N = |y|^2 the independent samples, as far as y is whitened rightly. G. H. Golub, M. Heath, G. Wahba, Technometrics 21 (1979)
+    215: generalised cross-validation.
     """
     values, V = np.linalg.eigh(X.T @ X)
     values, b, best = np.maximum(values, 0.0), V.T @ (X.T @ y), (np.zeros(X.shape[1]), np.inf)
