@@ -19,7 +19,7 @@ def test_cmake_builds_tests_and_installs(packages, cmake, cpp, tmp_path):
     c = packages["circle20"]
     run(cmake, "-S", c.path, "-B", tmp_path / "b", f"-DCMAKE_INSTALL_PREFIX={tmp_path / 'usr'}")
     run(cmake, "--build", tmp_path / "b")
-    assert "100% tests passed, 0 tests failed out of 2" in run("ctest", "--test-dir", tmp_path / "b")
+    assert re.search(r"100% tests passed.* out of 2\b", run("ctest", "--test-dir", tmp_path / "b"))
     run(cmake, "--install", tmp_path / "b")
     (tmp_path / "p").mkdir()
     (tmp_path / "p" / "main.c").write_text(everything({"circle20": c}))
@@ -45,7 +45,7 @@ def test_two_packages_are_subdirectories_of_one_cpp_project(packages, cmake, cpp
     )
     run(cmake, "-S", tmp_path, "-B", tmp_path / "b")
     run(cmake, "--build", tmp_path / "b")
-    assert "100% tests passed, 0 tests failed out of 1" in run("ctest", "--test-dir", tmp_path / "b")
+    assert re.search(r"100% tests passed.* out of 1\b", run("ctest", "--test-dir", tmp_path / "b"))
 
 
 ZEPHYR = """cmake_minimum_required(VERSION 3.16)
