@@ -14,7 +14,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.feedforward import Controller

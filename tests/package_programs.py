@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
 
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")

@@ -16,7 +16,8 @@ import pytest
 from conftest import ROOT, SCENARIOS
 
 from ctrlgen import Controller, CtrlgenError, __version__, build_model, load_scenario
-from ctrlgen.firmware.cprint import Real, print_function
+from ctrlgen.firmware.cprint import print_function
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.fmu import write_fmus
 from ctrlgen.firmware.folder import generate, write_harness

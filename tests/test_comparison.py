@@ -8,7 +8,7 @@ import pytest
 
 from ctrlgen import ToolError
 from ctrlgen.firmware import toolchains
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import generate
 from ctrlgen.verification.comparison import compare
 

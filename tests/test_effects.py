@@ -24,7 +24,8 @@ from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.hypotheses.priors import prior_of
 from ctrlgen.effects import Channel, Effect, Param, Place
-from ctrlgen.firmware.cprint import Real, print_function
+from ctrlgen.firmware.cprint import print_function
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model.effect_terms import available, channels, partner_channels

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from ctrlgen.firmware import elementary
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import TURN_END, TURNS, elementary_text, polynomial
 from ctrlgen.firmware.toolchains import COMPILERS, FLAGS
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers

@@ -14,7 +14,7 @@ import pytest
 from conftest import AXIS_FILE, SCENARIOS, effect_device
 
 from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.fmu import write_fmus
 from ctrlgen.firmware.plant import plant_of, write_plant

@@ -11,7 +11,7 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import ToolError, build_model, generate, load_scenario, solve
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.reporting.build_record import BUDGETS
 from ctrlgen.verification import cores, emulation, in_loop

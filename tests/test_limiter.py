@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from ctrlgen import Controller, ControllerStatus
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.toolchains import FLAGS

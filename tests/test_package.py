@@ -12,7 +12,7 @@ from conftest import SCENARIOS
 from package_programs import STRICT, everything, run
 
 from ctrlgen import InputError, build_model, generate, load_scenario
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.package import verify_package
 from ctrlgen.reporting.plots import draw_all

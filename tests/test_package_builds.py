@@ -9,7 +9,7 @@ import pytest
 from package_programs import STRICT, everything, run
 
 from ctrlgen import __version__
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 
 SEMANTIC = re.compile(r"(0|[1-9]\d*)\.(0|[1-9]\d*)\.(0|[1-9]\d*)(-[0-9A-Za-z.-]+)?(\+[0-9A-Za-z.-]+)?")
 

@@ -14,7 +14,8 @@ import pytest
 from conftest import SCENARIOS, effect_device
 
 from ctrlgen import Controller, build_model, load_scenario
-from ctrlgen.firmware.cprint import Real, print_function
+from ctrlgen.firmware.cprint import print_function
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.folder import CFolder, generate, write_harness

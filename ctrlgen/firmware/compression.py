@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.core.units import same_dimension
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.spline import Spline, fit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import render
 
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899")

@@ -22,7 +22,7 @@ import numpy as np
 from ctrlgen.core.errors import CtrlgenError, Fault, InputError, ToolError
 from ctrlgen.core.files import whole_folder, write_bytes
 from ctrlgen.core.units import base_unit, exponents, from_si
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.fmi_calls import FOREIGN_TYPES, REFUSED_2, REFUSED_3
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.plant import Plant, plant_of, write_plant

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ctrlgen.firmware.compression import Compression, compress
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.deviations import deviations_context
 from ctrlgen.firmware.misra import CPPCHECK
 from ctrlgen.firmware.online import online_context

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.units import base_unit, show
-from ctrlgen.firmware.cprint import Kernel, Real, print_function
+from ctrlgen.firmware.cprint import Kernel, print_function
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
 from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller

@@ -14,7 +14,7 @@ from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices.base import Signal
 from ctrlgen.firmware.compression import Candidate
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, commit

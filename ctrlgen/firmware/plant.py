@@ -20,7 +20,8 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
-from ctrlgen.firmware.cprint import Kernel, Real, print_function
+from ctrlgen.firmware.cprint import Kernel, print_function
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.model.assembly import build_model

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 
 DENSE = 400  # samples of a piece up to which the dense solver is as fast; it also takes rank-deficient fits
 AT_LIMIT = 1e-6  # of a drive's range: nearer to a bound the drive counts as at the bound (IPOPT stays 1e-8 away)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.firmware.compression import Compression
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.online import FLOAT_SLACK
 from ctrlgen.model.feedforward import Controller, ControllerStatus
 

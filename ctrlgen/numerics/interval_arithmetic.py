@@ -6,7 +6,7 @@ division by an interval that contains zero give (-inf, inf). Source: R. E. Moore
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 
 import casadi as ca
@@ -68,6 +68,14 @@ _RULES: dict[int, Callable[..., Interval]] = {
 }
 
 
+def interval_of(operation: int, operands: Sequence[Interval]) -> Interval:
+    """The interval of one CasADi `operation` (such as `ca.OP_ADD`) on operands that lie in those given."""
+    rule = _RULES.get(operation, lambda *_: UNBOUNDED)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        value = rule(*operands)
+    return UNBOUNDED if np.isnan(value).any() else value
+
+
 def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> list[Interval]:
     """The interval of every instruction of an SX `function`, in their order.
 
@@ -86,10 +94,7 @@ def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.n
         elif op == ca.OP_CONST:
             value = (function.instruction_constant(k),) * 2
         else:
-            rule = _RULES.get(op, lambda *_: UNBOUNDED)
-            with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                value = rule(*(at[i] for i in inputs))
-            value = UNBOUNDED if np.isnan(value).any() else value
+            value = interval_of(op, [at[i] for i in inputs])
         found.append(value)
         if op != ca.OP_OUTPUT:
             at[outputs[0]] = value

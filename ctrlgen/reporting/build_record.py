@@ -10,7 +10,7 @@ import numpy as np
 
 from ctrlgen.core.units import base_unit, from_si, show
 from ctrlgen.firmware.compression import INSTRUCTION_BUDGET
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.motion_feedforward import controller_of

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import write
 from ctrlgen.model.feedforward import ControllerStatus

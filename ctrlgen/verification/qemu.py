@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.templates import write
 from ctrlgen.verification.check import Check, CheckFinding, finished, not_run, run_tool, version_of

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.misra import CPPCHECK, rule_class

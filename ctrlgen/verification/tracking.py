@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.verification.host import Host
