@@ -1,89 +1,28 @@
-"""A CasADi SX function as C99, in double or in true single precision.
+"""CasADi SX functions as C99, in double or in true single precision, in the form in which an engineer would have written them.
 
-CasADi's own generator computes in double whatever `casadi_real` is (constants, `sqrt`); this
-printer writes every constant and every call in the chosen type, stores all outputs last (so
-that an output may be the same array as an input), and passes only the arguments that are read.
-
-Square roots need no library: where the range of the argument is known (`intervals`) and narrow, they are a straight
-line and a few of Heron's steps, y <- (y + a/y)/2, elsewhere a call of `root`. Powers with a
-constant whole or half exponent are products and roots. The other functions are called by the names that `elementary` has
-them under.
+CasADi's own generator writes one line an operation and computes in double whatever `casadi_real` is. This printer writes every
+constant and every call in the chosen type. Rows of a result that differ in numbers only, as those of equal axes do, are one loop,
+their numbers tables; linear combinations are rows of a matrix; what several rows need is computed once, before them. Functions
+are called by the names that `ctrlgen.firmware.elementary` has them under.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from enum import Enum
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.core.errors import CtrlgenError
-from ctrlgen.numerics.interval_arithmetic import UNBOUNDED, Interval, intervals, product_of, quotient_of
+from ctrlgen.firmware.c_expression import PLACE, SCALAR, Linear, Text, text_of
+from ctrlgen.firmware.expression_graph import Graph, Node, reached
+from ctrlgen.firmware.real import Real
 
-
-class Real(Enum):
-    """The arithmetic of the generated C."""
-
-    DOUBLE = "double"
-    FLOAT = "float"
-
-    @property
-    def suffix(self) -> str:
-        """Name suffix of files and functions."""
-        return "f64" if self is Real.DOUBLE else "f32"
-
-    @property
-    def bytes(self) -> int:
-        """Size of a number."""
-        return 8 if self is Real.DOUBLE else 4
-
-    @property
-    def epsilon(self) -> float:
-        """Distance from one to the next number."""
-        return float(np.finfo(np.float64 if self is Real.DOUBLE else np.float32).eps)
-
-    def literal(self, value: float) -> str:
-        """The shortest decimal that reads back as the same number of this type."""
-        if not math.isfinite(value):
-            raise CtrlgenError(f"the constant {value} cannot be written as C")
-        if self is Real.DOUBLE:
-            text = repr(float(value))
-        else:
-            with np.errstate(over="ignore", under="ignore"):
-                single = np.float32(value)
-            if not np.isfinite(single) or (value != 0 and abs(single) < np.finfo(np.float32).tiny):
-                raise CtrlgenError(
-                    f"the constant {value:g} does not fit a float; rescale the model or export double only"
-                )
-            text = str(single)
-        if "." not in text and "e" not in text:
-            text += ".0"
-        return text + ("f" if self is Real.FLOAT else "")
-
-
-WIDER = 0.01  # than the range: arguments may leave it by rounding
-MOST_STEPS = {
-    Real.DOUBLE: 4,
-    Real.FLOAT: 3,
-}  # of Heron's method from a linear start; with more, calling `root` is as cheap
-MOST_FACTORS = 64  # largest whole exponent that is printed as products
-TRUSTED = 1e15  # products between 1/TRUSTED and TRUSTED neither overflow nor underflow a float
-PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
-_OPERATOR = re.compile(r" (?:[-+*/<>?]|<=|==|!=|&&|\|\|) |\(-[a-z]|[a-z]\w*\(")
-
-_NAME = re.compile(r"\bt\d\w*")
-_BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
-_COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-_CALLS = {  # of `elementary`
-    ca.OP_EXP: "exponential", ca.OP_LOG: "logarithm", ca.OP_SIN: "sine", ca.OP_COS: "cosine", ca.OP_TAN: "tangent",
-    ca.OP_ASIN: "arcsine", ca.OP_ACOS: "arccosine", ca.OP_ATAN: "arctangent", ca.OP_ATAN2: "arctangent2",
-    ca.OP_TANH: "hyperbolic_tangent", ca.OP_SINH: "hyperbolic_sine", ca.OP_COSH: "hyperbolic_cosine",
-    ca.OP_POW: "power", ca.OP_CONSTPOW: "power", ca.OP_FLOOR: "whole_below", ca.OP_CEIL: "whole_above",
-}  # fmt: skip
+Ranges = Mapping[str, tuple[np.ndarray, np.ndarray]]
+WIDTH = 120  # columns of a line of C
+DIVISORS = (1, 2, 3, 4, 6)  # of a loop's index, where several rows read the same element
 
 
 @dataclass(frozen=True)
@@ -101,278 +40,349 @@ class Kernel:
         return f"{self.name}({', '.join([*(values[a] for a in self.arguments), result])})"
 
 
-def print_function(
-    function: ca.Function, name: str, real: Real, ranges: Mapping[str, tuple[np.ndarray, np.ndarray]] | None = None
-) -> Kernel:
-    """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter.
+def print_function(function: ca.Function, name: str, real: Real, ranges: Ranges | None = None) -> Kernel:
+    """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter, which may be an argument too.
 
     `ranges`: low and high of the arguments, where they are known. Raises CtrlgenError for an operation C has no
     counterpart of.
     """
-    printer = _Printer(function, real, ranges or {})
-    results = printer.run()
-    written = {i for i, _ in results}
-    results += [(i, real.literal(0.0)) for i in range(function.size1_out(0)) if i not in written]
-    lines = _read(printer.lines, [f"    result[{i}] = {text};" for i, text in sorted(results)])
-    body = "\n".join(lines)
-    arguments = tuple(name for name in function.name_in() if re.search(rf"\b{name}\[", body))
-    parameters = ", ".join(
-        [
-            *(f"const {real.value} {a}[{function.size1_in(a)}]" for a in arguments),
-            f"{real.value} result[{function.size1_out(0)}]",
-        ]
-    )
-    text = f"static void {name}({parameters})\n{{\n{body}\n}}\n"
-    operations = len(_OPERATOR.findall(body))
-    return Kernel(
-        name, text, arguments, operations, frozenset(c for c in printer.calls if re.search(rf"\b{c}\(", body))
-    )
+    return Printer(real, ranges or {}).kernel(function, name, may_be_result=function.name_in())
 
 
-def _read(lines: list[str], results: list[str]) -> list[str]:
-    """The lines that a result needs, and the results: what turned out to be a constant leaves operands that nothing reads."""
-    kept, read = results[::-1], {word for line in results for word in _NAME.findall(line)}
-    for line in reversed(lines):
-        name, *operands = _NAME.findall(line)
-        if name in read:
-            read.update(operands)
-            kept.append(line)
-    return kept[::-1]
+@dataclass
+class Printer:
+    """Prints the functions of one file. `ranges`: low and high of arguments by name; `numbers`: value and formula of each element of
+    the arguments that are constants of the device."""
 
+    real: Real
+    ranges: Ranges
+    numbers: Mapping[str, Sequence[tuple[float, str]]] = field(default_factory=dict)
 
-@dataclass(frozen=True)
-class _Value:
-    """`factor` times the C operand `text`, which lies `within`; a number of its own has `text` "1"."""
-
-    text: str
-    factor: float
-    within: Interval
+    def __post_init__(self) -> None:
+        self._graph = Graph()
+        self._constants = _Constants(self.real)
 
     @property
-    def number(self) -> bool:
-        return self.text == "1"
+    def constants(self) -> str:
+        """The named constants of all kernels so far, one line each with its formula."""
+        return self._constants.text()
 
-    def scaled(self, factor: float) -> _Value:
-        return replace(self, factor=self.factor * factor)
+    def kernel(
+        self, function: ca.Function, name: str, about: str = "", may_be_result: Sequence[str] = (), steps: tuple[str, int] | None = None
+    ) -> Kernel:  # fmt: skip
+        """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter.
+
+        `about`: its comment. `may_be_result`: arguments that a caller may give as the result too. With `steps` (argument, count) the
+        function is one step of an iteration on that argument, and the printed one takes `count` of them. Raises CtrlgenError for an
+        operation C has no counterpart of.
+        """
+        stepped = f"{name}_step" if steps else name
+        rows = self._graph.rows(function, self.ranges, self.numbers)
+        body = _Body(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result).run()
+        lines = "\n".join(body.lines)
+        arguments = tuple(a for a in function.name_in() if re.search(rf"\b{a}\[", lines))
+        size, T = function.size1_out(0), self.real.value
+        sizes = {a: function.size1_in(a) for a in arguments}
+        text = _function(stepped, "" if steps else about, sizes, size, body.lines, T)
+        operations = body.operations
+        if steps:
+            argument, count = steps
+            arguments = tuple(a for a in function.name_in() if a in arguments or a == argument)
+            call = ", ".join("result" if a == argument else a for a in arguments if a in sizes)
+            lines = [
+                "int i;", "int step;", f"for (i = 0; i < {size}; i++) {{", f"    result[i] = {argument}[i];", "}",
+                f"for (step = 0; step < {count}; step++) {{", f"    {stepped}({call}, result);", "}",
+            ]  # fmt: skip
+            text = f"/* {about} */\n" * bool(about) + text
+            text += "\n" + _function(name, "", {a: function.size1_in(a) for a in arguments}, size, lines, T)
+            operations *= count
+        return Kernel(name, text, arguments, operations, body.calls)
 
 
-class _Printer:
-    """Walks a function's instructions. Numbers that multiply are gathered: (c x) (d y) is printed as (c d) (x y), where the
-    ranges say that x y neither overflows nor vanishes without them."""
+def _function(name: str, about: str, arguments: Mapping[str, int], size: int, lines: Sequence[str], T: str) -> str:
+    parameters = ", ".join([*(f"const {T} {a}[{n}]" for a, n in arguments.items()), f"{T} result[{size}]"])
+    comment = f"/* {about} */\n" if about else ""
+    return f"{comment}static void {name}({parameters})\n{{\n{_indented(lines)}\n}}\n"
 
-    def __init__(self, function: ca.Function, real: Real, ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
-        self.function, self.real = function, real
-        self.between, self.uses = intervals(function, ranges), _uses(function)
+
+def _indented(lines: Sequence[str]) -> str:
+    wrapped = []
+    for line in lines:
+        inner = len(line) - len(line.lstrip()) + 4
+        wrapped += textwrap.wrap(
+            line.strip(), WIDTH, initial_indent=" " * inner, subsequent_indent=" " * (inner + 4), break_long_words=False,
+            break_on_hyphens=False,
+        )  # fmt: skip
+    return "\n".join(wrapped)
+
+
+class _Body:
+    """The lines of one function."""
+
+    def __init__(
+        self, rows: Sequence[Node], real: Real, named: Callable[[Node], str], may_be_result: Sequence[str]
+    ) -> None:
+        self.rows, self.real, self.named, self.may_be_result = list(rows), real, named, set(may_be_result)
+        self.ends: dict[int, Node] = {}
         self.lines: list[str] = []
-        self.calls: set[str] = set()
+        self.tables: dict[str, str] = {}  # name by C initialiser
+        self.declared: list[str] = []
+        self.locals = self.parts = self.operations = 0
+        self.calls: frozenset[str] = frozenset()
+        self.loops = False
 
-    def run(self) -> list[tuple[int, str]]:
-        """Row and C operand of every result; the lines before them are in `lines`."""
-        f, at, results = self.function, dict[int, _Value](), list[tuple[int, str]]()
-        for k in range(f.n_instructions()):
-            op, inputs, outputs = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
-            if op == ca.OP_INPUT:
-                text = f"{f.name_in(inputs[0])}[{_dense(f.sparsity_in(inputs[0]), inputs[1])}]"
-                at[outputs[0]] = _Value(text, 1.0, self.between[k])
-            elif op == ca.OP_OUTPUT:
-                text = self._operand(at[inputs[0]])
-                if "[" in text:  # read before any result is stored
-                    text = self._named(k, text, self.between[k]).text
-                results.append((_dense(f.sparsity_out(0), outputs[1]), text))
-            elif op == ca.OP_CONST:
-                at[outputs[0]] = _Value("1", f.instruction_constant(k), (1.0, 1.0))
+    def run(self) -> _Body:
+        linear = Linear({})
+        shared = _shared(self.rows, linear)
+        for level in _levels(shared):
+            self._store(level)
+        result = "result"
+        if self._reads_elsewhere():
+            result = "next"
+            self.declared.append(f"{self.real.value} next[{len(self.rows)}];")
+        self._results(result)
+        if result == "next":
+            self.loops = True
+            self.lines += [f"for (i = 0; i < {len(self.rows)}; i++) {{", "    result[i] = next[i];", "}"]
+        tables = [
+            f"static const {self.real.value} {name}{head} = {values};"
+            for (head, values), name in ((k.split("|"), n) for k, n in self.tables.items())
+        ]
+        self.lines = [*tables, *self.declared, *(["int i;"] if self.loops else []), *self.lines]
+        return self
+
+    def _reads_elsewhere(self) -> bool:
+        """Whether a row reads an element of the result's array that another row may have written."""
+        if len(self.rows) == 1:
+            return False
+        return any(
+            node.array in self.may_be_result and node.index != i
+            for i, row in enumerate(self.rows)
+            for node in reached([row], [])
+            if node.array
+        )
+
+    def _store(self, roots: Sequence[Node]) -> None:
+        """What several rows need, in local arrays and variables."""
+        linear = Linear(self.ends)
+        new: dict[int, Node] = {}
+        for group in self._groups(roots, list(range(len(roots))), linear, []):
+            self.locals += 1
+            if len(group.places) == 1:
+                node = roots[group.places[0]]
+                name = f"shared{self.locals}"
+                self._write(group, f"const {self.real.value} {name} = ")
+                new[node.number] = Node(-self.locals, -2, array=name, index=SCALAR)
             else:
-                at[outputs[0]] = self._settled(self._value(k, op, [at[i] for i in inputs]), k)
-        return results
+                name = f"shared{self.locals}"
+                self.declared.append(f"{self.real.value} {name}[{len(group.places)}];")
+                for k, place in enumerate(group.places):
+                    new[roots[place].number] = Node(-self.locals, -2, array=name, index=k)
+                self._write(group, f"{name}[i] = ")
+        self.ends |= new
 
-    def _value(self, k: int, op: int, a: list[_Value]) -> _Value:
-        """Of instruction `k`; what it needs is printed."""
-        if op in (ca.OP_SQ, ca.OP_INV):
-            op, a = (ca.OP_MUL, [a[0], a[0]]) if op == ca.OP_SQ else (ca.OP_DIV, [_Value("1", 1.0, (1.0, 1.0)), a[0]])
-        if op in (ca.OP_NEG, ca.OP_TWICE, ca.OP_ASSIGN):
-            return a[0].scaled({ca.OP_NEG: -1.0, ca.OP_TWICE: 2.0, ca.OP_ASSIGN: 1.0}[op])
-        if op == ca.OP_MUL and (a[0].number or a[1].number):
-            number, other = a if a[0].number else a[::-1]
-            return other.scaled(number.factor)
-        if op == ca.OP_DIV and a[1].number:  # a multiplication is several times cheaper
-            return a[0].scaled(1 / a[1].factor)
-        if op in (ca.OP_MUL, ca.OP_DIV):
-            return self._product(k, op, *a)
-        if op in (ca.OP_FMIN, ca.OP_FMAX):
-            low, high = sorted(a, key=_range_of)
-            if _range_of(low)[1] <= _range_of(high)[0]:  # known before the device runs
-                return low if op == ca.OP_FMIN else high
-            if a[0].factor == a[1].factor > 0 and not a[0].number:
-                larger = _expression(op, [v.text for v in a], self.real)
-                return replace(self._named(k, larger, _hull(a[0].within, a[1].within)), factor=a[0].factor)
-        if op in (ca.OP_ADD, ca.OP_SUB) and a[1].factor < 0 and not a[1].number:
-            op, a = (ca.OP_SUB if op == ca.OP_ADD else ca.OP_ADD), [a[0], a[1].scaled(-1.0)]
-        if op == ca.OP_ADD and a[0].factor < 0 and not a[0].number:
-            op, a = ca.OP_SUB, [a[1], a[0].scaled(-1.0)]
-        if op in (ca.OP_POW, ca.OP_CONSTPOW) and a[1].number and _by_products(a[1].factor):
-            return self._power(k, self._named(f"{k}_b", self._scaled(a[0]), _range_of(a[0])), a[1].factor)
-        if op in (ca.OP_ADD, ca.OP_SUB) and a[1].number and a[1].factor == 0.0:
-            return a[0]
-        operands = [self._operand(v) for v in a]
-        if op == ca.OP_SQRT:
-            return self._root(k, operands[0], a[0])
-        if op in _CALLS:
-            self.calls.add(_CALLS[op])
-        return self._named(k, _expression(op, operands, self.real), self.between[k])
+    def _results(self, result: str) -> None:
+        linear = Linear(self.ends)
+        terms = [linear.terms(row) for row in self.rows]
+        arrays = {t[0] for t in terms if t}
+        as_row = len(arrays) == 1 and all(terms) and any(len(t[1]) > 2 for t in terms if t)
+        for group in self._groups(self.rows, list(range(len(self.rows))), linear, self.rows if as_row else []):
+            index = str(group.places[0]) if len(group.places) == 1 else group.index("i", group.places)
+            self._write(group, f"{result}[{index}] = ")
 
-    def _product(self, k: int, op: int, a: _Value, b: _Value) -> _Value:
-        """a b or a/b with the factors gathered in front, if the bare operands' product is of a size that can be trusted."""
-        within = PRODUCT[op](a.within, b.within)
-        factor = a.factor * b.factor if op == ca.OP_MUL else a.factor / b.factor
-        plain = a.factor == 1.0 and b.factor == 1.0
-        size = max(abs(v) for v in within)
-        if not plain and not (1 / TRUSTED < size < TRUSTED and 1 / TRUSTED < abs(factor) < TRUSTED):
-            return self._named(k, f"{self._operand(a)} {_BINARY[op]} {self._operand(b)}", self.between[k])
-        if a.number:  # c/(d x) = (c/d)/x
-            return self._named(k, f"{self._literal(factor)} / {b.text}", self.between[k])
-        return replace(self._named(k, f"{a.text} {_BINARY[op]} {b.text}", within), factor=factor)
+    def _groups(self, roots: Sequence[Node], places: Sequence[int], linear: Linear, as_rows: Sequence[Node]) -> list[_Group]:
+        """Roots of equal shape whose elements follow the loop's index, in the order of the first of each."""
+        groups: list[_Group] = []
+        forced = {node.number for node in as_rows}
+        for place in places:
+            text = text_of(roots[place], self._without(roots[place]), linear, self.real, roots[place].number in forced)
+            self.calls |= text.calls
+            self.operations += text.operations
+            for group in groups:
+                if group.takes(place, text):
+                    break
+            else:
+                groups.append(_Group([place], [text]))
+        return groups
 
-    def _root(self, k: int, operand: str, a: _Value) -> _Value:
-        within = _range_of(a)
-        plan = heron_plan(within, self.real)
-        if plan is None:
-            return self._named(k, self._root_call(operand), self.between[k])
-        if a.factor != 1.0:
-            operand = self._named(f"{k}_a", operand, within).text
-        (start, slope), steps = plan
-        y = self._named(f"{k}_0", f"{self._literal(start)} + ({self._literal(slope)} * {operand})", within)
-        for step in range(1, steps + 1):
-            expression = f"{self._literal(0.5)} * ({y.text} + ({operand} / {y.text}))"
-            y = self._named(f"{k}_{step}" if step < steps else k, expression, self.between[k])
-        return y
+    def _without(self, root: Node) -> Mapping[int, Node]:
+        """A row that was stored before is read, and not computed anew."""
+        return self.ends
 
-    def _root_call(self, operand: str) -> str:
-        self.calls.add("root")
-        return f"root({operand})"
+    def _write(self, group: _Group, assignment: str) -> None:
+        """A group's lines, as a loop where it has several rows."""
+        many, first = len(group.places) > 1, group.texts[0]
+        offset = 0 if many else self.parts
 
-    def _power(self, k: int, base: _Value, exponent: float) -> _Value:
-        """base^exponent by squaring, with one root where the exponent is not whole."""
-        factors, square, left, step = list[str](), base.text, int(abs(exponent)), 0
-        if abs(exponent) % 1.0:
-            factors.append(self._named(f"{k}_r", self._root_call(base.text), UNBOUNDED).text)
-        while left:
-            if left % 2:
-                factors.append(square)
-            left //= 2
-            if left:
-                step += 1
-                square = self._named(f"{k}_{step}", f"{square} * {square}", UNBOUNDED).text
-        while len(factors) > 1:
-            step += 1
-            factors = [self._named(f"{k}_{step}", f"{factors[0]} * {factors[1]}", UNBOUNDED).text, *factors[2:]]
-        one = self._literal(1.0)
-        result = (factors or [one])[0]
-        return self._named(k, f"{one} / {result}" if exponent < 0 else result, self.between[k])
+        def filled(match: re.Match) -> str:
+            kind, k = match[1], int(match[2])
+            if kind == "t":
+                return f"t{offset + k + 1}"
+            if kind == "c":
+                return self._constant([text.constants[k] for text in group.texts])
+            if kind == "r":
+                return self._read(group, [text.reads[k] for text in group.texts])
+            return self._row(group, [text.rows[k] for text in group.texts])
 
-    def _settled(self, value: _Value, k: int) -> _Value:
-        """Multiplied out where several need it, so that it is done once."""
-        if value.number or value.factor == 1.0 or self.uses[k] < 2:
-            return value
-        return self._named(f"{k}_c" if value.text == f"t{k}" else k, self._scaled(value), self.between[k])
+        written = [PLACE.sub(filled, line) for line in (*first.lines, f"{assignment}{first.result};")]
+        if many:
+            self.loops = True
+            self.lines += [f"for (i = 0; i < {len(group.places)}; i++) {{", *(f"    {line}" for line in written), "}"]
+        else:
+            self.parts += len(first.lines)
+            self.lines += written
 
-    def _named(self, k: int | str, expression: str, within: Interval) -> _Value:
-        self.lines.append(f"    const {self.real.value} t{k} = {expression};")
-        return _Value(f"t{k}", 1.0, within)
+    def _constant(self, nodes: Sequence[Node]) -> str:
+        literals = [self.real.literal(node.value) for node in nodes]
+        if len(set(literals)) == 1:
+            return self.named(nodes[0])
+        return f"{self._table(f'[{len(nodes)}]', '{ ' + ', '.join(literals) + ' }')}[i]"
 
-    def _operand(self, value: _Value) -> str:
-        """As it may stand beside an operator."""
-        if value.number:
-            return _signed(self._literal(value.factor))
-        text = self._scaled(value)
-        return value.text if text == value.text else f"({text})"
+    def _read(self, group: _Group, nodes: Sequence[Node]) -> str:
+        if nodes[0].index == SCALAR:
+            return nodes[0].array
+        indices = [node.index for node in nodes]
+        return f"{nodes[0].array}[{indices[0] if len(set(indices)) == 1 else group.index('i', indices)}]"
 
-    def _scaled(self, value: _Value) -> str:
-        if value.factor == -1.0:
-            return f"-{value.text}"
-        literal = self._literal(value.factor)
-        return value.text if literal == self._literal(1.0) else f"{_signed(literal)} * {value.text}"
+    def _row(self, group: _Group, rows: Sequence[tuple[str, dict[int, float]]]) -> str:
+        """A row of a matrix times an array."""
+        array, indices = rows[0][0], sorted({i for _, row in rows for i in row})
+        if len(rows) == 1:
+            text = ""
+            for i in indices:
+                value = rows[0][1][i]
+                term = f"{array}[{i}]"
+                if abs(value) != 1.0:
+                    literal = self.real.literal(abs(value) if text else value)
+                    term = f"({f'({literal})' if literal.startswith('-') else literal} * {term})"
+                elif value < 0 and not text:
+                    term = f"(-{term})"
+                text = f"{text} {'-' if value < 0 else '+'} {term}" if text else term
+            return f"({text})"
+        values = ["{ " + ", ".join(self.real.literal(row.get(i, 0.0)) for i in indices) + " }" for _, row in rows]
+        table = self._table(f"[{len(rows)}][{len(indices)}]", "{ " + ", ".join(values) + " }")
+        return "(" + " + ".join(f"({table}[i][{k}] * {array}[{i}])" for k, i in enumerate(indices)) + ")"
 
-    def _literal(self, value: float) -> str:
-        return self.real.literal(value)
+    def _table(self, head: str, values: str) -> str:
+        """The name of a table of numbers, declared once."""
+        return self.tables.setdefault(f"{head}|{values}", f"K{len(self.tables) + 1}")
 
 
-def _hull(a: Interval, b: Interval) -> Interval:
-    return min(a[0], b[0]), max(a[1], b[1])
+@dataclass
+class _Group:
+    """Rows of equal shape: their places in the result and their texts."""
 
+    places: list[int]
+    texts: list[Text]
 
-def _range_of(value: _Value) -> Interval:
-    """Low and high of a value, its factor included."""
-    return product_of((value.factor, value.factor), value.within)
+    def takes(self, place: int, text: Text) -> bool:
+        """Adds a row where its shape is that of the others and its places follow the loop's index."""
+        if text.shape != self.texts[0].shape:
+            return False
+        places, texts = [*self.places, place], [*self.texts, text]
+        if self.index("i", places) is None:
+            return False
+        for k in range(len(text.reads)):
+            indices = [t.reads[k].index for t in texts]
+            if len(set(indices)) > 1 and self.index("i", indices) is None:
+                return False
+        self.places, self.texts = places, texts
+        return True
 
-
-def _uses(function: ca.Function) -> list[int]:
-    """How often the value of each instruction is read."""
-    counts, by_slot = [0] * function.n_instructions(), dict[int, int]()
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        if op != ca.OP_INPUT:
-            for slot in function.instruction_input(k):
-                counts[by_slot[slot]] += 1
-        if op in (ca.OP_SQ, ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX):  # printed with their operands twice
-            for slot in function.instruction_input(k):
-                counts[by_slot[slot]] += 1
-        if op != ca.OP_OUTPUT:
-            by_slot[function.instruction_output(k)[0]] = k
-    return counts
-
-
-def heron_plan(within: Interval, real: Real) -> tuple[tuple[float, float], int] | None:
-    """(start, slope) of the line that is nearest to the root within a range, relatively, and the steps from there to rounding.
-
-    The line y = s (a + sqrt(low high)) has equal relative errors at both ends and at the geometric mean; a step takes
-    an error e to e^2/(2 (1 + e)), which is positive. None where more steps than `MOST_STEPS` are needed.
-    """
-    low, high = within
-    if not 0.0 < low <= high < math.inf:
+    @staticmethod
+    def index(i: str, values: Sequence[int]) -> str | None:
+        """`values` as an expression of the loop's index 0, 1, 2 ...; None where they follow no simple one."""
+        first = values[0]
+        if len(values) == 2 and values[1] == first:
+            return str(first)
+        for step in (values[1] - first,) if values[1] > first else ():
+            if all(v == first + step * k for k, v in enumerate(values)):
+                scaled = i if step == 1 else f"({step} * {i})"
+                return scaled if first == 0 else f"{scaled} + {first}"
+        for divisor in DIVISORS[1:]:
+            if all(v == first + k // divisor for k, v in enumerate(values)):
+                return f"{i} / {divisor}" if first == 0 else f"({i} / {divisor}) + {first}"
         return None
-    low, high = low * (1 - WIDER), high * (1 + WIDER)
-    middle = math.sqrt(low * high)
-    at_end, at_middle = (low + middle) / math.sqrt(low), 2 * math.sqrt(middle)
-    slope = 2 / (at_end + at_middle)
-    error, steps = (at_end - at_middle) / (at_end + at_middle), 0
-    if error > real.epsilon / 4:
-        error, steps = error**2 / (2 * (1 - error)), 1  # the line is low in the middle
-    while error > real.epsilon / 4 and steps <= MOST_STEPS[real]:
-        error, steps = error**2 / (2 * (1 + error)), steps + 1
-    return ((slope * middle, slope), steps) if steps <= MOST_STEPS[real] else None
 
 
-def _dense(sparsity: ca.Sparsity, nonzero: int) -> int:
-    """Row of a column vector's nonzero."""
-    return int(sparsity.row()[nonzero])
+def _shared(rows: Sequence[Node], linear: Linear) -> list[Node]:
+    """The largest expressions that several rows, or several of these, need."""
+    roots = {row.number: row for row in rows if not _plain(row, linear)}
+    while True:
+        order = [n for n in reached(roots.values()) if not n.leaf]
+        of: dict[int, int] = {}  # the roots that need a node, as bits
+        parents: dict[int, set[int]] = {}
+        for bit, number in enumerate(sorted(roots)):
+            of[number] = of.get(number, 0) | 0
+            for operand in roots[number].operands if not _plain(roots[number], linear) else ():
+                of[operand.number] = of.get(operand.number, 0) | 1 << bit
+        needed = {number: bits for number, bits in of.items()}
+        for node in reversed(order):
+            if node.number in roots or _plain(node, linear):
+                continue
+            for operand in node.operands:
+                needed[operand.number] = needed.get(operand.number, 0) | needed.get(node.number, 0)
+                parents.setdefault(operand.number, set()).add(node.number)
+        for bit, number in enumerate(sorted(roots)):
+            for operand in roots[number].operands:
+                parents.setdefault(operand.number, set()).add(-1 - bit)
+        found = [
+            node for node in order
+            if node.number not in roots and not _plain(node, linear) and needed.get(node.number, 0).bit_count() > 1
+            and any(p < 0 or needed.get(p) != needed[node.number] for p in parents.get(node.number, ()))
+        ]  # fmt: skip
+        if not found:
+            break
+        roots |= {node.number: node for node in found}
+    own = {row.number for row in rows}
+    used = {n.number for root in roots.values() for n in reached(root.operands, [r for r in roots.values()])}
+    return [node for number, node in sorted(roots.items()) if number not in own or number in used]
 
 
-def _by_products(exponent: float) -> bool:
-    """Whether a power is cheaper, and as exact, by multiplications."""
-    return (2 * exponent).is_integer() and abs(exponent) <= MOST_FACTORS
+def _plain(node: Node, linear: Linear) -> bool:
+    """What is read where it is needed rather than stored before: leaves and rows of matrices."""
+    return node.leaf or linear.row(node)
 
 
-def _signed(literal: str) -> str:
-    return f"({literal})" if literal.startswith("-") else literal
+def _levels(stored: Sequence[Node]) -> list[list[Node]]:
+    """Stored expressions in an order in which each is known before its use."""
+    level: dict[int, int] = {}
+    for node in stored:  # operands have lower numbers
+        below = [level[n.number] for n in reached(node.operands, stored) if n.number in level]
+        level[node.number] = 1 + max(below, default=-1)
+    return [[node for node in stored if level[node.number] == k] for k in range(max(level.values(), default=-1) + 1)]
 
 
-def _expression(op: int, a: list[str], real: Real) -> str:
-    """One operation on the operands `a`."""
-    zero, one, two = real.literal(0.0), real.literal(1.0), real.literal(2.0)
-    if op in _BINARY:
-        return f"{a[0]} {_BINARY[op]} {a[1]}"
-    if op in _COMPARE:
-        return f"({a[0]} {_COMPARE[op]} {a[1]}) ? {one} : {zero}"
-    if op in _CALLS:
-        return f"{_CALLS[op]}({', '.join(a)})"
-    forms = {
-        ca.OP_ASSIGN: "{0}", ca.OP_NEG: "-{0}", ca.OP_SQ: "{0} * {0}", ca.OP_TWICE: f"{two} * {{0}}", ca.OP_INV: f"{one} / {{0}}",
-        ca.OP_FMIN: "({0} < {1}) ? {0} : {1}", ca.OP_FMAX: "({0} > {1}) ? {0} : {1}", ca.OP_FABS: f"({{0}} < {zero}) ? -{{0}} : {{0}}",
-        ca.OP_SIGN: f"({{0}} > {zero}) ? {one} : (({{0}} < {zero}) ? -{one} : {zero})",
-        ca.OP_IF_ELSE_ZERO: f"({{0}} != {zero}) ? {{1}} : {zero}", ca.OP_NOT: f"({{0}} != {zero}) ? {zero} : {one}",
-        ca.OP_AND: f"(({{0}} != {zero}) && ({{1}} != {zero})) ? {one} : {zero}",
-        ca.OP_OR: f"(({{0}} != {zero}) || ({{1}} != {zero})) ? {one} : {zero}",
-    }  # fmt: skip
-    if op not in forms:
-        raise CtrlgenError(f"CasADi operation {op} has no C99 form here; add it to ctrlgen/firmware/cprint.py")
-    return forms[op].format(*a)
+class _Constants:
+    """The named constants of a file."""
+
+    def __init__(self, real: Real) -> None:
+        self.real = real
+        self.names: dict[float, str] = {}
+        self.lines: list[str] = []
+
+    def named(self, node: Node) -> str:
+        """How a number is written in an expression: by its name where it has a formula."""
+        literal = self.real.literal(node.value)
+        if not node.formula:
+            return f"({literal})" if literal.startswith("-") else literal
+        if node.value not in self.names:
+            name = _name_of(node.formula, set(self.names.values()))
+            self.names[node.value] = name
+            self.lines.append(f"static const {self.real.value} {name} = {literal}; /* {node.formula} */")
+        return self.names[node.value]
+
+    def text(self) -> str:
+        return "\n".join(self.lines)
+
+
+def _name_of(formula: str, taken: set[str]) -> str:
+    """A name for a constant: of the parameter that it is, or of those that it is made of, numbered."""
+    words = list(dict.fromkeys(word.rpartition(".")[2] for word in re.findall(r"[a-z_][\w.\[\]]*", formula)))
+    parameters = [re.sub(r"\W", "", word).upper() for word in words if word not in ("sqrt", "exp", "log", "sin", "cos", "tan")]
+    base = "_".join(parameters[:2]) or "NUMBER"
+    name, k = (base if re.fullmatch(r"[\w.\[\]]+", formula) else f"{base}_1"), 1
+    while name in taken:
+        k += 1
+        name = f"{base}_{k}"
+    return name

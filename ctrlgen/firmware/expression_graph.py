@@ -1,0 +1,277 @@
+"""The expressions of CasADi functions as one graph, in the form in which they are printed as C.
+
+Equal expressions are one node. Numbers are folded, and those that come from named parameters keep their formula. A product is a
+number times a bare product, (c x) (d y) = (c d) (x y), where the ranges of x and y say that x y neither overflows nor vanishes.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.numerics.interval_arithmetic import UNBOUNDED, Interval, interval_of, product_of, quotient_of
+
+CONSTANT, READ = -1, -2  # operations of leaves, beside CasADi's
+TRUSTED = 1e15  # products between 1/TRUSTED and TRUSTED neither overflow nor underflow a float
+MOST_FACTORS = 64  # largest whole exponent that is printed as products
+LONGEST_FORMULA = 120  # characters of a number's formula; a longer one says nothing to a reader
+PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
+TWICE_PRINTED = (ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX)  # their operands appear twice in C
+_FORMULA = {
+    ca.OP_ADD: "{0} + {1}", ca.OP_SUB: "{0} - {1}", ca.OP_MUL: "{0} * {1}", ca.OP_DIV: "{0} / {1}", ca.OP_NEG: "-{0}", ca.OP_SQ: "{0}^2",
+    ca.OP_TWICE: "2 * {0}", ca.OP_INV: "1 / {0}", ca.OP_ASSIGN: "{0}", ca.OP_SQRT: "sqrt({0})", ca.OP_EXP: "exp({0})", ca.OP_LOG: "log({0})",
+    ca.OP_SIN: "sin({0})", ca.OP_COS: "cos({0})", ca.OP_TAN: "tan({0})", ca.OP_ASIN: "asin({0})", ca.OP_ATAN: "atan({0})",
+    ca.OP_POW: "{0}^{1}", ca.OP_CONSTPOW: "{0}^{1}", ca.OP_TANH: "tanh({0})",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """An expression: a number (`value`, with the `formula` that it comes from), element `index` of an `array`, or an operation."""
+
+    number: int  # nodes are numbered as they are made: operands before what uses them
+    operation: int
+    operands: tuple[Node, ...] = ()
+    within: Interval = UNBOUNDED
+    value: float = math.nan
+    formula: str = ""
+    array: str = ""
+    index: int = 0
+
+    @property
+    def constant(self) -> bool:
+        """Whether it is a number."""
+        return self.operation == CONSTANT
+
+    @property
+    def leaf(self) -> bool:
+        """Whether it is a number or an element of an array."""
+        return self.operation in (CONSTANT, READ)
+
+
+class Graph:
+    """Makes nodes, each of them once."""
+
+    def __init__(self) -> None:
+        self._nodes: dict[tuple, Node] = {}
+        self._count = 0
+        self._sealed: set[int] = set()
+
+    def constant(self, value: float, formula: str = "") -> Node:
+        """A number; the first formula that is given for it is kept."""
+        known = self._nodes.get((CONSTANT, value))
+        if known is not None and (known.formula or not formula):
+            return known
+        return self._make((CONSTANT, value), CONSTANT, within=(value, value), value=value, formula=formula)
+
+    def read(self, array: str, index: int, within: Interval = UNBOUNDED) -> Node:
+        """Element `index` of an argument or of a local array."""
+        key = (READ, array, index)
+        return self._nodes.get(key) or self._make(key, READ, within=within, array=array, index=index)
+
+    def rows(
+        self,
+        function: ca.Function,
+        ranges: Mapping[str, tuple[np.ndarray, np.ndarray]],
+        numbers: Mapping[str, Sequence[tuple[float, str]]] | None = None,
+    ) -> list[Node]:
+        """The rows of the only result of an SX `function` with dense arguments.
+
+        `ranges`: low and high of arguments, where they are known. `numbers`: value and formula of each element of arguments that are
+        not read when the C runs.
+        """
+        at, uses = dict[int, Node](), _uses(function)
+        found = [self.constant(0.0)] * function.size1_out(0)
+        for k in range(function.n_instructions()):
+            op, inputs, outputs = (
+                function.instruction_id(k), function.instruction_input(k), function.instruction_output(k),
+            )  # fmt: skip
+            if op == ca.OP_OUTPUT:
+                found[function.sparsity_out(0).row()[outputs[1]]] = at[inputs[0]]
+            elif op == ca.OP_CONST:
+                at[outputs[0]] = self.constant(function.instruction_constant(k))
+            elif op == ca.OP_INPUT:
+                at[outputs[0]] = self._input(function, inputs, ranges, numbers or {})
+            else:
+                node = self.apply(op, [at[i] for i in inputs])
+                if uses[k] > 1:
+                    self._sealed.add(node.number)
+                at[outputs[0]] = node
+        return found
+
+    def _input(self, function: ca.Function, place: Sequence[int], ranges: Mapping, numbers: Mapping) -> Node:
+        name, row = function.name_in(place[0]), int(function.sparsity_in(place[0]).row()[place[1]])
+        if name in numbers:
+            return self.constant(*numbers[name][row])
+        low, high = ranges.get(name, (None, None))
+        return self.read(name, row, UNBOUNDED if low is None else (float(low[row]), float(high[row])))
+
+    def apply(self, op: int, a: Sequence[Node]) -> Node:
+        """CasADi's operation `op` on nodes."""
+        a = list(a)
+        if all(node.constant for node in a):
+            return self._folded(op, a)
+        if op in (ca.OP_SQ, ca.OP_INV):
+            op, a = (ca.OP_MUL, [a[0], a[0]]) if op == ca.OP_SQ else (ca.OP_DIV, [self.constant(1.0), a[0]])
+        if op in (ca.OP_NEG, ca.OP_TWICE, ca.OP_ASSIGN):
+            return self._scaled(a[0], self.constant({ca.OP_NEG: -1.0, ca.OP_TWICE: 2.0, ca.OP_ASSIGN: 1.0}[op]))
+        if op == ca.OP_MUL and (a[0].constant or a[1].constant):
+            number, other = a if a[0].constant else a[::-1]
+            return self._scaled(other, number)
+        if op == ca.OP_DIV and a[1].constant:  # a multiplication is several times cheaper
+            return self._scaled(a[0], self._folded(ca.OP_INV, [a[1]]))
+        if op in PRODUCT:
+            return self._product(op, *a)
+        if op in (ca.OP_FMIN, ca.OP_FMAX):
+            low, high = sorted(a, key=lambda node: node.within)
+            if low.within[1] <= high.within[0]:  # known before the device runs
+                return low if op == ca.OP_FMIN else high
+            (c, x), (d, y) = self._split(a[0]), self._split(a[1])
+            if c.value == d.value > 0 and c.value != 1.0:
+                return self._scaled(self._operation(op, x, y), c)
+        if op in (ca.OP_ADD, ca.OP_SUB):
+            return self._sum(op, *a)
+        if op in (ca.OP_POW, ca.OP_CONSTPOW) and a[1].constant and _by_products(a[1].value):
+            return self._power(a[0], a[1].value)
+        return self._operation(op, *a)
+
+    def _sum(self, op: int, a: Node, b: Node) -> Node:
+        if b.constant and b.value == 0.0:
+            return a
+        if a.constant and a.value == 0.0:
+            return b if op == ca.OP_ADD else self._scaled(b, self.constant(-1.0))
+        if b.constant and b.value < 0:
+            op, b = (ca.OP_SUB if op == ca.OP_ADD else ca.OP_ADD), self._folded(ca.OP_NEG, [b])
+        c, x = self._split(b)
+        if c.value < 0:
+            op, b = (ca.OP_SUB if op == ca.OP_ADD else ca.OP_ADD), self._scaled(x, self._folded(ca.OP_NEG, [c]))
+        c, x = self._split(a)
+        if op == ca.OP_ADD and c.value < 0:
+            op, a, b = ca.OP_SUB, b, self._scaled(x, self._folded(ca.OP_NEG, [c]))
+        return self._operation(op, a, b)
+
+    def _product(self, op: int, a: Node, b: Node) -> Node:
+        """a b or a/b with the numbers gathered in front, if the bare operands' product is of a size that can be trusted."""
+        (c, x), (d, y) = self._split(a), self._split(b)
+        if c.value == d.value == 1.0:
+            return self._operation(op, a, b)
+        factor = self._folded(op, [c, d])
+        size = max(abs(v) for v in PRODUCT[op](x.within, y.within))
+        if not (1 / TRUSTED < size < TRUSTED and 1 / TRUSTED < abs(factor.value) < TRUSTED):
+            return self._operation(op, a, b)
+        if x.constant:  # c/(d y) = (c/d)/y
+            return self._operation(op, factor, y)
+        return self._scaled(self._operation(op, x, y), factor)
+
+    def _power(self, base: Node, exponent: float) -> Node:
+        """base^exponent by squaring, with one root where the exponent is not whole."""
+        factors, square, left = list[Node](), base, int(abs(exponent))
+        if abs(exponent) % 1.0:
+            factors.append(self._operation(ca.OP_SQRT, base))
+        while left:
+            if left % 2:
+                factors.append(square)
+            left //= 2
+            if left:
+                square = self._operation(ca.OP_MUL, square, square)
+        result = factors[0] if factors else self.constant(1.0)
+        for factor in factors[1:]:
+            result = self._operation(ca.OP_MUL, result, factor)
+        return self._operation(ca.OP_DIV, self.constant(1.0), result) if exponent < 0 else result
+
+    def _split(self, node: Node) -> tuple[Node, Node]:
+        """(c, x) with node = c x; x is the number one where the node is a number."""
+        if node.constant:
+            return node, self.constant(1.0)
+        if node.operation == ca.OP_MUL and node.operands[0].constant and node.number not in self._sealed:
+            return node.operands[0], node.operands[1]
+        return self.constant(1.0), node
+
+    def _scaled(self, node: Node, factor: Node) -> Node:
+        if node.constant:
+            return self._folded(ca.OP_MUL, [factor, node])
+        c, x = self._split(node)
+        if c.value != 1.0:
+            factor = self._folded(ca.OP_MUL, [factor, c])
+        return x if factor.value == 1.0 else self._operation(ca.OP_MUL, factor, x)
+
+    def _folded(self, op: int, a: Sequence[Node]) -> Node:
+        values = [node.value for node in a]
+        with np.errstate(all="ignore"):
+            value = float(_computed(op, values))
+        formula = ""
+        if op in _FORMULA and any(node.formula for node in a):
+            formula = _FORMULA[op].format(*(_term(node) for node in a))
+            one = [i for i, node in enumerate(a) if node.value == 1.0 and not node.formula]
+            if op == ca.OP_MUL and one:
+                formula = a[1 - one[0]].formula
+            if op == ca.OP_DIV and one == [1]:
+                formula = a[0].formula
+        return self.constant(value, formula if len(formula) <= LONGEST_FORMULA else "")
+
+    def _operation(self, op: int, *operands: Node) -> Node:
+        key = (op, *(node.number for node in operands))
+        if key in self._nodes:
+            return self._nodes[key]
+        return self._make(key, op, operands=operands, within=interval_of(op, [node.within for node in operands]))
+
+    def _make(self, key: tuple, op: int, **rest: object) -> Node:
+        node = Node(self._count, op, **rest)  # type: ignore[arg-type]
+        self._count += 1
+        self._nodes[key] = node
+        return node
+
+
+def reached(roots: Iterable[Node], ends: Iterable[Node] = ()) -> list[Node]:
+    """The nodes that roots need, operands first, not going below `ends`."""
+    stop, seen, left = {node.number for node in ends}, dict[int, Node](), list(roots)
+    while left:
+        node = left.pop()
+        if node.number not in seen:
+            seen[node.number] = node
+            if node.number not in stop:
+                left.extend(node.operands)
+    return [seen[number] for number in sorted(seen)]
+
+
+def _computed(op: int, values: Sequence[float]) -> float:
+    symbols = [ca.SX.sym("a") for _ in values]
+    built = _FUNCTIONS.get((op, len(values)))
+    if built is None:
+        expression = ca.SX.unary(op, *symbols) if len(values) == 1 else ca.SX.binary(op, *symbols)
+        built = ca.Function("f", symbols, [expression])
+        _FUNCTIONS[op, len(values)] = built
+    return built(*values)
+
+
+_FUNCTIONS: dict[tuple[int, int], ca.Function] = {}
+
+
+def _term(node: Node) -> str:
+    """A number's formula as a part of another."""
+    text = node.formula or f"{node.value:.9g}"
+    simple = re.fullmatch(r"[\w.\[\]]+|\w+\([^()]*\)", text)
+    return text if simple else f"({text})"
+
+
+def _uses(function: ca.Function) -> list[int]:
+    """How often the value of each instruction is read."""
+    counts, by_slot = [0] * function.n_instructions(), dict[int, int]()
+    for k in range(function.n_instructions()):
+        op = function.instruction_id(k)
+        if op != ca.OP_INPUT:
+            for slot in function.instruction_input(k):
+                counts[by_slot[slot]] += 2 if op == ca.OP_SQ or op in TWICE_PRINTED else 1
+        if op != ca.OP_OUTPUT:
+            by_slot[function.instruction_output(k)[0]] = k
+    return counts
+
+
+def _by_products(exponent: float) -> bool:
+    """Whether a power is cheaper, and as exact, by multiplications."""
+    return (2 * exponent).is_integer() and abs(exponent) <= MOST_FACTORS
