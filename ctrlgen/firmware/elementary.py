@@ -4,8 +4,8 @@ Each argument is reduced to a short range (by halves of ln 2, quarter turns, the
 is evaluated. The polynomial interpolates the function's Taylor series at Chebyshev points and has the lowest degree whose error
 is a small fraction of a rounding. It is computed in integers of many bits, so that every machine prints the same digits.
 
-NaN gives NaN (0 for `root`), every finite argument a finite number. The root of a subnormal number is finite but inaccurate,
-that of infinity is not defined. The comment above each C function says what it returns where C's own would be infinite or undefined.
+NaN gives NaN (0 for `square_root`), every finite argument a finite number. The square root is rounded correctly, by the core's own
+instruction or in integers. The comment above each C function says what it returns where C's own would be infinite or undefined.
 """
 
 from __future__ import annotations
@@ -35,9 +35,13 @@ TURN_END = {
     Real.FLOAT: 2.0**20,
 }  # rad; beyond, quarter turns overflow 32 bits (double) or rounding is too coarse (float)
 ASIN_NEAR, TANH_NEAR, SINH_NEAR = 0.5625, 0.625, 1.0  # argument up to which the series itself is used
+ROOTS = {  # the instructions of cores, correctly rounded by IEEE 754
+    Real.FLOAT: {"arm": "vsqrt.f32 %0, %1", "arm_places": '"=t"(y) : "t"(a)', "aarch64": "fsqrt %s0, %s1", "sse": "sqrtss %1, %0"},
+    Real.DOUBLE: {"arm": "vsqrt.f64 %P0, %P1", "arm_places": '"=w"(y) : "w"(a)', "aarch64": "fsqrt %d0, %d1", "sse": "sqrtsd %1, %0"},
+}  # fmt: skip
 NEEDS = {  # function -> the functions that it calls
     "sine": ("quarters",), "cosine": ("quarters",), "tangent": ("quarters",), "arctangent2": ("arctangent",),
-    "arcsine": ("root", "small_arcsine"), "arccosine": ("root", "small_arcsine"),
+    "arcsine": ("square_root", "small_arcsine"), "arccosine": ("square_root", "small_arcsine"),
     "hyperbolic_tangent": ("exponential",), "hyperbolic_sine": ("exponential",), "hyperbolic_cosine": ("exponential",),
     "power": ("exponential", "logarithm", "whole_below"),
 }  # fmt: skip
@@ -66,8 +70,11 @@ def _context(real: Real) -> dict[str, Any]:
     return {
         "real": real, "word": f"uint{width}_t", "signed": f"int{width}_t", "fraction": fraction, "bias": float(bias),
         # 1/sqrt from half the exponent (the constants minimise the largest relative error, 3.4 %; a step
-        # y (1.5 - a y^2/2) takes an error e to 1.5 e^2), then one step for the root itself
+        # y (1.5 - a y^2/2) takes an error e to 1.5 e^2), one step for the root itself, and the last digit in integers
         "root_guess": "0x5F3759DFU" if real is Real.FLOAT else "0x5FE6EB50C7B537A9ULL", "root_steps": 2 if real is Real.FLOAT else 3,
+        "roots": ROOTS[real], "arm_fp": 4 if real is Real.FLOAT else 8, "bias_bits": f"{bias}{end}",
+        "root_up": 4.0 ** ((fraction + 2) // 2), "root_down": 0.5 ** ((fraction + 2) // 2),
+        "mask": f"0x{(1 << fraction) - 1:X}{end}", "hidden": f"0x{1 << fraction:X}{end}", "sign": f"0x{1 << (width - 1):X}{end}",
         "largest": float(kind.max), "smallest": float(kind.tiny), "one_bits": f"0x{one_bits:X}{end}",
         "log_offset": f"0x{one_bits - middle:X}{end}", "log_up": 2.0 ** (fraction + 2), "log_up_bits": float(fraction + 2),
         "exp_high": high * inward, "exp_low": low * inward, "last": last, "per_ln2": float(1 / ln2),
