@@ -27,7 +27,7 @@ from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model import feedforward
-from ctrlgen.model.inverse import Inverse
+from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
 
 N = 3  # axes; enough for "some of them, not the first"
 SLACK = 2.0**-6  # coarse, so that values within it are common; a power of two keeps the arithmetic exact
@@ -51,6 +51,7 @@ class Device:
     composite: str = "bounded"  # "none"; "plain": the ratio is always worked out; "bounded": a cheap bound comes first
     rounds: int = 1  # how often a displacement that breaks a composite limit is shrunk
     moving: bool = True  # a sample time: step beside settle
+    coupled: bool = True  # one displacement moves several channels
 
     def __str__(self) -> str:
         return "-".join(
@@ -81,7 +82,7 @@ DEVICES = (
     Device(limited=False, memory=True, composite="none"),
     Device(states=False, memory=True),
     Device(states=False, moving=False, composite="plain"),
-    Device(moving=False, composite="none"),
+    Device(moving=False, composite="none", coupled=False),
 )
 
 
@@ -103,6 +104,14 @@ def controller_of(device: Device) -> Scripted:
     def kernel(name, arguments, names, result):
         return ca.Function(name, arguments, [result], names, ["result"])
 
+    step = (ca.sum1(x) / 16 if device.n_x else 0) + u / 4 - z / 2
+    newton = kernel("newton", [x, z, u], ["x", "z", "drive"], z + step / 32)
+    settled = z
+    for _ in range(NEWTON_STEPS):
+        settled = newton(x, settled, u)
+    settle = kernel("settle", [x, z, u], ["x", "z", "drive"], settled)
+    ratio = ca.fabs(z[1]) + ca.fabs(z[0] * (1 - wanted[0]))
+
     def inverse(own: float) -> Inverse:
         """`own` differs between equilibrium and next sample, so that taking the other's kernel shows."""
         phase = 5 * wanted + (state if device.states else 0) + 61 * z[1] * np.arange(1, N + 1) + own
@@ -113,9 +122,8 @@ def controller_of(device: Device) -> Scripted:
             kernel("drive", [x, z, wanted, state], ["x", "z", "wanted", "state"], drive),
             kernel("memory", [x, z, wanted], ["x", "z", "wanted"], x[device.n_s :]),
             kernel("advance", [x, z, u], ["x", "z", "drive"], (1 - own) * x / 2 + ca.sum1(z) / 8 + u[0] / 4),
-            kernel(
-                "settle", [x, z, u], ["x", "z", "drive"], 0.875 * z + u / 16 + (ca.sum1(x) / 64 if device.n_x else 0)
-            ),
+            settle,
+            newton,
         )
 
     signal = SimpleNamespace(channels=("a", "b", "c"), units=("m",) * N, label="signal", scale=(1.0,) * N)
@@ -134,9 +142,9 @@ def controller_of(device: Device) -> Scripted:
         static=inverse(0.0), moving=inverse(0.25) if device.moving else None, input_limits=TARGET_LIMIT, safe_drive=np.zeros(N),
         slacks=(np.full(N, SLACK), np.full(device.n_s, SLACK), np.full(N, SLACK)),
         guarded_limits=(SimpleNamespace(label="share"),) if guarded else (),
-        composite_ratio=kernel("ratio", [x, z, wanted], ["x", "z", "wanted"], ca.fabs(z[1]) + ca.fabs(z[0] * (1 - wanted[0]))),
+        composite_shares=kernel("shares", [x, z, wanted], ["x", "z", "wanted"], ratio**2),
+        nearest_slopes=np.array([[1, 0.25, 0.0625], [0.25, 1, -0.125], [0.0625, -0.125, 1]]) if device.coupled else None,
         composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
-        nearest=kernel("nearest", [u], ["beyond"], ca.fmin(ca.fmax(u, Z_LOW), Z_HIGH) * 0.75 + 0.125 * (Z_LOW + Z_HIGH)),
     )  # fmt: skip
     return controller
 
@@ -392,7 +400,7 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
     context = online_context(
         SimpleNamespace(file=SimpleNamespace(follow="displacement"), digest={}), controller, Real.DOUBLE, "limiter"
     )
-    assert not unvisited(tmp_path, {kernel.name for kernel in context["kernels"]} | {"whole_below"})
+    assert not unvisited(tmp_path, {kernel.name for kernel in context["kernels"]} | {"whole_below", "square_root"})
 
 
 def test_samples_of_these_devices_take_every_branch_of_the_limiter_in_python(tmp_path):

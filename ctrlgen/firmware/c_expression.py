@@ -194,7 +194,7 @@ class _Body:
         return text if whole else f"({text})"
 
     def _place(self, kind: str, node: Node) -> str:
-        place = f"<{kind}{node.number}>"
+        place = f"<{kind}{len(self.nodes)}>"
         self.nodes[place] = node
         return place
 

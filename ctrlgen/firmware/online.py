@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ctrlgen.core.units import base_unit, show
-from ctrlgen.firmware.cprint import Kernel, print_function
+from ctrlgen.firmware.cprint import Kernel, Printer
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
-from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, SWEEPS, Controller
+from ctrlgen.model.inverse import NEWTON_STEPS
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
@@ -25,22 +27,12 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     """The context of online.c.j2 and online.h.j2."""
     model = controller.nominal
     n = len(model.axes)
-    kernels: dict[str, Kernel] = {}  # by body, so that a function shared by settle and step is printed once
-
     (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
     s_low, s_high = np.maximum(x_low[: model.n_states], -UNLIMITED), np.minimum(x_high[: model.n_states], UNLIMITED)
     ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
     }  # fmt: skip
-
-    def printed(function: Any, *names: str) -> Kernel:
-        """`function` as C, named by the first of `names` that no other body has."""
-        taken = {kernel.name for kernel in kernels.values()}
-        kernel = print_function(function, names[0], real, ranges)
-        body = kernel.text.partition("(")[2]
-        if body not in kernels and kernel.name in taken:
-            kernel = print_function(function, names[-1], real, ranges)
-        return kernels.setdefault(body, kernel)
+    printed = _Kernels(Printer(real, ranges), kernel_comments(controller))
 
     modes: list[dict[str, Any]] = []
     for name, inverse, z in (
@@ -49,43 +41,29 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     ):
         if inverse is not None:
             named = {
-                kernel: printed(getattr(inverse, kernel), f"wanted_{kernel}", f"{name}_{kernel}")
-                for kernel in ("displacement", "state", "drive", "advance")
-                if getattr(inverse, kernel).size1_out(0)
+                part: printed.kernel(getattr(inverse, part), (name, part), (f"wanted_{part}", f"{name}_{part}"))
+                for part in ("displacement", "state", "drive", "advance")
+                if getattr(inverse, part).size1_out(0)
             }
-            uses_state = any(
-                {"x", "z"} & set(named[kernel].arguments) for kernel in ("state", "drive") if kernel in named
-            )
+            uses_state = any({"x", "z"} & set(named[part].arguments) for part in ("state", "drive") if part in named)
             modes.append({"name": name, "z": z, "uses_state": uses_state, **named})
     motion = {}
     if isinstance(controller, MotionController):
-        motion = {name: printed(kernel, f"motion_{name}") for name, kernel in controller.motion.items()}
-    balance = printed(controller.static.settle, "balance_displacement")
-    ratio = printed(controller.composite_ratio, "composite_ratio") if controller.guarded_limits else None
-    nearest = printed(controller.nearest, "nearest_displacement")
-    bound = printed(controller.composite_bound, "composite_bound") if controller.composite_bound else None
+        motion = {
+            part: printed.kernel(kernel, ("motion", part), (f"motion_{part}",)) for part, kernel in controller.motion.items()
+        }
+    balance = printed.kernel(
+        controller.static.newton, "balance", ("balance_displacement",), steps=("z", NEWTON_STEPS)
+    )
+    shares = bound = None
+    if controller.guarded_limits:
+        shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
+    if controller.composite_bound:
+        bound = printed.kernel(controller.composite_bound, "bound", ("composite_bound",))
     slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     z_slack, s_slack, u_slack = slack.slacks
     drive, follow = model.signals["drive"], controller.target
-    last = modes[-1]
-    advance = [] if model.x.numel() == model.n_states else ["advance"]
-    step_cost = sum(
-        last[kernel].operations for kernel in ("displacement", "state", "drive", *advance) if kernel in last
-    )
-    step_cost += bound.operations if bound else 0
-    once_more = sum(last[kernel].operations for kernel in ("state", "drive") if kernel in last)
-    worst_cost = (
-        step_cost
-        + nearest.operations
-        + (2 if controller.state_can_be_limited else 1) * balance.operations
-        + (controller.composite_rounds * ratio.operations if ratio else 0)
-        + (last["advance"].operations if "advance" in last and not advance else 0)
-        + once_more * (SECANT_STEPS + 3)
-    )
-    if motion:  # what breaks a limit is answered by settling
-        step_cost = sum(kernel.operations for kernel in motion.values())
-        worst_cost += step_cost
-    called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
+    called = printed.calls | ({"square_root"} if shares else set())
     (z_centre, z_half), (s_centre, s_half), (u_centre, u_half) = (
         _middles(low, high, real) for low, high in ((z_low, z_high), (s_low, s_high), (u_low, u_high))
     )
@@ -98,18 +76,98 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
-        "elementary": elementary_text(called, real), "bound": bound, "nearest": nearest,
-        "kernels": list(kernels.values()), "modes": modes, "motion": motion, "ratio": ratio,
+        "elementary": elementary_text(called, real), "bound": bound, "nearest_slopes": controller.nearest_slopes, "sweeps": SWEEPS,
+        "constants": printed.printer.constants, "kernels": printed.kernels, "modes": modes, "motion": motion, "shares": shares,
+        "shares_count": controller.composite_shares.size1_out(0) if shares else 0,
         "balance": balance, "secant_steps": SECANT_STEPS, "secant_fraction": SECANT_FRACTION,
         "composite_rounds": controller.composite_rounds,
-        "ratio_uses_state": ratio is not None and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,
-        "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack, "cost": {"step": step_cost, "worst": worst_cost},
+        "shares_use_state": shares is not None and bool({"x", "z"} & set(shares.arguments)), "state_limited": controller.state_can_be_limited,
+        "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack,
+        "cost": _cost(controller, modes[-1], motion, balance, bound, shares),
         "input_limits": controller.input_limits, "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "z_centre": z_centre, "z_half": z_half,
         "s_low": s_low, "s_high": s_high, "s_slack": s_slack, "s_centre": s_centre, "s_half": s_half,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack, "u_centre": u_centre, "u_half": u_half,
         "u_safe": controller.safe_drive,
     }  # fmt: skip
+
+
+@dataclass
+class _Kernels:
+    """The kernels of one file; one that several modes share is printed once."""
+
+    printer: Printer
+    comments: Mapping[Any, str]
+
+    def __post_init__(self) -> None:
+        self._by_body: dict[str, Kernel] = {}
+
+    def kernel(
+        self, function: Any, what: Any, names: tuple[str, ...], steps: tuple[str, int] | None = None
+    ) -> Kernel:
+        """`function` as C, named by the first of `names` that no other body has."""
+        may_be_result = ["x"] if what[-1] == "advance" else []
+        taken = {kernel.name for kernel in self._by_body.values()}
+        kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps)
+        if kernel.body not in self._by_body and kernel.name in taken:
+            kernel = self.printer.kernel(function, names[-1], self.comments[what], may_be_result, steps)
+        return self._by_body.setdefault(kernel.body, kernel)
+
+    @property
+    def kernels(self) -> list[Kernel]:
+        """In the order in which they were printed."""
+        return list(self._by_body.values())
+
+    @property
+    def calls(self) -> frozenset[str]:
+        """The elementary functions that they call."""
+        return frozenset().union(*(kernel.calls for kernel in self.kernels))
+
+
+def kernel_comments(controller: Controller) -> dict[Any, str]:
+    """What each kernel computes, in words, by mode and part or by name."""
+    m, follow, drive = controller.nominal, controller.model.signals[controller.follow], controller.nominal.signals["drive"]
+    state, within = m.signals.get("state"), f"one sample of {controller.sample_time} s"
+    holds = f"the {state.label}s `state`" if state and m.n_states else "the displacement `wanted`"
+    states = ", ".join(f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True))
+    found: dict[Any, str] = {
+        "balance": f"Displacement at which the forces balance, g(x, z, drive) = 0: {NEWTON_STEPS} Newton steps z - g/(dg/dz) from z.",
+        "shares": f"The square of each {', '.join(limit.label for limit in controller.guarded_limits)} over its limit at displacement "
+        "`wanted`.",
+        "bound": "A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept.",
+    }
+    for mode in ("settle", "step", "motion"):
+        after = {"settle": "at rest", "step": within + " later", "motion": "during the motion that `target` says"}[mode]
+        found |= {
+            (mode, "displacement"): f"Displacement at which the {follow.label} is `target`, {_si_text(follow)}.",
+            (mode, "state"): f"States that the displacement needs {after}: {states}.",
+            (mode, "drive"): {
+                "settle": f"{drive.label.capitalize()} that keeps {holds} at rest.",
+                "step": f"{drive.label.capitalize()} that leads from x to {holds} within {within}.",
+                "motion": f"{drive.label.capitalize()} of the motion that `target` says.",
+            }[mode],
+            (mode, "advance"): f"States under `drive`, {after}: {states}.",
+        }
+    return found
+
+
+def _cost(
+    controller: Controller, mode: dict[str, Any], motion: dict[str, Kernel], balance: Kernel, bound: Kernel | None,
+    shares: Kernel | None,
+) -> dict[str, int]:  # fmt: skip
+    """Operations of the physics: of a "step" that no limit touches, and of the "worst"."""
+    n = len(controller.nominal.axes)
+    advance = [] if controller.nominal.x.numel() == controller.nominal.n_states else ["advance"]
+    step = sum(mode[part].operations for part in ("displacement", "state", "drive", *advance) if part in mode)
+    step += bound.operations if bound else 0
+    if motion:  # what breaks a limit is answered by settling
+        step = sum(kernel.operations for kernel in motion.values())
+    again = sum(mode[part].operations for part in ("state", "drive") if part in mode)
+    worst = step + (2 if controller.state_can_be_limited else 1) * balance.operations + again * (SECANT_STEPS + 3)
+    worst += controller.composite_rounds * (shares.operations + 1) if shares else 0
+    worst += mode["advance"].operations if "advance" in mode and not advance else 0
+    worst += 2 * n * n * (1 + SWEEPS) if controller.nearest_slopes is not None else 0
+    return {"step": step, "worst": worst}
 
 
 def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
-from ctrlgen.firmware.cprint import Kernel, print_function
+from ctrlgen.firmware.cprint import Kernel, Printer
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment, write
@@ -100,12 +100,20 @@ def plant_of(scenario: Scenario) -> Plant:
 def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> dict[str, Any]:
     """Everything the templates of the plant need."""
     m = plant.model
-    kernels: dict[str, Kernel] = {"advance": print_function(plant.advance, "advance", real)} if m.x.numel() else {}
+    printer = Printer(real, {})
+    states = ", ".join(f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True))
+    kernels: dict[str, Kernel] = {}
+    if m.x.numel():
+        about = f"States one sample of {plant.sample_time} s later, the drive held: {states}."
+        kernels["advance"] = printer.kernel(plant.advance, "advance", about, ["x", "z"])
     if not plant.inertial:
-        kernels["balance"] = print_function(plant.balance, "balance", real)
+        about = "Displacement after one Newton step z - g/(dg/dz) on the balance of forces g(x, z, drive) = 0."
+        kernels["balance"] = printer.kernel(plant.balance, "balance", about, ["z"])
         if m.x.numel():
-            kernels["rest"] = print_function(plant.rest, "rest", real)
-    kernels["signals"] = print_function(plant.output, "signals", real)
+            about = "States after one Newton step on dx/dt = 0, the displacement held."
+            kernels["rest"] = printer.kernel(plant.rest, "rest", about, ["x"])
+    about = f"What can be read: {', '.join(signal.label for signal in plant.signals)}."
+    kernels["signals"] = printer.kernel(plant.output, "signals", about)
     called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
     starts = np.cumsum([0, *(len(signal.channels) for signal in plant.signals)])
     return {
@@ -114,7 +122,7 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
         "rate": f"{1 / plant.sample_time:.17g}", "n": len(m.axes), "nx": m.x.numel(), "nu": m.u.numel(),
         "x_names": [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)],
         "signals": list(zip(plant.signals, map(int, starts), strict=False)), "width": int(starts[-1]),
-        "inertial": plant.inertial, "kernels": kernels, "axes": m.axes,
+        "inertial": plant.inertial, "constants": printer.constants, "kernels": kernels, "axes": m.axes,
         "elementary": elementary_text(called, real),
         "rest": m.rest, "z_scale": m.z_scale, "x_near": ARRIVED[real] * m.x_scale, "z_near": ARRIVED[real] * m.z_scale,
         "newton": NEWTON_MOST, "rounds": ROUNDS,

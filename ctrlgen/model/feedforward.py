@@ -82,8 +82,8 @@ class Controller:
         return tuple(limit for limit in limits if ca.depends_on(limit.expr, x) or self._worst_in_range(limit) > 1)
 
     @cached_property
-    def composite_ratio(self) -> ca.Function:
-        """(x, z, wanted) -> the largest ratio of a guarded limit's value to its bound at displacement `wanted`; above 1 it is broken."""
+    def composite_shares(self) -> ca.Function:
+        """(x, z, wanted) -> the square of each guarded limit's value over its bound at displacement `wanted`; above 1 it is broken."""
         m = self.nominal
         wanted = ca.SX.sym("wanted", m.z.numel())
         x_then = ca.vertcat(m.x[: m.n_states], (self.moving or self.static).memory(m.x, m.z, wanted))
@@ -91,10 +91,18 @@ class Controller:
             ca.substitute(limit.expr, ca.vertcat(m.x, m.z), ca.vertcat(x_then, wanted)) ** 2 * (1 / limit.upper**2)
             for limit in self.guarded_limits if limit.upper
         ]  # fmt: skip
-        worst = ca.sqrt(ca.mmax(ca.vertcat(*squares))) if squares else ca.SX(0)  # one root at the end
+        names = ["x", "z", "wanted"]
         return ca.Function(
-            "composite_ratio", [m.x, m.z, wanted], [worst], ["x", "z", "wanted"], ["ratio"], {"cse": True}
+            "composite_shares", [m.x, m.z, wanted], [ca.vertcat(ca.SX(0, 1), *squares)], names, ["shares"], {"cse": True}
         )
+
+    @cached_property
+    def composite_ratio(self) -> ca.Function:
+        """(x, z, wanted) -> the largest ratio of a guarded limit's value to its bound at displacement `wanted`; above 1 it is broken."""
+        arguments = [ca.SX.sym(name, *self.composite_shares.size_in(name)) for name in self.composite_shares.name_in()]
+        shares = self.composite_shares(*arguments)
+        worst = ca.sqrt(ca.mmax(shares)) if shares.numel() else ca.SX(0)  # one root at the end
+        return ca.Function("composite_ratio", arguments, [worst], self.composite_shares.name_in(), ["ratio"], {"cse": True})
 
     @property
     def composite_rounds(self) -> int:
@@ -104,6 +112,16 @@ class Controller:
         return COMPOSITE_ROUNDS if bent or m.x.numel() > m.n_states else 1
 
     @cached_property
+    def nearest_slopes(self) -> np.ndarray | None:
+        """(n, n) H_ij / H_ii of H = W^T W, W the slope of the followed signal at home in its typical sizes; None where H is diagonal:
+        then one displacement moves one channel."""
+        m, signal = self.nominal, self.nominal.signals[self.follow]
+        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(signal.expr, m.z)])(m.rest, 0 * m.z_scale).full()
+        W = slope / np.array(signal.scale)[:, None]
+        H = W.T @ W
+        return None if np.array_equal(H, np.diag(np.diag(H))) else H / np.diag(H)[:, None]
+
+    @cached_property
     def nearest(self) -> ca.Function:
         """beyond -> the displacement in range whose followed signal is nearest to that of the displacement `beyond`.
 
@@ -111,20 +129,17 @@ class Controller:
         `SWEEPS` of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) from the clipped
         displacement; to first order in the displacement, and exact where one displacement moves one channel.
         """
-        m, signal = self.nominal, self.nominal.signals[self.follow]
-        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(signal.expr, m.z)])(m.rest, 0 * m.z_scale).full()
-        W = slope / np.array(signal.scale)[:, None]
-        H = W.T @ W
-        P = ca.sparsify(ca.DM(H / np.diag(H)[:, None]))
+        m, P = self.nominal, self.nearest_slopes
         low, high = m.z_bounds
         beyond = ca.SX.sym("beyond", m.z.numel())
         z = ca.fmin(ca.fmax(beyond, low), high)
-        slopes = ca.mtimes(P, z - beyond)
-        for _ in range(SWEEPS if not P.sparsity().is_diag() else 0):
-            for i in range(m.z.numel()):
-                moved = ca.fmin(ca.fmax(z[i] - slopes[i], low[i]), high[i])
-                slopes += P[:, i] * (moved - z[i])
-                z[i] = moved
+        if P is not None:
+            slopes = ca.mtimes(ca.DM(P), z - beyond)
+            for _ in range(SWEEPS):
+                for i in range(m.z.numel()):
+                    moved = ca.fmin(ca.fmax(z[i] - slopes[i], low[i]), high[i])
+                    slopes += ca.DM(P[:, i]) * (moved - z[i])
+                    z[i] = moved
         return ca.Function("nearest", [beyond], [z], ["beyond"], ["z"], {"cse": True})
 
     @cached_property

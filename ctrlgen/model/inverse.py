@@ -33,8 +33,8 @@ class Inverse:
     `displacement` (x, z, target) -> z at the next sample; `state` (x, z, z_wanted) -> actuator states (n_states,) that hold
     it, none for actuators without memory; `drive` (x, z, z_wanted, state_wanted) -> u; `memory` (x, z, z_wanted) -> the
     effects' states then; `advance` (x, z, u) -> x at the next sample; `settle` (x, z, u) -> the displacement that balances
-    the forces at x, by Newton's method from z. x, z are those of the present sample. A static inverse does not depend on
-    them, except that its `advance` takes the new z.
+    the forces at x, by `NEWTON_STEPS` of Newton's method from z, of which `newton` is one. x, z are those of the present sample. A
+    static inverse does not depend on them, except that its `advance` takes the new z.
     """
 
     displacement: ca.Function
@@ -43,6 +43,7 @@ class Inverse:
     memory: ca.Function
     advance: ca.Function
     settle: ca.Function
+    newton: ca.Function
 
 
 def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
@@ -92,6 +93,7 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     wanted_u = (
         solve_by_blocks(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
     )
+    settled = ca.substitute(model.balance, model.p, ca.DM(model.p_nominal))
     advance = ca.substitute(reached, heat, ca.substitute(produced, x_1, reached) if sample_time is None else produced)
     return Inverse(
         _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
@@ -99,11 +101,9 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
         _kernel("drive", [x, z, z_1, x_1[:n_s]], ["x", "z", "wanted", "state"], wanted_u),
         _kernel("memory", [x, z, z_1], ["x", "z", "wanted"], memory),
         _kernel("advance", [x, z, u_1], ["x", "z", "drive"], advance),
-        _kernel(
-            "settle",
-            [x, z, u],
-            ["x", "z", "drive"],
-            newton_root(ca.substitute(model.balance, model.p, ca.DM(model.p_nominal)), z, z, NEWTON_STEPS),
+        *(
+            _kernel(name, [x, z, u], ["x", "z", "drive"], newton_root(settled, z, z, steps))
+            for name, steps in (("settle", NEWTON_STEPS), ("newton", 1))
         ),
     )
 
