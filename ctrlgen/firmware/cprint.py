@@ -81,27 +81,52 @@ class Printer:
         function is one step of an iteration on that argument, and the printed one takes `count` of them. Raises CtrlgenError for an
         operation C has no counterpart of.
         """
-        stepped = f"{name}_step" if steps else name
         rows = self._graph.rows(function, self.ranges, self.numbers)
         body = _Body(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result).run()
-        lines = "\n".join(body.lines)
-        arguments = tuple(a for a in function.name_in() if re.search(rf"\b{a}\[", lines))
-        size, T = function.size1_out(0), self.real.value
-        sizes = {a: function.size1_in(a) for a in arguments}
-        text = _function(stepped, "" if steps else about, sizes, size, body.lines, T)
-        operations = body.operations
+        sizes = {a: function.size1_in(a) for a in function.name_in()}
+        parts = [(name, about, body.lines)]
         if steps:
-            argument, count = steps
-            arguments = tuple(a for a in function.name_in() if a in arguments or a == argument)
-            call = ", ".join("result" if a == argument else a for a in arguments if a in sizes)
-            lines = [
-                "int i;", "int step;", f"for (i = 0; i < {size}; i++) {{", f"    result[i] = {argument}[i];", "}",
-                f"for (step = 0; step < {count}; step++) {{", f"    {stepped}({call}, result);", "}",
-            ]  # fmt: skip
-            text = f"/* {about} */\n" * bool(about) + text
-            text += "\n" + _function(name, "", {a: function.size1_in(a) for a in arguments}, size, lines, T)
-            operations *= count
-        return Kernel(name, text, arguments, operations, body.calls)
+            parts = _iterated(name, about, body, *steps, sizes)
+        arguments = [tuple(a for a in sizes if any(re.search(rf"\b{a}\[", line) for line in lines)) for _, _, lines in parts]
+        if len(parts) > 1:
+            arguments[1] = tuple(a for a in sizes if a in arguments[0] or a in arguments[1])
+        texts = [
+            _function(one, words, {a: sizes[a] for a in read}, function.size1_out(0), lines, self.real.value)
+            for (one, words, lines), read in zip(parts, arguments, strict=True)
+        ]
+        operations = body.operations * (steps[1] if steps else 1)
+        return Kernel(name, "\n".join(texts), arguments[-1], operations, body.calls)
+
+
+def _iterated(
+    name: str, about: str, body: _Body, argument: str, count: int, sizes: Mapping[str, int]
+) -> list[tuple[str, str, list[str]]]:
+    """Functions that take `count` steps of an iteration on `argument`: name, comment, lines. Axes that do not depend on each other are
+    iterated one after the other; others together, by a function that is one step."""
+    size, T, own = len(body.rows), body.real.value, f"{argument}[i]"
+    loop = body.lines[body.lines.index(f"for (i = 0; i < {size}; i++) {{") :] if body.single_loop else []
+    if loop and all(found == own for line in loop for found in re.findall(rf"\b{argument}\[[^]]*\]", line)):
+        head, inner = body.lines[: -len(loop)], [line.replace(own, "value") for line in loop[1:-1]]
+        moving = {"value"}
+        before, during = [], []
+        for line in inner:
+            words = set(re.findall(r"\w+", line))
+            named = re.match(rf"\s*const {T} (t\d+) =", line)
+            if named and not words & moving:
+                before.append(line)
+            else:
+                moving |= {named[1]} if named else set()
+                during.append(f"    {line}".replace("result[i] =", "value ="))
+        return [(
+            name, about,
+            [*head, loop[0], f"    {T} value = {own};", "    int step;", *before, f"    for (step = 0; step < {count}; step++) {{",
+             *during, "    }", "    result[i] = value;", "}"],
+        )]  # fmt: skip
+    read = [a for a in sizes if any(re.search(rf"\b{a}\[", line) for line in body.lines)]
+    call = ", ".join("result" if a == argument else a for a in read)
+    start = [f"for (i = 0; i < {size}; i++) {{", f"    result[i] = {argument}[i];", "}"]
+    again = [f"for (step = 0; step < {count}; step++) {{", f"    {name}_step({call}, result);", "}"]
+    return [(f"{name}_step", about, body.lines), (name, f"{count} such steps.", ["int i;", "int step;", *start, *again])]
 
 
 def _function(name: str, about: str, arguments: Mapping[str, int], size: int, lines: Sequence[str], T: str) -> str:
@@ -135,6 +160,14 @@ class _Body:
         self.locals = self.parts = self.operations = 0
         self.calls: frozenset[str] = frozenset()
         self.loops = False
+        self.copies: dict[str, str] = {}  # elements that every turn of a loop reads, by the name of their copy: they stay in registers
+        self.copied: set[str] = set()
+        self.groups = 0
+
+    @property
+    def single_loop(self) -> bool:
+        """Whether the function is one loop over all rows and nothing else."""
+        return self.groups == 1 and self.loops and not self.declared
 
     def run(self) -> _Body:
         linear = Linear({})
@@ -217,6 +250,7 @@ class _Body:
     def _write(self, group: _Group, assignment: str) -> None:
         """A group's lines, as a loop where it has several rows."""
         many, first = len(group.places) > 1, group.texts[0]
+        self.groups += 1
         offset = 0 if many else self.parts
 
         def filled(match: re.Match) -> str:
@@ -232,6 +266,10 @@ class _Body:
         written = [PLACE.sub(filled, line) for line in (*first.lines, f"{assignment}{first.result};")]
         if many:
             self.loops = True
+            self.lines += [
+                f"const {self.real.value} {copy} = {element};" for copy, element in self.copies.items() if copy not in self.copied
+            ]
+            self.copied |= set(self.copies)
             self.lines += [f"for (i = 0; i < {len(group.places)}; i++) {{", *(f"    {line}" for line in written), "}"]
         else:
             self.parts += len(first.lines)
@@ -266,7 +304,9 @@ class _Body:
             return f"({text})"
         values = ["{ " + ", ".join(self.real.literal(row.get(i, 0.0)) for i in indices) + " }" for _, row in rows]
         table = self._table(f"[{len(rows)}][{len(indices)}]", "{ " + ", ".join(values) + " }")
-        return "(" + " + ".join(f"({table}[i][{k}] * {array}[{i}])" for k, i in enumerate(indices)) + ")"
+        for i in indices:
+            self.copies[f"{array}_{i}"] = f"{array}[{i}]"
+        return "(" + " + ".join(f"({table}[i][{k}] * {array}_{i})" for k, i in enumerate(indices)) + ")"
 
     def _table(self, head: str, values: str) -> str:
         """The name of a table of numbers, declared once."""

@@ -19,9 +19,7 @@ static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static float square_root(float a)
 {
     float y = 0.0f;
-    if (a > 3.4028235e+38f) {
-        y = a;
-    } else if (a > 0.0f) {
+    if (a > 0.0f) {
 #if defined(CTRLGEN_SQRT)
         y = CTRLGEN_SQRT(a);
 #elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__ARM_FP) && !defined(__aarch64__) && ((__ARM_FP & 4) != 0) && !defined(__SOFTFP__)
@@ -56,10 +54,8 @@ static float square_root(float a)
             /* rounded correctly already */
         }
         v.bits = (exponent << 23U) + (S - 0x800000U);
-        y = v.number * ((up > 1.0f) ? 0.00024414062f : 1.0f);
+        y = (a > 3.4028235e+38f) ? a : (v.number * ((up > 1.0f) ? 0.00024414062f : 1.0f));
 #endif
-    } else {
-        /* zero */
     }
     return y;
 }
@@ -73,9 +69,15 @@ static void wanted_displacement(const float target[6], float result[6])
         -0.5f, 1.1192472f }, { 0.0045320555f, -0.00043452534f, 0.0041873017f, -0.5f, 0.8660254f, 0.64624566f }, {
         -0.0026723198f, -0.00074434135f, -0.002447848f, -0.8660254f, -0.5f, 1.1192472f } };
     int i;
+    const float target_0 = target[0];
+    const float target_1 = target[1];
+    const float target_2 = target[2];
+    const float target_3 = target[3];
+    const float target_4 = target[4];
+    const float target_5 = target[5];
     for (i = 0; i < 6; i++) {
-        result[i] = ((K1[i][0] * target[0]) + (K1[i][1] * target[1]) + (K1[i][2] * target[2]) + (K1[i][3] * target[3]) +
-            (K1[i][4] * target[4]) + (K1[i][5] * target[5]));
+        result[i] = ((K1[i][0] * target_0) + (K1[i][1] * target_1) + (K1[i][2] * target_2) + (K1[i][3] * target_3) +
+            (K1[i][4] * target_4) + (K1[i][5] * target_5));
     }
 }
 
@@ -132,36 +134,29 @@ static void step_advance(const float x[6], const float drive[6], float result[6]
 }
 
 /* Displacement at which the forces balance, g(x, z, drive) = 0: 6 Newton steps z - g/(dg/dz) from z. */
-static void balance_displacement_step(const float x[6], const float z[6], float result[6])
-{
-    int i;
-    for (i = 0; i < 6; i++) {
-        const float t1 = (3e-06f + (3e-09f * (x[i] - 273.15f))) * (x[i] - 295.15f);
-        const float t2 = 1.03154003e+09f * z[i];
-        const float t3 = z[i] * z[i];
-        const float t4 = square_root(1e-06f - t3);
-        const float t5 = 1000.0f * t4;
-        const float t6 = t2 * t5;
-        const float t7 = 0.001f + t4;
-        const float t8 = t3 / t7;
-        const float t9 = (177.2821f * t1) - ((1895.5361f * z[i]) + (t6 * t8));
-        const float t10 = z[i] / t4;
-        const float t11 = (1.03154003e+09f * t5) - (1000.0f * (t2 * t10));
-        const float t12 = (2.0f * (z[i] / t7)) + ((t8 / t7) * t10);
-        const float t13 = 1895.5361f + ((t8 * t11) + (t6 * t12));
-        result[i] = z[i] + (t9 / t13);
-    }
-}
-
 static void balance_displacement(const float x[6], const float z[6], float result[6])
 {
     int i;
-    int step;
     for (i = 0; i < 6; i++) {
-        result[i] = z[i];
-    }
-    for (step = 0; step < 6; step++) {
-        balance_displacement_step(x, result, result);
+        float value = z[i];
+        int step;
+        const float t1 = (3e-06f + (3e-09f * (x[i] - 273.15f))) * (x[i] - 295.15f);
+        for (step = 0; step < 6; step++) {
+            const float t2 = 1.03154003e+09f * value;
+            const float t3 = value * value;
+            const float t4 = square_root(1e-06f - t3);
+            const float t5 = 1000.0f * t4;
+            const float t6 = t2 * t5;
+            const float t7 = 0.001f + t4;
+            const float t8 = t3 / t7;
+            const float t9 = (177.2821f * t1) - ((1895.5361f * value) + (t6 * t8));
+            const float t10 = value / t4;
+            const float t11 = (1.03154003e+09f * t5) - (1000.0f * (t2 * t10));
+            const float t12 = (2.0f * (value / t7)) + ((t8 / t7) * t10);
+            const float t13 = 1895.5361f + ((t8 * t11) + (t6 * t12));
+            value = value + (t9 / t13);
+        }
+        result[i] = value;
     }
 }
 
@@ -210,21 +205,27 @@ static void composite_shares(const float wanted[6], float result[12])
     float shared1[6];
     float shared2[6];
     int i;
+    const float wanted_0 = wanted[0];
+    const float wanted_1 = wanted[1];
+    const float wanted_2 = wanted[2];
+    const float wanted_3 = wanted[3];
+    const float wanted_4 = wanted[4];
+    const float wanted_5 = wanted[5];
     for (i = 0; i < 6; i++) {
-        const float t1 = ((K1[i][0] * wanted[0]) + (K1[i][1] * wanted[1]) + (K1[i][2] * wanted[2]) + (K1[i][3] *
-            wanted[3]) + (K1[i][4] * wanted[4]) + (K1[i][5] * wanted[5]));
+        const float t1 = ((K1[i][0] * wanted_0) + (K1[i][1] * wanted_1) + (K1[i][2] * wanted_2) + (K1[i][3] * wanted_3)
+            + (K1[i][4] * wanted_4) + (K1[i][5] * wanted_5));
         shared1[i] = (t1 < 0.0f) ? -t1 : t1;
     }
     for (i = 0; i < 6; i++) {
-        const float t1 = ((K2[i][0] * wanted[0]) + (K2[i][1] * wanted[1]) + (K2[i][2] * wanted[2]) + (K2[i][3] *
-            wanted[3]) + (K2[i][4] * wanted[4]) + (K2[i][5] * wanted[5]));
+        const float t1 = ((K2[i][0] * wanted_0) + (K2[i][1] * wanted_1) + (K2[i][2] * wanted_2) + (K2[i][3] * wanted_3)
+            + (K2[i][4] * wanted_4) + (K2[i][5] * wanted_5));
         shared2[i] = 3.0f * (t1 * t1);
     }
     for (i = 0; i < 12; i++) {
-        const float t1 = ((K3[i][0] * wanted[0]) + (K3[i][1] * wanted[1]) + (K3[i][2] * wanted[2]) + (K3[i][3] *
-            wanted[3]) + (K3[i][4] * wanted[4]) + (K3[i][5] * wanted[5]));
-        const float t2 = ((K4[i][0] * wanted[0]) + (K4[i][1] * wanted[1]) + (K4[i][2] * wanted[2]) + (K4[i][3] *
-            wanted[3]) + (K4[i][4] * wanted[4]) + (K4[i][5] * wanted[5]));
+        const float t1 = ((K3[i][0] * wanted_0) + (K3[i][1] * wanted_1) + (K3[i][2] * wanted_2) + (K3[i][3] * wanted_3)
+            + (K3[i][4] * wanted_4) + (K3[i][5] * wanted_5));
+        const float t2 = ((K4[i][0] * wanted_0) + (K4[i][1] * wanted_1) + (K4[i][2] * wanted_2) + (K4[i][3] * wanted_3)
+            + (K4[i][4] * wanted_4) + (K4[i][5] * wanted_5));
         const float t3 = ((t1 * t1) + (t2 * t2)) + 0.3025f;
         const float t4 = square_root(t3) + shared1[i / 2];
         result[i] = 3.3057851e-18f * ((t4 * t4) + shared2[i / 2]);
