@@ -141,9 +141,10 @@ def test_the_square_root_is_rounded_as_ieee_754_says(compiler, tmp_path, real, o
     squares = (odd * odd).astype(KIND[real])
     near = [np.nextafter(squares, KIND[real](side)) for side in (0, np.inf)]
     subnormal = np.arange(1, 2000).astype(word).view(KIND[real])
-    for a in (everything, digits, 2 * digits, squares, *near, subnormal, [kind.max, kind.tiny, np.inf]):
+    for a in (everything, digits, 2 * digits, squares, *near, subnormal, [kind.max, kind.tiny, np.inf, 0.0, -0.0, -1.0, np.nan]):
         a = np.asarray(a, dtype=KIND[real])
-        assert np.array_equal(c("square_root", a), np.sqrt(a))
+        with np.errstate(invalid="ignore"):
+            assert np.array_equal(c("square_root", a), np.sqrt(a), equal_nan=True)
 
 
 @pytest.mark.parametrize("real", list(Real))
@@ -170,9 +171,9 @@ def test_special_values(libraries, real):
     big, small = float(kind.max), float(kind.smallest_subnormal)
     infinite = np.array([np.inf, -np.inf])
     for name in ONE:
-        assert np.isnan(c(name, [np.nan])[0]) != (name == "square_root"), name
+        assert np.isnan(c(name, [np.nan])[0]), name
         finite = [0.0, -0.0, small, -small, 1.0, -1.0, 2.0, -2.0, 1e7, -1e7, 3e9, -3e9, 1e20, -1e20, big, -big]
-        assert np.isfinite(c(name, finite)).all(), name
+        assert np.isfinite(c(name, finite[::2] if name == "square_root" else finite)).all(), name
         if name in ZERO_AT_ZERO:
             assert c(name, [0.0, -0.0]).tolist() == [0.0, 0.0], name
     for name in TWO:
@@ -187,7 +188,7 @@ def test_special_values(libraries, real):
     assert c("arcsine", [1.0, 7.0, -7.0]) == pytest.approx([np.pi / 2, np.pi / 2, -np.pi / 2], rel=real.epsilon)
     assert c("arccosine", [1.0, 7.0, -7.0]) == pytest.approx([0.0, 0.0, np.pi], rel=real.epsilon)
     assert c("sine", [*infinite, 1e10]).tolist() == [0, 0, 0] and c("cosine", [*infinite, 1e10]).tolist() == [1, 1, 1]
-    assert c("tangent", [*infinite, 1e10]).tolist() == [0, 0, 0] and c("square_root", [-1.0, -np.inf]).tolist() == [0, 0]
+    assert c("tangent", [*infinite, 1e10]).tolist() == [0, 0, 0] and np.isnan(c("square_root", [-1.0, -np.inf])).all()
 
 
 @pytest.mark.parametrize("real", list(Real))

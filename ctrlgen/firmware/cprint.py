@@ -38,11 +38,15 @@ class Kernel:
     @property
     def body(self) -> str:
         """Its text without its name: equal for equal functions."""
-        return self.text.partition("static void ")[2].replace(self.name, "")
+        return self.text.partition("static ")[2].replace(self.name, "")
 
     def call(self, result: str, **values: str) -> str:
         """A C call with each argument's expression by name."""
         return f"{self.name}({', '.join([*(values[a] for a in self.arguments), result])})"
+
+    def value(self, **values: str) -> str:
+        """A C call of a function that returns its only row."""
+        return f"{self.name}({', '.join(values[a] for a in self.arguments)})"
 
 
 def print_function(function: ca.Function, name: str, real: Real, ranges: Ranges | None = None) -> Kernel:
@@ -73,12 +77,14 @@ class Printer:
         return self._constants.text()
 
     def kernel(
-        self, function: ca.Function, name: str, about: str = "", may_be_result: Sequence[str] = (), steps: tuple[str, int] | None = None
+        self, function: ca.Function, name: str, about: str = "", may_be_result: Sequence[str] = (),
+        steps: tuple[str, int] | None = None, returned: bool = False,
     ) -> Kernel:  # fmt: skip
         """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter.
 
         `about`: its comment. `may_be_result`: arguments that a caller may give as the result too. With `steps` (argument, count) the
-        function is one step of an iteration on that argument, and the printed one takes `count` of them. Raises CtrlgenError for an
+        function is one step of an iteration on that argument, and the printed one takes `count` of them. The only row can be
+        `returned` instead. Raises CtrlgenError for an
         operation C has no counterpart of.
         """
         rows = self._graph.rows(function, self.ranges, self.numbers)
@@ -91,7 +97,7 @@ class Printer:
         if len(parts) > 1:
             arguments[1] = tuple(a for a in sizes if a in arguments[0] or a in arguments[1])
         texts = [
-            _function(one, words, {a: sizes[a] for a in read}, function.size1_out(0), lines, self.real.value)
+            _function(one, words, {a: sizes[a] for a in read}, 0 if returned else function.size1_out(0), lines, self.real.value)
             for (one, words, lines), read in zip(parts, arguments, strict=True)
         ]
         operations = body.operations * (steps[1] if steps else 1)
@@ -130,8 +136,13 @@ def _iterated(
 
 
 def _function(name: str, about: str, arguments: Mapping[str, int], size: int, lines: Sequence[str], T: str) -> str:
-    parameters = ", ".join([*(f"const {T} {a}[{n}]" for a, n in arguments.items()), f"{T} result[{size}]"])
-    comment = f"/* {about} */\n" if about else ""
+    """A static function; with `size` 0 it returns its only row."""
+    read = [f"const {T} {a}[{n}]" for a, n in arguments.items()]
+    comment = "\n".join(textwrap.wrap(f"/* {about} */", WIDTH, subsequent_indent=" * ")) + "\n" if about else ""
+    if not size:
+        lines = [line.replace("result[0] =", "return") for line in lines]
+        return f"{comment}static {T} {name}({', '.join(read)})\n{{\n{_indented(lines)}\n}}\n"
+    parameters = ", ".join([*read, f"{T} result[{size}]"])
     return f"{comment}static void {name}({parameters})\n{{\n{_indented(lines)}\n}}\n"
 
 
@@ -186,6 +197,7 @@ class _Body:
             f"static const {self.real.value} {name}{head} = {values};"
             for (head, values), name in ((k.split("|"), n) for k, n in self.tables.items())
         ]
+        tables = [line for table in tables for line in table.split("\n")]
         self.lines = [*tables, *self.declared, *(["int i;"] if self.loops else []), *self.lines]
         return self
 
@@ -263,7 +275,7 @@ class _Body:
                 return self._read(group, [text.reads[k] for text in group.texts])
             return self._row(group, [text.rows[k] for text in group.texts])
 
-        written = [PLACE.sub(filled, line) for line in (*first.lines, f"{assignment}{first.result};")]
+        written = [_bare(PLACE.sub(filled, line)) for line in (*first.lines, f"{assignment}{first.result};")]
         if many:
             self.loops = True
             self.lines += [
@@ -303,7 +315,7 @@ class _Body:
                 text = f"{text} {'-' if value < 0 else '+'} {term}" if text else term
             return f"({text})"
         values = ["{ " + ", ".join(self.real.literal(row.get(i, 0.0)) for i in indices) + " }" for _, row in rows]
-        table = self._table(f"[{len(rows)}][{len(indices)}]", "{ " + ", ".join(values) + " }")
+        table = self._table(f"[{len(rows)}][{len(indices)}]", "{\n    " + ",\n    ".join(values) + "\n}")
         for i in indices:
             self.copies[f"{array}_{i}"] = f"{array}[{i}]"
         return "(" + " + ".join(f"({table}[i][{k}] * {array}_{i})" for k, i in enumerate(indices)) + ")"
@@ -311,6 +323,17 @@ class _Body:
     def _table(self, head: str, values: str) -> str:
         """The name of a table of numbers, declared once."""
         return self.tables.setdefault(f"{head}|{values}", f"K{len(self.tables) + 1}")
+
+
+def _bare(line: str) -> str:
+    """An assignment without parentheses about the whole value."""
+    head, _, value = line.rstrip(";").partition(" = ")
+    depth = 0
+    for k, character in enumerate(value):
+        depth += (character == "(") - (character == ")")
+        if depth == 0 and k < len(value) - 1:
+            return line
+    return f"{head} = {value[1:-1]};" if value.startswith("(") else line
 
 
 @dataclass

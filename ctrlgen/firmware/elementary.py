@@ -4,8 +4,8 @@ Each argument is reduced to a short range (by halves of ln 2, quarter turns, the
 is evaluated. The polynomial interpolates the function's Taylor series at Chebyshev points and has the lowest degree whose error
 is a small fraction of a rounding. It is computed in integers of many bits, so that every machine prints the same digits.
 
-NaN gives NaN (0 for `square_root`), every finite argument a finite number. The square root is rounded correctly, by the core's own
-instruction or in integers. The comment above each C function says what it returns where C's own would be infinite or undefined.
+NaN gives NaN, every finite argument a finite number, but the root of a negative one. The square root is rounded correctly, by the
+core's own instruction or in integers. The comment above each C function says what it returns where C's own would be infinite or undefined.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     if controller.guarded_limits:
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
     if controller.composite_bound:
-        bound = printed.kernel(controller.composite_bound, "bound", ("composite_bound",))
+        bound = printed.kernel(controller.composite_bound, "bound", ("composite_bound",), returned=True)
     slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     z_slack, s_slack, u_slack = slack.slacks
     drive, follow = model.signals["drive"], controller.target
@@ -103,14 +103,14 @@ class _Kernels:
         self._by_body: dict[str, Kernel] = {}
 
     def kernel(
-        self, function: Any, what: Any, names: tuple[str, ...], steps: tuple[str, int] | None = None
+        self, function: Any, what: Any, names: tuple[str, ...], steps: tuple[str, int] | None = None, returned: bool = False
     ) -> Kernel:
         """`function` as C, named by the first of `names` that no other body has."""
         may_be_result = ["x"] if what[-1] == "advance" else []
         taken = {kernel.name for kernel in self._by_body.values()}
-        kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps)
+        kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps, returned)
         if kernel.body not in self._by_body and kernel.name in taken:
-            kernel = self.printer.kernel(function, names[-1], self.comments[what], may_be_result, steps)
+            kernel = self.printer.kernel(function, names[-1], self.comments[what], may_be_result, steps, returned)
         return self._by_body.setdefault(kernel.body, kernel)
 
     @property

@@ -11,24 +11,26 @@
 static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
+static const float U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
+static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f };
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 
-/* Square root, rounded correctly; 0 for 0, for negative numbers and for what is not a number. The core's own instruction where it has
-   one, or the caller's CTRLGEN_SQRT(a), which must be rounded correctly too. Elsewhere, and with CTRLGEN_PORTABLE_SQRT, Newton steps and
-   a correction of the last digit in integers, S being the digits of the root and R those of a less S squared: the same bits. */
+/* Square root as IEEE 754 has it: rounded correctly, not a number for a negative one. The core's own instruction where it has one, or
+   the caller's CTRLGEN_SQRT(a), which must be rounded correctly too. Elsewhere, and with CTRLGEN_PORTABLE_SQRT, Newton steps and a
+   correction of the last digit in integers, S being the digits of the root and R those of a less S squared: the same bits. */
 static float square_root(float a)
 {
-    float y = 0.0f;
-    if (a > 0.0f) {
+    float y = a;
 #if defined(CTRLGEN_SQRT)
-        y = CTRLGEN_SQRT(a);
+    y = CTRLGEN_SQRT(a);
 #elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__ARM_FP) && !defined(__aarch64__) && ((__ARM_FP & 4) != 0) && !defined(__SOFTFP__)
-        __asm__("vsqrt.f32 %0, %1" : "=t"(y) : "t"(a));
+    __asm__("vsqrt.f32 %0, %1" : "=t"(y) : "t"(a));
 #elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__aarch64__)
-        __asm__("fsqrt %s0, %s1" : "=w"(y) : "w"(a));
+    __asm__("fsqrt %s0, %s1" : "=w"(y) : "w"(a));
 #elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__SSE2__)
-        __asm__("sqrtss %1, %0" : "=x"(y) : "x"(a));
+    __asm__("sqrtss %1, %0" : "=x"(y) : "x"(a));
 #else
+    if ((a > 0.0f) && (a <= 3.4028235e+38f)) {
         union { float number; uint32_t bits; } v;
         const float up = (a < 1.1754944e-38f) ? 1.6777216e+07f : 1.0f; /* where there are fewer digits */
         const float h = 0.5f * (a * up);
@@ -54,20 +56,28 @@ static float square_root(float a)
             /* rounded correctly already */
         }
         v.bits = (exponent << 23U) + (S - 0x800000U);
-        y = (a > 3.4028235e+38f) ? a : (v.number * ((up > 1.0f) ? 0.00024414062f : 1.0f));
-#endif
+        y = v.number * ((up > 1.0f) ? 0.00024414062f : 1.0f);
+    } else if (a < 0.0f) {
+        y = (a - a) / (a - a);
+    } else {
+        /* zero, infinity and what is not a number are their own roots */
     }
+#endif
     return y;
 }
 
-/* Displacement at which the platform pose is `target`, theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m], delta_y [m], delta_z [m]. */
+/* Displacement at which the platform pose is `target`, theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m],
+ * delta_y [m], delta_z [m]. */
 static void wanted_displacement(const float target[6], float result[6])
 {
-    static const float K1[6][6] = { { -0.0026423377f, -0.0037076124f, 0.0041873017f, 1.0f, 0.0f, 0.64624566f }, {
-        0.0006915413f, 0.0026864675f, -0.002447848f, 0.0f, 1.0f, 1.1192472f }, { -0.0018897178f, 0.0041421377f,
-        0.0041873017f, -0.5f, -0.8660254f, 0.64624566f }, { 0.0019807783f, -0.0019421261f, -0.002447848f, 0.8660254f,
-        -0.5f, 1.1192472f }, { 0.0045320555f, -0.00043452534f, 0.0041873017f, -0.5f, 0.8660254f, 0.64624566f }, {
-        -0.0026723198f, -0.00074434135f, -0.002447848f, -0.8660254f, -0.5f, 1.1192472f } };
+    static const float K1[6][6] = {
+        { -0.0026423377f, -0.0037076124f, 0.0041873017f, 1.0f, 0.0f, 0.64624566f },
+        { 0.0006915413f, 0.0026864675f, -0.002447848f, 0.0f, 1.0f, 1.1192472f },
+        { -0.0018897178f, 0.0041421377f, 0.0041873017f, -0.5f, -0.8660254f, 0.64624566f },
+        { 0.0019807783f, -0.0019421261f, -0.002447848f, 0.8660254f, -0.5f, 1.1192472f },
+        { 0.0045320555f, -0.00043452534f, 0.0041873017f, -0.5f, 0.8660254f, 0.64624566f },
+        { -0.0026723198f, -0.00074434135f, -0.002447848f, -0.8660254f, -0.5f, 1.1192472f }
+    };
     int i;
     const float target_0 = target[0];
     const float target_1 = target[1];
@@ -76,12 +86,13 @@ static void wanted_displacement(const float target[6], float result[6])
     const float target_4 = target[4];
     const float target_5 = target[5];
     for (i = 0; i < 6; i++) {
-        result[i] = ((K1[i][0] * target_0) + (K1[i][1] * target_1) + (K1[i][2] * target_2) + (K1[i][3] * target_3) +
-            (K1[i][4] * target_4) + (K1[i][5] * target_5));
+        result[i] = (K1[i][0] * target_0) + (K1[i][1] * target_1) + (K1[i][2] * target_2) + (K1[i][3] * target_3) +
+            (K1[i][4] * target_4) + (K1[i][5] * target_5);
     }
 }
 
-/* States that the displacement needs at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
+/* States that the displacement needs at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K],
+ * temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
 static void wanted_state(const float wanted[6], float result[6])
 {
     int i;
@@ -104,7 +115,8 @@ static void wanted_drive(const float state[6], float result[6])
     }
 }
 
-/* States under `drive`, at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
+/* States under `drive`, at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K],
+ * temperature_3X [K], temperature_3Y [K]. */
 static void wanted_advance(const float drive[6], float result[6])
 {
     int i;
@@ -123,7 +135,8 @@ static void step_drive(const float x[6], const float state[6], float result[6])
     }
 }
 
-/* States under `drive`, one sample of 0.001 s later: temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
+/* States under `drive`, one sample of 0.001 s later: temperature_1X [K], temperature_1Y [K], temperature_2X [K],
+ * temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
 static void step_advance(const float x[6], const float drive[6], float result[6])
 {
     int i;
@@ -163,45 +176,50 @@ static void balance_displacement(const float x[6], const float z[6], float resul
 /* The square of each wire flexure stress over its limit at displacement `wanted`. */
 static void composite_shares(const float wanted[6], float result[12])
 {
-    static const float K1[6][6] = { { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f,
-        8.624482e+09f }, { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f,
-        6.1723305e+09f }, { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f,
-        -4.441134e+09f }, { 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f,
-        1.8204311e+09f }, { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f,
-        -8.725365e+09f }, { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f,
-        -1.1251239e+10f } };
-    static const float K2[6][6] = { { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f,
-        -5.625638e+11f }, { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f,
-        1.0655088e+11f }, { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f,
-        -1.2846023e+11f }, { 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f,
-        -1.7690893e+11f }, { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f,
-        1.5950956e+11f }, { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f,
-        -6.161432e+11f } };
-    static const float K3[12][6] = { { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f, -1.5802731e+12f,
-        -2.536233e+12f }, { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f, -1.1851115e+12f,
-        1.3707138e+12f }, { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f, -1.4328322e+12f,
-        -2.6332991e+12f }, { -1.7746715e+12f, 6.861064e+11f, 8.951435e+11f, 3.2527894e+12f, 1.7830487e+12f,
-        -3.4267975e+11f }, { 1.0806304e+12f, 1.4966203e+12f, 3.0024456e+12f, -3.4103414e+12f, -2.2080156e+12f,
-        -2.6212012e+12f }, { -1.883654e+12f, 7.064584e+11f, 1.1220354e+12f, 3.5960072e+12f, 2.1216132e+12f,
-        -4.5177068e+11f }, { 9.697803e+11f, 1.4594866e+12f, -5.4737345e+11f, 2.2814135e+12f, 9.2301296e+11f,
-        3.1843436e+12f }, { -3.9721988e+12f, 1.851032e+12f, 3.843818e+12f, -2.6561623e+12f, -3.967535e+12f,
-        -7.1714346e+12f }, { 2.2969296e+12f, 6.93611e+11f, 7.789762e+11f, 1.5153417e+12f, 2.2495927e+12f, 2.4190625e+12f
-        }, { -4.2271263e+12f, 1.9982296e+12f, 3.5889726e+12f, -2.5090518e+12f, -4.222497e+12f, -7.0243514e+12f }, {
-        -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f, -1.1844611e+12f, -3.1986845e+12f }, {
-        2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f, -1.4484263e+12f, 1.6090792e+12f } };
-    static const float K4[12][6] = { { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f,
-        7.0338765e+10f, -1.9992656e+11f }, { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f,
-        -3.4923767e+12f, 2.1020536e+12f }, { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f,
-        2.4708851e+11f, 7.325468e+10f }, { 3.4239317e+12f, -2.704245e+12f, -4.1205613e+12f, -6.4245046e+12f,
-        -3.5701538e+12f, 1.9693478e+12f }, { 1.1551834e+12f, 2.0573224e+12f, 3.2989472e+12f, 1.4659148e+12f,
-        1.7148913e+12f, -9.493543e+10f }, { 3.1706516e+12f, -2.4079872e+12f, -4.07338e+12f, -6.234046e+12f,
-        -3.7648282e+12f, 1.952499e+12f }, { 1.0833221e+12f, 2.1930641e+12f, -1.4129366e+12f, -2.6369178e+12f,
-        -4.3476942e+12f, 1.9398967e+12f }, { 3.8327186e+11f, -7.5461276e+11f, -3.1277734e+11f, 8.53514e+11f,
-        1.4279259e+12f, 6.522469e+11f }, { 1.5938316e+12f, 2.529548e+12f, -1.3767377e+12f, -2.0435721e+12f,
-        -3.8518912e+12f, 2.8155762e+12f }, { -8.9809656e+11f, -1.5306036e+11f, 8.487993e+11f, 4.6308487e+10f,
-        1.4800983e+11f, -1.5662322e+12f }, { 4.1998467e+11f, -3.6188638e+12f, -1.2494657e+12f, -2.0487497e+12f,
-        9.450183e+11f, -1.3880204e+12f }, { 3.358615e+12f, 6.647834e+12f, 3.6755997e+12f, -1.5404901e+12f,
-        -3.5741893e+12f, 2.279155e+12f } };
+    static const float K1[6][6] = {
+        { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
+        { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f },
+        { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f },
+        { 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f },
+        { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f },
+        { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f }
+    };
+    static const float K2[6][6] = {
+        { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f },
+        { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f },
+        { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f },
+        { 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f },
+        { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f },
+        { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f }
+    };
+    static const float K3[12][6] = {
+        { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f, -1.5802731e+12f, -2.536233e+12f },
+        { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f, -1.1851115e+12f, 1.3707138e+12f },
+        { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f, -1.4328322e+12f, -2.6332991e+12f },
+        { -1.7746715e+12f, 6.861064e+11f, 8.951435e+11f, 3.2527894e+12f, 1.7830487e+12f, -3.4267975e+11f },
+        { 1.0806304e+12f, 1.4966203e+12f, 3.0024456e+12f, -3.4103414e+12f, -2.2080156e+12f, -2.6212012e+12f },
+        { -1.883654e+12f, 7.064584e+11f, 1.1220354e+12f, 3.5960072e+12f, 2.1216132e+12f, -4.5177068e+11f },
+        { 9.697803e+11f, 1.4594866e+12f, -5.4737345e+11f, 2.2814135e+12f, 9.2301296e+11f, 3.1843436e+12f },
+        { -3.9721988e+12f, 1.851032e+12f, 3.843818e+12f, -2.6561623e+12f, -3.967535e+12f, -7.1714346e+12f },
+        { 2.2969296e+12f, 6.93611e+11f, 7.789762e+11f, 1.5153417e+12f, 2.2495927e+12f, 2.4190625e+12f },
+        { -4.2271263e+12f, 1.9982296e+12f, 3.5889726e+12f, -2.5090518e+12f, -4.222497e+12f, -7.0243514e+12f },
+        { -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f, -1.1844611e+12f, -3.1986845e+12f },
+        { 2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f, -1.4484263e+12f, 1.6090792e+12f }
+    };
+    static const float K4[12][6] = {
+        { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f, 7.0338765e+10f, -1.9992656e+11f },
+        { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f, -3.4923767e+12f, 2.1020536e+12f },
+        { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f, 2.4708851e+11f, 7.325468e+10f },
+        { 3.4239317e+12f, -2.704245e+12f, -4.1205613e+12f, -6.4245046e+12f, -3.5701538e+12f, 1.9693478e+12f },
+        { 1.1551834e+12f, 2.0573224e+12f, 3.2989472e+12f, 1.4659148e+12f, 1.7148913e+12f, -9.493543e+10f },
+        { 3.1706516e+12f, -2.4079872e+12f, -4.07338e+12f, -6.234046e+12f, -3.7648282e+12f, 1.952499e+12f },
+        { 1.0833221e+12f, 2.1930641e+12f, -1.4129366e+12f, -2.6369178e+12f, -4.3476942e+12f, 1.9398967e+12f },
+        { 3.8327186e+11f, -7.5461276e+11f, -3.1277734e+11f, 8.53514e+11f, 1.4279259e+12f, 6.522469e+11f },
+        { 1.5938316e+12f, 2.529548e+12f, -1.3767377e+12f, -2.0435721e+12f, -3.8518912e+12f, 2.8155762e+12f },
+        { -8.9809656e+11f, -1.5306036e+11f, 8.487993e+11f, 4.6308487e+10f, 1.4800983e+11f, -1.5662322e+12f },
+        { 4.1998467e+11f, -3.6188638e+12f, -1.2494657e+12f, -2.0487497e+12f, 9.450183e+11f, -1.3880204e+12f },
+        { 3.358615e+12f, 6.647834e+12f, 3.6755997e+12f, -1.5404901e+12f, -3.5741893e+12f, 2.279155e+12f }
+    };
     float shared1[6];
     float shared2[6];
     int i;
@@ -212,20 +230,20 @@ static void composite_shares(const float wanted[6], float result[12])
     const float wanted_4 = wanted[4];
     const float wanted_5 = wanted[5];
     for (i = 0; i < 6; i++) {
-        const float t1 = ((K1[i][0] * wanted_0) + (K1[i][1] * wanted_1) + (K1[i][2] * wanted_2) + (K1[i][3] * wanted_3)
-            + (K1[i][4] * wanted_4) + (K1[i][5] * wanted_5));
+        const float t1 = (K1[i][0] * wanted_0) + (K1[i][1] * wanted_1) + (K1[i][2] * wanted_2) + (K1[i][3] * wanted_3) +
+            (K1[i][4] * wanted_4) + (K1[i][5] * wanted_5);
         shared1[i] = (t1 < 0.0f) ? -t1 : t1;
     }
     for (i = 0; i < 6; i++) {
-        const float t1 = ((K2[i][0] * wanted_0) + (K2[i][1] * wanted_1) + (K2[i][2] * wanted_2) + (K2[i][3] * wanted_3)
-            + (K2[i][4] * wanted_4) + (K2[i][5] * wanted_5));
+        const float t1 = (K2[i][0] * wanted_0) + (K2[i][1] * wanted_1) + (K2[i][2] * wanted_2) + (K2[i][3] * wanted_3) +
+            (K2[i][4] * wanted_4) + (K2[i][5] * wanted_5);
         shared2[i] = 3.0f * (t1 * t1);
     }
     for (i = 0; i < 12; i++) {
-        const float t1 = ((K3[i][0] * wanted_0) + (K3[i][1] * wanted_1) + (K3[i][2] * wanted_2) + (K3[i][3] * wanted_3)
-            + (K3[i][4] * wanted_4) + (K3[i][5] * wanted_5));
-        const float t2 = ((K4[i][0] * wanted_0) + (K4[i][1] * wanted_1) + (K4[i][2] * wanted_2) + (K4[i][3] * wanted_3)
-            + (K4[i][4] * wanted_4) + (K4[i][5] * wanted_5));
+        const float t1 = (K3[i][0] * wanted_0) + (K3[i][1] * wanted_1) + (K3[i][2] * wanted_2) + (K3[i][3] * wanted_3) +
+            (K3[i][4] * wanted_4) + (K3[i][5] * wanted_5);
+        const float t2 = (K4[i][0] * wanted_0) + (K4[i][1] * wanted_1) + (K4[i][2] * wanted_2) + (K4[i][3] * wanted_3) +
+            (K4[i][4] * wanted_4) + (K4[i][5] * wanted_5);
         const float t3 = ((t1 * t1) + (t2 * t2)) + 0.3025f;
         const float t4 = square_root(t3) + shared1[i / 2];
         result[i] = 3.3057851e-18f * ((t4 * t4) + shared2[i / 2]);
@@ -233,22 +251,22 @@ static void composite_shares(const float wanted[6], float result[12])
 }
 
 /* A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept. */
-static void composite_bound(const float wanted[6], float result[1])
+static float composite_bound(const float wanted[6])
 {
-    const float t1 = (((-7418.532f) * wanted[0]) - (4198.844f * wanted[1]) + (72.96058f * wanted[2]) + (8524.06f *
-        wanted[3]) + (7345.572f * wanted[4]) - (4325.2153f * wanted[5]));
+    const float t1 = ((-7418.532f) * wanted[0]) - (4198.844f * wanted[1]) + (72.96058f * wanted[2]) + (8524.06f *
+        wanted[3]) + (7345.572f * wanted[4]) - (4325.2153f * wanted[5]);
     const float t2 = (t1 < 0.0f) ? -t1 : t1;
-    const float t3 = (((-4731.5063f) * wanted[0]) + (8359.642f * wanted[1]) + (9605.415f * wanted[2]) - (82.2163f *
-        wanted[3]) - (4873.909f * wanted[4]) - (8277.426f * wanted[5]));
+    const float t3 = ((-4731.5063f) * wanted[0]) + (8359.642f * wanted[1]) + (9605.415f * wanted[2]) - (82.2163f *
+        wanted[3]) - (4873.909f * wanted[4]) - (8277.426f * wanted[5]);
     const float t4 = (t3 < 0.0f) ? -t3 : t3;
-    const float t5 = ((3009.9507f * wanted[0]) - (1737.9247f * wanted[1]) + (3009.9507f * wanted[2]) - (1737.9247f *
-        wanted[3]) + (3009.9507f * wanted[4]) - (1737.9247f * wanted[5]));
+    const float t5 = (3009.9507f * wanted[0]) - (1737.9247f * wanted[1]) + (3009.9507f * wanted[2]) - (1737.9247f *
+        wanted[3]) + (3009.9507f * wanted[4]) - (1737.9247f * wanted[5]);
     const float t6 = (t5 < 0.0f) ? -t5 : t5;
-    const float t7 = ((2774.401f * wanted[0]) + (4745.9053f * wanted[1]) + (2774.401f * wanted[2]) + (4745.9053f *
-        wanted[3]) + (2774.401f * wanted[4]) + (4745.9053f * wanted[5]));
+    const float t7 = (2774.401f * wanted[0]) + (4745.9053f * wanted[1]) + (2774.401f * wanted[2]) + (4745.9053f *
+        wanted[3]) + (2774.401f * wanted[4]) + (4745.9053f * wanted[5]);
     const float t8 = (t7 < 0.0f) ? -t7 : t7;
     const float t9 = (((t2 + t4) + t6) + t8) + 2.0006166e-09f;
-    result[0] = t9 + 1e-06f;
+    return t9 + 1e-06f;
 }
 
 /* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
@@ -308,7 +326,7 @@ static int drives_admissible(const float drive[6])
     int admissible = 1;
     int i;
     for (i = 0; i < 6; i++) {
-        if (!((drive[i] <= (U_HIGH[i] + U_SLACK[i])) && (drive[i] >= (U_LOW[i] - U_SLACK[i])))) {
+        if (!((drive[i] <= U_MOST[i]) && (drive[i] >= U_LEAST[i]))) {
             admissible = 0;
         }
     }
@@ -332,9 +350,7 @@ static int is_usable(const float target[6])
 static int limit_composite(const circle20_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
-    float bound[1];
-    composite_bound(wanted, bound);
-    if (!(bound[0] <= 1.0f)) {
+    if (!(composite_bound(wanted) <= 1.0f)) {
         float share[12];
         float worst = 0.0f;
         int i;
@@ -362,24 +378,24 @@ static int limit_composite(const circle20_online_f32_state *state, float wanted[
  * W the slope of the platform pose at home. */
 static void nearest_displacement(const float beyond[6], float value[6])
 {
-    static const float P[6][6] = { /* H_ij/H_ii of H = W^T W */
-        { 1.0f, 1.1193434f, -0.2363756f, -0.16930602f, -0.2363756f, -0.45906138f },
-        { 0.49971864f, 1.0f, -0.20494296f, -0.25956145f, -0.07558483f, -0.25956145f },
-        { -0.2363756f, -0.45906138f, 1.0f, 1.1193434f, -0.2363756f, -0.16930602f },
-        { -0.07558483f, -0.25956145f, 0.49971864f, 1.0f, -0.20494296f, -0.25956145f },
-        { -0.2363756f, -0.16930602f, -0.2363756f, -0.45906138f, 1.0f, 1.1193434f },
-        { -0.20494296f, -0.25956145f, -0.07558483f, -0.25956145f, 0.49971864f, 1.0f }
+    static const float P[6][6] = { /* H_ij/H_jj of H = W^T W */
+        { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f },
+        { 1.1193434f, 1.0f, -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f },
+        { -0.2363756f, -0.20494296f, 1.0f, 0.49971864f, -0.2363756f, -0.07558483f },
+        { -0.16930602f, -0.25956145f, 1.1193434f, 1.0f, -0.45906138f, -0.25956145f },
+        { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f },
+        { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f }
     };
     static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
     static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
-    float slope[6];
+    float slope[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
     int sweep;
     int i;
     int j;
     for (i = 0; i < 6; i++) {
-        slope[i] = 0.0f;
+        const float change = value[i] - beyond[i];
         for (j = 0; j < 6; j++) {
-            slope[i] = slope[i] + (P[i][j] * (value[j] - beyond[j]));
+            slope[j] = slope[j] + (P[i][j] * change);
         }
     }
     for (sweep = 0; sweep < 3; sweep++) {
@@ -388,10 +404,12 @@ static void nearest_displacement(const float beyond[6], float value[6])
             const float raised = (wanted > LOW[i]) ? wanted : LOW[i];
             const float moved = (raised < HIGH[i]) ? raised : HIGH[i];
             const float change = moved - value[i];
-            for (j = 0; j < 6; j++) {
-                slope[j] = slope[j] + (P[j][i] * change);
+            if ((change < 0.0f) || (change > 0.0f)) {
+                for (j = 0; j < 6; j++) {
+                    slope[j] = slope[j] + (P[i][j] * change);
+                }
+                value[i] = moved;
             }
-            value[i] = moved;
         }
     }
 }
@@ -432,7 +450,7 @@ static int settle_line_search(const circle20_online_f32_state *state, const floa
             float share = 1.0f;
             float fraction;
             for (i = 0; i < 6; i++) {
-                if ((at_target[i] > (U_HIGH[i] + U_SLACK[i])) || (at_target[i] < (U_LOW[i] - U_SLACK[i]))) {
+                if ((at_target[i] > U_MOST[i]) || (at_target[i] < U_LEAST[i])) {
                     const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
                     const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
                     share = (reached < share) ? reached : share;
@@ -505,7 +523,7 @@ static int step_line_search(const circle20_online_f32_state *state, const float 
             float share = 1.0f;
             float fraction;
             for (i = 0; i < 6; i++) {
-                if ((at_target[i] > (U_HIGH[i] + U_SLACK[i])) || (at_target[i] < (U_LOW[i] - U_SLACK[i]))) {
+                if ((at_target[i] > U_MOST[i]) || (at_target[i] < U_LEAST[i])) {
                     const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
                     const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
                     share = (reached < share) ? reached : share;
