@@ -426,7 +426,7 @@ class _Constants:
 
     def __init__(self, real: Real) -> None:
         self.real = real
-        self.names: dict[float, str] = {}
+        self.names: dict[tuple[str, str], str] = {}
         self.lines: list[str] = []
 
     def named(self, node: Node) -> str:
@@ -434,11 +434,14 @@ class _Constants:
         literal = self.real.literal(node.value)
         if not node.formula:
             return f"({literal})" if literal.startswith("-") else literal
-        if node.value not in self.names:
-            name = _name_of(node.formula, set(self.names.values()))
-            self.names[node.value] = name
-            self.lines.append(f"static const {self.real.value} {name} = {literal}; /* {node.formula} */")
-        return self.names[node.value]
+        key = literal, node.formula
+        if key not in self.names:
+            name = self.names[key] = _name_of(node.formula, set(self.names.values()))
+            line = f"static const {self.real.value} {name} = {literal}; /* {node.formula} */"
+            if len(line) > WIDTH:
+                line = f"/* {node.formula} */\n{line.partition(' /*')[0]}"
+            self.lines.append(line)
+        return self.names[key]
 
     def text(self) -> str:
         return "\n".join(self.lines)
@@ -446,10 +449,11 @@ class _Constants:
 
 def _name_of(formula: str, taken: set[str]) -> str:
     """A name for a constant: of the parameter that it is, or of those that it is made of, numbered."""
-    words = list(dict.fromkeys(word.rpartition(".")[2] for word in re.findall(r"[a-z_][\w.\[\]]*", formula)))
-    parameters = [re.sub(r"\W", "", word).upper() for word in words if word not in ("sqrt", "exp", "log", "sin", "cos", "tan")]
-    base = "_".join(parameters[:2]) or "NUMBER"
-    name, k = (base if re.fullmatch(r"[\w.\[\]]+", formula) else f"{base}_1"), 1
+    paths = re.findall(r"[a-z_][\w\[\]]*(?:\.[\w\[\]]+)*", re.sub(r"\b[a-z]+\(", "(", formula))
+    part = 0 if formula.startswith("f(") else -1  # of many parameters the sections that they stand in
+    words = dict.fromkeys(re.sub(r"\W", "_", path.split(".")[part]).strip("_").upper() for path in paths)
+    base = "_".join(list(words)[:2])
+    name, k = (base if formula in paths else f"{base}_1"), 1
     while name in taken:
         k += 1
         name = f"{base}_{k}"

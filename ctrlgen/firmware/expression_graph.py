@@ -63,11 +63,9 @@ class Graph:
         self._sealed: set[int] = set()
 
     def constant(self, value: float, formula: str = "") -> Node:
-        """A number; the first formula that is given for it is kept."""
-        known = self._nodes.get((CONSTANT, value))
-        if known is not None and (known.formula or not formula):
-            return known
-        return self._make((CONSTANT, value), CONSTANT, within=(value, value), value=value, formula=formula)
+        """A number, and the formula of parameters that it comes from."""
+        key = (CONSTANT, value, formula)
+        return self._nodes.get(key) or self._make(key, CONSTANT, within=(value, value), value=value, formula=formula)
 
     def read(self, array: str, index: int, within: Interval = UNBOUNDED) -> Node:
         """Element `index` of an argument or of a local array."""
@@ -118,6 +116,8 @@ class Graph:
             return self._folded(op, a)
         if op in (ca.OP_SQ, ca.OP_INV):
             op, a = (ca.OP_MUL, [a[0], a[0]]) if op == ca.OP_SQ else (ca.OP_DIV, [self.constant(1.0), a[0]])
+        if op == ca.OP_IF_ELSE_ZERO and a[0].constant:
+            return a[1] if a[0].value else self.constant(0.0)
         if op in (ca.OP_NEG, ca.OP_TWICE, ca.OP_ASSIGN):
             return self._scaled(a[0], self.constant({ca.OP_NEG: -1.0, ca.OP_TWICE: 2.0, ca.OP_ASSIGN: 1.0}[op]))
         if op == ca.OP_MUL and (a[0].constant or a[1].constant):
@@ -212,7 +212,7 @@ class Graph:
                 formula = a[1 - one[0]].formula
             if op == ca.OP_DIV and one == [1]:
                 formula = a[0].formula
-        return self.constant(value, formula if len(formula) <= LONGEST_FORMULA else "")
+        return self.constant(value, formula if len(formula) <= LONGEST_FORMULA else _short(formula))
 
     def _operation(self, op: int, *operands: Node) -> Node:
         key = (op, *(node.number for node in operands))
@@ -257,6 +257,13 @@ def _term(node: Node) -> str:
     text = node.formula or f"{node.value:.9g}"
     simple = re.fullmatch(r"[\w.\[\]]+|\w+\([^()]*\)", text)
     return text if simple else f"({text})"
+
+
+def _short(formula: str) -> str:
+    """What a long formula depends on: the parameters, or the sections of the device that they stand in."""
+    paths = list(dict.fromkeys(re.findall(r"[a-z_]\w*(?:\[\d+\])?(?:\.[\w\[\].]+)+", formula)))
+    text = f"f({', '.join(paths)})"
+    return text if len(text) <= LONGEST_FORMULA else f"f({', '.join(dict.fromkeys(path.partition('.')[0] for path in paths))})"
 
 
 def _uses(function: ca.Function) -> list[int]:

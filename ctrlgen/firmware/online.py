@@ -32,12 +32,13 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
     }  # fmt: skip
-    printed = _Kernels(Printer(real, ranges), kernel_comments(controller))
+    static, moving, numbers = controller.named
+    printed = _Kernels(Printer(real, ranges, {"p": numbers}), kernel_comments(controller))
 
     modes: list[dict[str, Any]] = []
     for name, inverse, z in (
-        ("settle", controller.static, "out->displacement"),
-        ("step", controller.moving, "state->z"),
+        ("settle", static, "out->displacement"),
+        ("step", moving, "state->z"),
     ):
         if inverse is not None:
             named = {
@@ -53,7 +54,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             part: printed.kernel(kernel, ("motion", part), (f"motion_{part}",)) for part, kernel in controller.motion.items()
         }
     balance = printed.kernel(
-        controller.static.newton, "balance", ("balance_displacement",), steps=("z", NEWTON_STEPS)
+        static.newton, "balance", ("balance_displacement",), steps=("z", NEWTON_STEPS)
     )
     shares = bound = None
     if controller.guarded_limits:

@@ -169,6 +169,7 @@ def _assemble(
             )
         ),
         rest=np.concatenate([_numbers(physics.rest, p, p_nominal), np.zeros(len(memories) + v.numel())]),
+        rest_formula=ca.vertcat(NONE, *physics.rest, *(0.0,) * (len(memories) + v.numel())),
         x_scale=np.array([
             *(() if state is None else state.scale),
             *(m.channel.si(s.scale, s) for m, s, _ in memories),

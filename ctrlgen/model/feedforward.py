@@ -14,7 +14,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ctrlgen.model.assembly import build_model
+from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Limit, Model, Signal
 from ctrlgen.numerics.interval_arithmetic import bounds
@@ -59,6 +59,18 @@ class Controller:
     def moving(self) -> Inverse | None:
         """Kernels for the next sample; None where there is no sample time."""
         return None if self.sample_time is None else invert(self.nominal, self.follow, self.sample_time)
+
+    @cached_property
+    def named(self) -> tuple[Inverse, Inverse | None, list[tuple[float, str]]]:
+        """The kernels for equilibria and for the next sample with an argument "p" more, and its values with their paths in the device:
+        the same numbers as those of `static` and `moving`, as formulas of the device's parameters."""
+        device = self.model.device
+        values = dict(device.quantities())
+        paths = [path for path in movable(device) if values[path].si != 0]
+        model = build_model(device, paths)
+        numbers = [(values[path].si, path) for path in paths]
+        moving = None if self.sample_time is None else invert(model, self.follow, self.sample_time, symbolic=True)
+        return invert(model, self.follow, None, symbolic=True), moving, numbers
 
     @cached_property
     def nominal(self) -> Model:

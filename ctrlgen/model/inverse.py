@@ -11,7 +11,7 @@ number of Newton steps. The operation count is therefore fixed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
@@ -46,20 +46,27 @@ class Inverse:
     newton: ca.Function
 
 
-def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
+def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool = False) -> Inverse:
     """The inverse of `model` for the signal named `follow`, over one `sample_time` [s]; static where that is None.
 
-    Free parameters take their nominal values.
+    Free parameters take their nominal values, and where it is `symbolic` stay a last argument "p" of every kernel: the
+    inverse at the nominal values, with its numbers as formulas of the parameters (those of the followed signal excepted).
     """
     x, z, u, n, n_s = model.x, model.z, model.u, len(model.axes), model.n_states
     x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
     heat, target = model.heat, ca.SX.sym("target", model.signals[follow].expr.numel())
-    now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, ca.DM(model.p_nominal))
+    p = model.p if symbolic else ca.SX(ca.DM(model.p_nominal))
+    now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, p)
     known = ExpansionPoint.of(
         (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (target, np.zeros(target.numel()), np.zeros(target.numel())),
         (x_1, model.rest, model.x_scale), (z_1, 0 * model.z_scale, model.z_scale), (u_1, 0 * model.u_scale, model.u_scale),
-        (heat, np.zeros(heat.numel()), np.ones(heat.numel())),
+        (heat, np.zeros(heat.numel()), np.ones(heat.numel())), (model.p, model.p_nominal, np.zeros(model.p.numel())),
     )  # fmt: skip
+    if symbolic:
+        known = replace(
+            known, parameters=model.p, with_formula=ca.vertcat(x, x_1),
+            base_formula=ca.vertcat(model.rest_formula, model.rest_formula),
+        )  # fmt: skip
     followed, balance, rates, produced = (
         ca.substitute(e, now, end)
         for e in (model.signals[follow].expr, model.balance, model.rates_of_heat, model.heat_of_drive)
@@ -74,15 +81,16 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
         ):  # the first two have no equilibrium: they start anew, at zero
             motion[i] = x_1[i]
         reached = ca.substitute(solve_by_blocks(known, motion, x_1), z_1, z)  # the equilibrium states at the given z
-        at_rest = ca.vertcat(reached, z, u_1, ca.DM(model.p_nominal))
+        at_rest = ca.vertcat(reached, z, u_1, p)
         for i, value in model.stepped.items():
             reached[i] = ca.substitute(value, now, at_rest)
     else:
-        reached = ca.substitute(held_step(model, sample_time, model.rates_of_heat), model.p, ca.DM(model.p_nominal))
+        reached = ca.substitute(held_step(model, sample_time, model.rates_of_heat), model.p, p)
         reached = ca.substitute(reached, u, u_1)
         motion = x_1 - reached
-        produced = ca.substitute(model.heat_of_drive, ca.vertcat(u, model.p), ca.vertcat(u_1, ca.DM(model.p_nominal)))
+        produced = ca.substitute(model.heat_of_drive, ca.vertcat(u, model.p), ca.vertcat(u_1, p))
     heating = heat - produced
+    followed = ca.substitute(followed, model.p, ca.DM(model.p_nominal))
     wanted_z = solve_by_blocks(
         known, ca.vertcat(followed - target, balance, motion, heating), ca.vertcat(z_1, x_1, u_1, heat)
     )[:n]
@@ -93,23 +101,24 @@ def invert(model: Model, follow: str, sample_time: float | None) -> Inverse:
     wanted_u = (
         solve_by_blocks(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
     )
-    settled = ca.substitute(model.balance, model.p, ca.DM(model.p_nominal))
+    settled = ca.substitute(model.balance, model.p, p)
     advance = ca.substitute(reached, heat, ca.substitute(produced, x_1, reached) if sample_time is None else produced)
-    return Inverse(
-        _kernel("displacement", [x, z, target], ["x", "z", "target"], wanted_z),
-        _kernel("state", [x, z, z_1], ["x", "z", "wanted"], wanted_state),
-        _kernel("drive", [x, z, z_1, x_1[:n_s]], ["x", "z", "wanted", "state"], wanted_u),
-        _kernel("memory", [x, z, z_1], ["x", "z", "wanted"], memory),
-        _kernel("advance", [x, z, u_1], ["x", "z", "drive"], advance),
-        *(
-            _kernel(name, [x, z, u], ["x", "z", "drive"], newton_root(settled, z, z, steps))
-            for name, steps in (("settle", NEWTON_STEPS), ("newton", 1))
-        ),
-    )
+    states = x_1[:n_s]
+    results: dict[str, tuple[dict[str, ca.SX], ca.SX]] = {
+        "displacement": ({"x": x, "z": z, "target": target}, wanted_z),
+        "state": ({"x": x, "z": z, "wanted": z_1}, wanted_state),
+        "drive": ({"x": x, "z": z, "wanted": z_1, "state": states}, wanted_u),
+        "memory": ({"x": x, "z": z, "wanted": z_1}, memory),
+        "advance": ({"x": x, "z": z, "drive": u_1}, advance),
+        "settle": ({"x": x, "z": z, "drive": u}, newton_root(settled, z, z, NEWTON_STEPS)),
+        "newton": ({"x": x, "z": z, "drive": u}, newton_root(settled, z, z, 1)),
+    }
+    more = {"p": model.p} if symbolic else {}
+    return Inverse(**{name: _kernel(name, arguments | more, result) for name, (arguments, result) in results.items()})
 
 
-def _kernel(name: str, arguments: list[ca.SX], names: list[str], result: ca.SX) -> ca.Function:
-    return ca.Function(name, arguments, [result], names, ["result"], {"cse": True})
+def _kernel(name: str, arguments: dict[str, ca.SX], result: ca.SX) -> ca.Function:
+    return ca.Function(name, list(arguments.values()), [result], list(arguments), ["result"], {"cse": True})
 
 
 @dataclass(frozen=True)
@@ -119,6 +128,10 @@ class ExpansionPoint:
     symbols: ca.SX
     base: np.ndarray
     scale: np.ndarray
+    # For numbers with formulas: those of the symbols that never change, and expressions in them of the base of some symbols
+    parameters: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    with_formula: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    base_formula: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
 
     @classmethod
     def of(cls, *rows: tuple[ca.SX, np.ndarray, np.ndarray]) -> ExpansionPoint:
@@ -130,9 +143,12 @@ class ExpansionPoint:
         """`expression` at base + fraction * scale."""
         return ca.Function("f", [self.symbols], [expression])(self.base + fraction * self.scale).full()
 
-    def base_of(self, unknowns: ca.SX) -> ca.DM:
+    def base_of(self, unknowns: ca.SX) -> ca.SX | ca.DM:
         """The base of some of the symbols."""
-        return ca.Function("f", [self.symbols], [unknowns])(self.base)
+        base = ca.Function("f", [self.symbols], [unknowns])(self.base)
+        formulas = ca.substitute(unknowns, self.with_formula, self.base_formula)
+        same = [ca.is_equal(formulas[i], unknowns[i]) for i in range(unknowns.numel())]
+        return ca.vertcat(*(base[i] if same[i] else formulas[i] for i in range(unknowns.numel())))
 
     def typical(self, unknowns: ca.SX) -> ca.DM:
         """A value of some of the symbols at which the device operates: base + scale."""
@@ -159,8 +175,10 @@ def _solve_block(known: ExpansionPoint, r: ca.SX, v: ca.SX) -> ca.SX:
     """One block, r(v) = 0: linear, quadratic in one unknown, or `NEWTON_STEPS` Newton steps."""
     base = known.base_of(v)
     slope = ca.jacobian(r, v)
-    if not ca.symvar(slope):  # numbers only: inverted once, when the kernel is built
-        return base - ca.mtimes(_inverse(ca.evalf(slope).full()), ca.substitute(r, v, base))
+    fixed = {symbol.name() for symbol in ca.symvar(known.parameters)} if known.parameters.numel() else set()
+    constant = all(symbol.name() in fixed for symbol in ca.symvar(slope))
+    if constant and (v.numel() > 1 or not ca.symvar(slope)):  # inverted once, when the kernel is built
+        return base - ca.mtimes(_inverse(known.at(slope, 0.0)), ca.substitute(r, v, base))
     if not ca.depends_on(slope, v):
         return base - ca.solve(slope, ca.substitute(r, v, base))
     curvature = ca.jacobian(slope, v)

@@ -70,6 +70,7 @@ class Model:
     x_names: tuple[str, ...]
     x_units: tuple[str, ...]
     rest: np.ndarray  # x of the device at rest
+    rest_formula: ca.SX  # the same in terms of p
     x_scale: np.ndarray
     z_scale: np.ndarray
     u_scale: np.ndarray

@@ -66,6 +66,32 @@ static float square_root(float a)
     return y;
 }
 
+static const float LEVER_LONG_1 = 1e-06f; /* stage.lever_long^2 */
+static const float LEVER_LONG = 0.001f; /* stage.lever_long */
+static const float STAGE_1 = 1895.5361f; /* f(stage.lever_long, stage.lever_short, stage.notch.theta_z_per_M_z) */
+static const float STAGE_2 = 1.03154e+12f; /* f(stage.lever_long, stage.lever_short, stage.half_stage_stiffness) */
+static const float BEAM_ANGLE_ACTUATOR_1 = 0.0005435469f; /* sin(actuator.beam_angle) * f(actuator) */
+static const float BEAM_ANGLE_ACTUATOR_2 = 2.9544324e-07f; /* (sin(actuator.beam_angle) * f(actuator))^2 */
+/* 4 * (f(actuator.beam_angle, actuator.thickness, actuator.beam_width, actuator.young, actuator.expansion_slope) / 2) */
+static const float BEAM_ANGLE_THICKNESS_1 = 2.1273852e-06f;
+static const float AMBIENT = 295.15f; /* actuator.ambient */
+/* (1 / (actuator.thermal_resistance / actuator.time_constant)) * (1 / actuator.time_constant) */
+static const float THERMAL_RESISTANCE_TIME_CONSTANT_1 = 0.0018181818f;
+static const float THERMAL_RESISTANCE = 550.0f; /* actuator.thermal_resistance */
+/* -((((exp((-(0.001 / actuator.time_constant)))) - 1) * actuator.time_constant) * (1 / actuator.time_constant)) */
+static const float TIME_CONSTANT_1 = 0.18126924f;
+/* (-1) * (1 / f(actuator.time_constant, actuator.thermal_resistance)) */
+static const float TIME_CONSTANT_THERMAL_RESISTANCE_1 = 0.010030283f;
+static const float EXPANSION = 3e-06f; /* actuator.expansion */
+static const float EXPANSION_SLOPE = 3e-09f; /* actuator.expansion_slope */
+/* ((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) * (1 / stage.lever_long) */
+static const float LEVER_LONG_LEVER_SHORT_1 = 1.03154003e+09f;
+static const float LEVER_LONG_2 = 1000.0f; /* 1 / stage.lever_long */
+/* sin(actuator.beam_angle) * (actuator.thickness * (actuator.beam_width * (actuator.young * 30))) */
+static const float BEAM_ANGLE_THICKNESS_2 = 177.2821f;
+/* ((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long */
+static const float LEVER_LONG_LEVER_SHORT_2 = 1.03154003e+09f;
+
 /* Displacement at which the platform pose is `target`, theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m],
  * delta_y [m], delta_z [m]. */
 static void wanted_displacement(const float target[6], float result[6])
@@ -98,11 +124,11 @@ static void wanted_state(const float wanted[6], float result[6])
     int i;
     for (i = 0; i < 6; i++) {
         const float t1 = wanted[i] * wanted[i];
-        const float t2 = square_root(1e-06f - t1);
-        const float t3 = (wanted[i] * t2) * (t1 / (0.001f + t2));
-        const float t4 = (1895.5361f * wanted[i]) + (1.03154e+12f * t3);
-        const float t5 = 0.0005435469f + square_root(2.9544324e-07f + (2.1273852e-06f * t4));
-        result[i] = 295.15f + (2.0f * (t4 / t5));
+        const float t2 = square_root(LEVER_LONG_1 - t1);
+        const float t3 = (wanted[i] * t2) * (t1 / (LEVER_LONG + t2));
+        const float t4 = (STAGE_1 * wanted[i]) + (STAGE_2 * t3);
+        const float t5 = BEAM_ANGLE_ACTUATOR_1 + square_root(BEAM_ANGLE_ACTUATOR_2 + (BEAM_ANGLE_THICKNESS_1 * t4));
+        result[i] = AMBIENT + (2.0f * (t4 / t5));
     }
 }
 
@@ -111,7 +137,7 @@ static void wanted_drive(const float state[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        result[i] = 0.0018181818f * (state[i] - 295.15f);
+        result[i] = THERMAL_RESISTANCE_TIME_CONSTANT_1 * (state[i] - AMBIENT);
     }
 }
 
@@ -121,7 +147,7 @@ static void wanted_advance(const float drive[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        result[i] = 295.15f + (550.0f * drive[i]);
+        result[i] = AMBIENT + (THERMAL_RESISTANCE * drive[i]);
     }
 }
 
@@ -130,8 +156,8 @@ static void step_drive(const float x[6], const float state[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        const float t1 = state[i] - (x[i] - (0.18126924f * (x[i] - 295.15f)));
-        result[i] = 0.010030283f * t1;
+        const float t1 = state[i] - (x[i] - (TIME_CONSTANT_1 * (x[i] - AMBIENT)));
+        result[i] = TIME_CONSTANT_THERMAL_RESISTANCE_1 * t1;
     }
 }
 
@@ -141,7 +167,7 @@ static void step_advance(const float x[6], const float drive[6], float result[6]
 {
     int i;
     for (i = 0; i < 6; i++) {
-        const float t1 = 0.18126924f * ((550.0f * drive[i]) - (x[i] - 295.15f));
+        const float t1 = TIME_CONSTANT_1 * ((THERMAL_RESISTANCE * drive[i]) - (x[i] - AMBIENT));
         result[i] = x[i] + t1;
     }
 }
@@ -153,20 +179,20 @@ static void balance_displacement(const float x[6], const float z[6], float resul
     for (i = 0; i < 6; i++) {
         float value = z[i];
         int step;
-        const float t1 = (3e-06f + (3e-09f * (x[i] - 273.15f))) * (x[i] - 295.15f);
+        const float t1 = (EXPANSION + (EXPANSION_SLOPE * (x[i] - 273.15f))) * (x[i] - AMBIENT);
         for (step = 0; step < 6; step++) {
-            const float t2 = 1.03154003e+09f * value;
+            const float t2 = LEVER_LONG_LEVER_SHORT_1 * value;
             const float t3 = value * value;
-            const float t4 = square_root(1e-06f - t3);
-            const float t5 = 1000.0f * t4;
+            const float t4 = square_root(LEVER_LONG_1 - t3);
+            const float t5 = LEVER_LONG_2 * t4;
             const float t6 = t2 * t5;
-            const float t7 = 0.001f + t4;
+            const float t7 = LEVER_LONG + t4;
             const float t8 = t3 / t7;
-            const float t9 = (177.2821f * t1) - ((1895.5361f * value) + (t6 * t8));
+            const float t9 = (BEAM_ANGLE_THICKNESS_2 * t1) - ((STAGE_1 * value) + (t6 * t8));
             const float t10 = value / t4;
-            const float t11 = (1.03154003e+09f * t5) - (1000.0f * (t2 * t10));
+            const float t11 = (LEVER_LONG_LEVER_SHORT_2 * t5) - (LEVER_LONG_2 * (t2 * t10));
             const float t12 = (2.0f * (value / t7)) + ((t8 / t7) * t10);
-            const float t13 = 1895.5361f + ((t8 * t11) + (t6 * t12));
+            const float t13 = STAGE_1 + ((t8 * t11) + (t6 * t12));
             value = value + (t9 / t13);
         }
         result[i] = value;
