@@ -206,12 +206,17 @@ class Graph:
             value = float(_computed(op, values))
         formula = ""
         if op in _FORMULA and any(node.formula for node in a):
-            formula = _FORMULA[op].format(*(_term(node) for node in a))
+            call = _FORMULA[op].endswith("({0})")
+            formula = _FORMULA[op].format(*(node.formula if call else _term(node) for node in a))
             one = [i for i, node in enumerate(a) if node.value == 1.0 and not node.formula]
             if op == ca.OP_MUL and one:
                 formula = a[1 - one[0]].formula
             if op == ca.OP_DIV and one == [1]:
                 formula = a[0].formula
+            if op == ca.OP_MUL and any(node.value == -1.0 and not node.formula for node in a):
+                formula = f"-{_term(next(node for node in a if node.formula))}"
+            if op == ca.OP_MUL and formula.count("(1 / ") == 1 and formula.endswith(")") and a[1].formula.startswith("1 / "):
+                formula = f"{_term(a[0])} / {a[1].formula[4:]}"
         return self.constant(value, formula if len(formula) <= LONGEST_FORMULA else _short(formula))
 
     def _operation(self, op: int, *operands: Node) -> Node:
@@ -255,8 +260,9 @@ _FUNCTIONS: dict[tuple[int, int], ca.Function] = {}
 def _term(node: Node) -> str:
     """A number's formula as a part of another."""
     text = node.formula or f"{node.value:.9g}"
-    simple = re.fullmatch(r"[\w.\[\]]+|\w+\([^()]*\)", text)
-    return text if simple else f"({text})"
+    depth = [text[: k + 1].count("(") - text[: k + 1].count(")") for k in range(len(text))]
+    call = re.match(r"\w*\(", text) is not None and all(depth[k] > 0 for k in range(text.index("("), len(text) - 1))
+    return text if call or re.fullmatch(r"[\w.\[\]]+", text) else f"({text})"
 
 
 def _short(formula: str) -> str:

@@ -6,7 +6,7 @@ It has no feedback: what it keeps of the device is the state that its own model 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
 from functools import cached_property
 from itertools import product
@@ -69,8 +69,11 @@ class Controller:
         paths = [path for path in movable(device) if values[path].si != 0]
         model = build_model(device, paths)
         numbers = [(values[path].si, path) for path in paths]
-        moving = None if self.sample_time is None else invert(model, self.follow, self.sample_time, symbolic=True)
-        return invert(model, self.follow, None, symbolic=True), moving, numbers
+        named = {
+            own: replace(invert(model, self.follow, time, symbolic=True), displacement=own.displacement)  # of matrices inverted as here
+            for own, time in ((self.static, None), (self.moving, self.sample_time)) if own is not None
+        }  # fmt: skip
+        return named[self.static], None if self.moving is None else named[self.moving], numbers
 
     @cached_property
     def nominal(self) -> Model:

@@ -69,7 +69,8 @@ static float square_root(float a)
 static const float LEVER_LONG_1 = 1e-06f; /* stage.lever_long^2 */
 static const float LEVER_LONG = 0.001f; /* stage.lever_long */
 static const float STAGE_1 = 1895.5361f; /* f(stage.lever_long, stage.lever_short, stage.notch.theta_z_per_M_z) */
-static const float STAGE_2 = 1.03154e+12f; /* f(stage.lever_long, stage.lever_short, stage.half_stage_stiffness) */
+/* (((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long) / stage.lever_long */
+static const float LEVER_LONG_LEVER_SHORT_1 = 1.03154e+12f;
 static const float BEAM_ANGLE_ACTUATOR_1 = 0.0005435469f; /* sin(actuator.beam_angle) * f(actuator) */
 static const float BEAM_ANGLE_ACTUATOR_2 = 2.9544324e-07f; /* (sin(actuator.beam_angle) * f(actuator))^2 */
 /* 4 * (f(actuator.beam_angle, actuator.thickness, actuator.beam_width, actuator.young, actuator.expansion_slope) / 2) */
@@ -78,19 +79,17 @@ static const float AMBIENT = 295.15f; /* actuator.ambient */
 /* (1 / (actuator.thermal_resistance / actuator.time_constant)) * (1 / actuator.time_constant) */
 static const float THERMAL_RESISTANCE_TIME_CONSTANT_1 = 0.0018181818f;
 static const float THERMAL_RESISTANCE = 550.0f; /* actuator.thermal_resistance */
-/* -((((exp((-(0.001 / actuator.time_constant)))) - 1) * actuator.time_constant) * (1 / actuator.time_constant)) */
+/* -(((exp(-(0.001 / actuator.time_constant)) - 1) * actuator.time_constant) / actuator.time_constant) */
 static const float TIME_CONSTANT_1 = 0.18126924f;
-/* (-1) * (1 / f(actuator.time_constant, actuator.thermal_resistance)) */
+/* (-1) / f(actuator.time_constant, actuator.thermal_resistance) */
 static const float TIME_CONSTANT_THERMAL_RESISTANCE_1 = 0.010030283f;
 static const float EXPANSION = 3e-06f; /* actuator.expansion */
 static const float EXPANSION_SLOPE = 3e-09f; /* actuator.expansion_slope */
-/* ((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) * (1 / stage.lever_long) */
-static const float LEVER_LONG_LEVER_SHORT_1 = 1.03154003e+09f;
+/* ((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long */
+static const float LEVER_LONG_LEVER_SHORT_2 = 1.03154003e+09f;
 static const float LEVER_LONG_2 = 1000.0f; /* 1 / stage.lever_long */
 /* sin(actuator.beam_angle) * (actuator.thickness * (actuator.beam_width * (actuator.young * 30))) */
 static const float BEAM_ANGLE_THICKNESS_2 = 177.2821f;
-/* ((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long */
-static const float LEVER_LONG_LEVER_SHORT_2 = 1.03154003e+09f;
 
 /* Displacement at which the platform pose is `target`, theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m],
  * delta_y [m], delta_z [m]. */
@@ -126,7 +125,7 @@ static void wanted_state(const float wanted[6], float result[6])
         const float t1 = wanted[i] * wanted[i];
         const float t2 = square_root(LEVER_LONG_1 - t1);
         const float t3 = (wanted[i] * t2) * (t1 / (LEVER_LONG + t2));
-        const float t4 = (STAGE_1 * wanted[i]) + (STAGE_2 * t3);
+        const float t4 = (STAGE_1 * wanted[i]) + (LEVER_LONG_LEVER_SHORT_1 * t3);
         const float t5 = BEAM_ANGLE_ACTUATOR_1 + square_root(BEAM_ANGLE_ACTUATOR_2 + (BEAM_ANGLE_THICKNESS_1 * t4));
         result[i] = AMBIENT + (2.0f * (t4 / t5));
     }
@@ -181,7 +180,7 @@ static void balance_displacement(const float x[6], const float z[6], float resul
         int step;
         const float t1 = (EXPANSION + (EXPANSION_SLOPE * (x[i] - 273.15f))) * (x[i] - AMBIENT);
         for (step = 0; step < 6; step++) {
-            const float t2 = LEVER_LONG_LEVER_SHORT_1 * value;
+            const float t2 = LEVER_LONG_LEVER_SHORT_2 * value;
             const float t3 = value * value;
             const float t4 = square_root(LEVER_LONG_1 - t3);
             const float t5 = LEVER_LONG_2 * t4;
