@@ -136,7 +136,7 @@ def controller_of(device: Device) -> Scripted:
         device=SimpleNamespace(title="scripted", source="none"),
     )  # fmt: skip
     controller = Scripted(nominal, "displacement", 1e-3 if device.moving else None, SLACK)
-    controller.__dict__["named"] = (inverse(0.0), inverse(0.25) if device.moving else None, [])
+    controller.__dict__["named"] = (inverse(0.0), inverse(0.25) if device.moving else None, SimpleNamespace(laws=()), [])
     guarded = device.composite != "none"
     controller.__dict__.update(
         nominal=nominal, rounds=device.rounds, state_can_be_limited=device.states and device.limited,

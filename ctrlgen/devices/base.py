@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
@@ -95,7 +95,8 @@ class DevicePhysics:
     `restoring_force` (d) pulls the axes home; `restoring_force_parts` (d) gives its parts by name for plots.
     `limits` is given the namespace drive, command, state, force, displacement, mechanism_displacement of expressions.
     `displacement_scale` and `force_scale` are typical sizes in SI, in the units `travel_unit` and `force_unit`.
-    `bipolar` says whether the drive has both signs.
+    `bipolar` says whether the drive has both signs. `documented`: for a map, the functions whose docstrings state its equation and
+    source; the generated C repeats them.
     """
 
     axes: tuple[str, ...]
@@ -114,6 +115,7 @@ class DevicePhysics:
     travel_unit: str = "um"
     force_unit: str = "N"
     bipolar: bool = True
+    documented: Mapping[str, Sequence[Callable[..., Any]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -276,6 +276,10 @@ class MemsHexapod(Device):
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
             bipolar=False,
+            documented={
+                "force": (thermal_actuator.force, thermal_actuator.expansion),
+                "restoring_force": (xy_stage.force, xy_stage.linear_force, xy_stage.nonlinear_force),
+            },
             tangent_compliance=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
             loop_closure=lambda pose, d: hexapod.loop_closure(pose, d, h),
         )

@@ -100,14 +100,28 @@ class Text:
         return self.lines, self.result, tuple(r.array for r in self.reads), tuple(array for array, _ in self.rows)
 
 
-def text_of(root: Node, ends: Mapping[int, Node], linear: Linear, real: Real, as_row: bool = False) -> Text:
-    """`root` as C, in terms of `ends`: what is stored in local arrays by the number of its node."""
-    return _Body(root, ends, linear, real, as_row).text()
+@dataclass(frozen=True)
+class Call:
+    """A law of one axis that is a C function of its own: its name, the elements that it reads, its operations, what it calls."""
+
+    name: str
+    reads: tuple[Node, ...]
+    operations: int
+    calls: frozenset[str]
+
+
+def text_of(
+    root: Node, ends: Mapping[int, Node], linear: Linear, real: Real, as_row: bool = False, laws: Mapping[int, Call] | None = None
+) -> Text:  # fmt: skip
+    """`root` as C, in terms of `ends`, what is stored in local arrays, and of `laws`, both by the number of a node."""
+    return _Body(root, ends, linear, real, as_row, laws or {}).text()
 
 
 class _Body:
-    def __init__(self, root: Node, ends: Mapping[int, Node], linear: Linear, real: Real, as_row: bool) -> None:
-        self.root, self.ends, self.linear, self.real, self.as_row = root, ends, linear, real, as_row
+    def __init__(
+        self, root: Node, ends: Mapping[int, Node], linear: Linear, real: Real, as_row: bool, laws: Mapping[int, Call]
+    ) -> None:
+        self.root, self.ends, self.linear, self.real, self.as_row, self.laws = root, ends, linear, real, as_row, laws
         self.nodes: dict[str, Node] = {}  # by place
         self.lines: list[str] = []
         self.parts: dict[int, tuple[str, int]] = {}  # text, operations in it; an atom has none
@@ -131,7 +145,7 @@ class _Body:
         return self._numbered(self.parts[self.root.number][0])
 
     def _leaf(self, node: Node) -> bool:
-        return node.leaf or self._is_end(node) or self._is_row(node)
+        return node.leaf or self._is_end(node) or self._is_row(node) or node.number in self.laws
 
     def _is_end(self, node: Node) -> bool:
         return node.number in self.ends and node is not self.root
@@ -159,6 +173,8 @@ class _Body:
         if self._is_row(node):
             terms = self.linear.terms(node)
             return 2 * len(terms[1]) - 1 if terms else 0
+        if node.number in self.laws and not self._is_end(node):
+            return self.laws[node.number].operations
         return 0 if self._leaf(node) else 1
 
     def _expression(self, node: Node) -> tuple[str, int]:
@@ -167,6 +183,10 @@ class _Body:
             return self._place("r", self.ends[node.number]), 0
         if self._is_row(node):
             return self._place("d", node), 1
+        if node.number in self.laws:
+            law = self.laws[node.number]
+            self.calls |= law.calls
+            return f"{law.name}({', '.join(self._place('r', read) for read in law.reads)})", 1
         if node.constant:
             return self._place("c", node), 0
         if node.operation == READ:
@@ -190,7 +210,7 @@ class _Body:
     def _operand(self, node: Node) -> str:
         """As it may stand beside an operator."""
         text, inside = self.parts[node.number]
-        whole = not inside or (node.operation in CALLS and not self._leaf(node))
+        whole = not inside or node.number in self.laws or (node.operation in CALLS and not self._leaf(node))
         return text if whole else f"({text})"
 
     def _place(self, kind: str, node: Node) -> str:

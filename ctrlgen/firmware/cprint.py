@@ -12,16 +12,21 @@ import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.firmware.c_expression import PLACE, SCALAR, Linear, Text, text_of
+from ctrlgen.firmware.c_expression import PLACE, SCALAR, Call, Linear, Text, text_of
 from ctrlgen.firmware.expression_graph import Graph, Node, reached
 from ctrlgen.firmware.real import Real
 
 Ranges = Mapping[str, tuple[np.ndarray, np.ndarray]]
 WIDTH = 120  # columns of a line of C
+FEWEST_OPERATIONS = 3  # of a law that is a function of its own
+STANDS_FOR = {"z": ("wanted",), "x": ("state",)}  # arguments of kernels that a law's argument may be
+SCALAR_NAMES = {"wanted": "z", "state": "x"}  # one element of them as the parameter of a law
+RESERVED = ("LOW", "HIGH", "SLACK", "P", "X_REST", "TARGET_LIMIT", "U_LOW", "U_HIGH", "U_SLACK", "U_LEAST", "U_MOST", "U_SAFE", "NULL")
 DIVISORS = (1, 2, 3, 4, 6)  # of a loop's index, where several rows read the same element
 
 
@@ -58,18 +63,80 @@ def print_function(function: ca.Function, name: str, real: Real, ranges: Ranges 
     return Printer(real, ranges or {}).kernel(function, name, may_be_result=function.name_in())
 
 
+@dataclass(frozen=True)
+class Law:
+    """A law of every axis, (n,) in terms of the kernels' arguments, that is a C function of its own where a kernel needs it: `about`
+    states its equation, units and source."""
+
+    name: str
+    about: str
+    function: ca.Function
+
+
 @dataclass
 class Printer:
     """Prints the functions of one file. `ranges`: low and high of arguments by name; `numbers`: value and formula of each element of
-    the arguments that are constants of the device."""
+    the arguments that are constants of the device; `laws`: what may be a function of its own."""
 
     real: Real
     ranges: Ranges
     numbers: Mapping[str, Sequence[tuple[float, str]]] = field(default_factory=dict)
+    laws: Sequence[Law] = ()
 
     def __post_init__(self) -> None:
         self._graph = Graph()
         self._constants = _Constants(self.real)
+        self._law_texts: dict[str, str] = {}
+
+    @property
+    def laws_text(self) -> str:
+        """The laws that the kernels so far call."""
+        return "\n".join(self._law_texts.values())
+
+    def _calls(self, arguments: Sequence[str], rows: Sequence[Node]) -> dict[int, Call]:
+        """The laws that rows need, by the number of their node, for every array that may stand for a law's argument."""
+        needed, found = {node.number for node in reached(rows)}, dict[int, Call]()
+        for law in self.laws:
+            names = [name for name in law.function.name_in() if name not in self.numbers]
+            standing = [[a for a in (name, *STANDS_FOR.get(name, ())) if a in arguments] for name in names]
+            for chosen in product(*standing):
+                renamed = dict(zip(names, chosen, strict=True))
+                nodes = self._graph.rows(law.function, self.ranges, self.numbers, renamed)
+                if any(node.number in needed for node in nodes):
+                    found |= self._called(law, nodes)
+        return found
+
+    def _called(self, law: Law, nodes: Sequence[Node]) -> dict[int, Call]:
+        """A law's rows as calls of one function of one axis; none where axes differ or depend on each other, or it is too short."""
+        linear, texts = Linear({}), list[Text]()
+        for i, node in enumerate(nodes):
+            if node.leaf or any(n.index != i for n in reached([node]) if n.array):
+                return {}
+            texts.append(text_of(node, {}, linear, self.real))
+        same = {(text.shape, tuple(self.real.literal(c.value) for c in text.constants)) for text in texts}
+        if len(same) > 1 or texts[0].operations < FEWEST_OPERATIONS:
+            return {}
+        by_name = {read.array: read for read in texts[0].reads}
+        found = {}
+        for i, node in enumerate(nodes):
+            reads = tuple(self._graph.read(array, i) for array in by_name)
+            found[node.number] = Call(law.name, reads, texts[0].operations, texts[0].calls)
+        if law.name not in self._law_texts:
+            self._law_texts[law.name] = self._law_text(law, texts[0], list(by_name))
+        return found
+
+    def _law_text(self, law: Law, text: Text, arrays: Sequence[str]) -> str:
+        T = self.real.value
+
+        def filled(match: re.Match) -> str:
+            kind, k = match[1], int(match[2])
+            if kind == "t":
+                return f"t{k + 1}"
+            return self._constants.named(text.constants[k]) if kind == "c" else SCALAR_NAMES.get(text.reads[k].array, text.reads[k].array)
+
+        lines = [_bare(PLACE.sub(filled, line)) for line in text.lines] + [f"return {PLACE.sub(filled, text.result)};"]
+        parameters = ", ".join(f"{T} {SCALAR_NAMES.get(array, array)}" for array in arrays)
+        return f"{_comment(law.about)}static inline {T} {law.name}({parameters})\n{{\n{_indented(lines)}\n}}\n"
 
     @property
     def constants(self) -> str:
@@ -88,7 +155,8 @@ class Printer:
         operation C has no counterpart of.
         """
         rows = self._graph.rows(function, self.ranges, self.numbers)
-        body = _Body(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result).run()
+        laws = self._calls(function.name_in(), rows)
+        body = _Body(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result, laws).run()
         sizes = {a: function.size1_in(a) for a in function.name_in()}
         parts = [(name, about, body.lines)]
         if steps:
@@ -138,12 +206,17 @@ def _iterated(
 def _function(name: str, about: str, arguments: Mapping[str, int], size: int, lines: Sequence[str], T: str) -> str:
     """A static function; with `size` 0 it returns its only row."""
     read = [f"const {T} {a}[{n}]" for a, n in arguments.items()]
-    comment = "\n".join(textwrap.wrap(f"/* {about} */", WIDTH, subsequent_indent=" * ")) + "\n" if about else ""
+    comment = _comment(about)
     if not size:
         lines = [line.replace("result[0] =", "return") for line in lines]
         return f"{comment}static {T} {name}({', '.join(read)})\n{{\n{_indented(lines)}\n}}\n"
     parameters = ", ".join([*read, f"{T} result[{size}]"])
     return f"{comment}static void {name}({parameters})\n{{\n{_indented(lines)}\n}}\n"
+
+
+def _comment(about: str) -> str:
+    text = about.replace("*/", "* /").replace("/*", "/ *")
+    return "\n".join(textwrap.wrap(f"/* {text} */", WIDTH, subsequent_indent=" * ")) + "\n" if about else ""
 
 
 def _indented(lines: Sequence[str]) -> str:
@@ -161,8 +234,10 @@ class _Body:
     """The lines of one function."""
 
     def __init__(
-        self, rows: Sequence[Node], real: Real, named: Callable[[Node], str], may_be_result: Sequence[str]
-    ) -> None:
+        self, rows: Sequence[Node], real: Real, named: Callable[[Node], str], may_be_result: Sequence[str],
+        laws: Mapping[int, Call],
+    ) -> None:  # fmt: skip
+        self.laws = laws
         self.rows, self.real, self.named, self.may_be_result = list(rows), real, named, set(may_be_result)
         self.ends: dict[int, Node] = {}
         self.lines: list[str] = []
@@ -245,7 +320,8 @@ class _Body:
         groups: list[_Group] = []
         forced = {node.number for node in as_rows}
         for place in places:
-            text = text_of(roots[place], self._without(roots[place]), linear, self.real, roots[place].number in forced)
+            root = roots[place]
+            text = text_of(root, self.ends, linear, self.real, root.number in forced, self.laws)
             self.calls |= text.calls
             self.operations += text.operations
             for group in groups:
@@ -254,10 +330,6 @@ class _Body:
             else:
                 groups.append(_Group([place], [text]))
         return groups
-
-    def _without(self, root: Node) -> Mapping[int, Node]:
-        """A row that was stored before is read, and not computed anew."""
-        return self.ends
 
     def _write(self, group: _Group, assignment: str) -> None:
         """A group's lines, as a loop where it has several rows."""
@@ -322,7 +394,7 @@ class _Body:
 
     def _table(self, head: str, values: str) -> str:
         """The name of a table of numbers, declared once."""
-        return self.tables.setdefault(f"{head}|{values}", f"K{len(self.tables) + 1}")
+        return self.tables.setdefault(f"{head}|{values}", f"TABLE_{len(self.tables) + 1}")
 
 
 def _bare(line: str) -> str:
@@ -426,7 +498,8 @@ class _Constants:
 
     def __init__(self, real: Real) -> None:
         self.real = real
-        self.names: dict[tuple[str, str], str] = {}
+        self.names: dict[tuple[str, str], str] = dict.fromkeys([("", name) for name in RESERVED], "")
+        self.names = {key: key[1] for key in self.names}
         self.lines: list[str] = []
 
     def named(self, node: Node) -> str:

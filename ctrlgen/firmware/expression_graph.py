@@ -60,7 +60,6 @@ class Graph:
     def __init__(self) -> None:
         self._nodes: dict[tuple, Node] = {}
         self._count = 0
-        self._sealed: set[int] = set()
 
     def constant(self, value: float, formula: str = "") -> Node:
         """A number, and the formula of parameters that it comes from."""
@@ -77,13 +76,14 @@ class Graph:
         function: ca.Function,
         ranges: Mapping[str, tuple[np.ndarray, np.ndarray]],
         numbers: Mapping[str, Sequence[tuple[float, str]]] | None = None,
+        renamed: Mapping[str, str] | None = None,
     ) -> list[Node]:
         """The rows of the only result of an SX `function` with dense arguments.
 
         `ranges`: low and high of arguments, where they are known. `numbers`: value and formula of each element of arguments that are
-        not read when the C runs.
+        not read when the C runs. `renamed`: arguments that have another name in the C.
         """
-        at, uses = dict[int, Node](), _uses(function)
+        at = dict[int, Node]()
         found = [self.constant(0.0)] * function.size1_out(0)
         for k in range(function.n_instructions()):
             op, inputs, outputs = (
@@ -94,18 +94,18 @@ class Graph:
             elif op == ca.OP_CONST:
                 at[outputs[0]] = self.constant(function.instruction_constant(k))
             elif op == ca.OP_INPUT:
-                at[outputs[0]] = self._input(function, inputs, ranges, numbers or {})
+                at[outputs[0]] = self._input(function, inputs, ranges, numbers or {}, renamed or {})
             else:
-                node = self.apply(op, [at[i] for i in inputs])
-                if uses[k] > 1:
-                    self._sealed.add(node.number)
-                at[outputs[0]] = node
+                at[outputs[0]] = self.apply(op, [at[i] for i in inputs])
         return found
 
-    def _input(self, function: ca.Function, place: Sequence[int], ranges: Mapping, numbers: Mapping) -> Node:
+    def _input(
+        self, function: ca.Function, place: Sequence[int], ranges: Mapping, numbers: Mapping, renamed: Mapping[str, str]
+    ) -> Node:
         name, row = function.name_in(place[0]), int(function.sparsity_in(place[0]).row()[place[1]])
         if name in numbers:
             return self.constant(*numbers[name][row])
+        name = renamed.get(name, name)
         low, high = ranges.get(name, (None, None))
         return self.read(name, row, UNBOUNDED if low is None else (float(low[row]), float(high[row])))
 
@@ -188,7 +188,7 @@ class Graph:
         """(c, x) with node = c x; x is the number one where the node is a number."""
         if node.constant:
             return node, self.constant(1.0)
-        if node.operation == ca.OP_MUL and node.operands[0].constant and node.number not in self._sealed:
+        if node.operation == ca.OP_MUL and node.operands[0].constant:
             return node.operands[0], node.operands[1]
         return self.constant(1.0), node
 
@@ -270,19 +270,6 @@ def _short(formula: str) -> str:
     paths = list(dict.fromkeys(re.findall(r"[a-z_]\w*(?:\[\d+\])?(?:\.[\w\[\].]+)+", formula)))
     text = f"f({', '.join(paths)})"
     return text if len(text) <= LONGEST_FORMULA else f"f({', '.join(dict.fromkeys(path.partition('.')[0] for path in paths))})"
-
-
-def _uses(function: ca.Function) -> list[int]:
-    """How often the value of each instruction is read."""
-    counts, by_slot = [0] * function.n_instructions(), dict[int, int]()
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        if op != ca.OP_INPUT:
-            for slot in function.instruction_input(k):
-                counts[by_slot[slot]] += 2 if op == ca.OP_SQ or op in TWICE_PRINTED else 1
-        if op != ca.OP_OUTPUT:
-            by_slot[function.instruction_output(k)[0]] = k
-    return counts
 
 
 def _by_products(exponent: float) -> bool:

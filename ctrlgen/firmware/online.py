@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import base_unit, show
-from ctrlgen.firmware.cprint import Kernel, Printer
+from ctrlgen.firmware.cprint import Kernel, Law, Printer
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
 from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, SWEEPS, Controller
 from ctrlgen.model.inverse import NEWTON_STEPS
+from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
@@ -32,8 +34,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
     }  # fmt: skip
-    static, moving, numbers = controller.named
-    printed = _Kernels(Printer(real, ranges, {"p": numbers}), kernel_comments(controller))
+    static, moving, named_model, numbers = controller.named
+    printer = Printer(real, ranges, {"p": numbers}, printed_laws(named_model))
+    printed = _Kernels(printer, kernel_comments(controller))
 
     modes: list[dict[str, Any]] = []
     for name, inverse, z in (
@@ -78,7 +81,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
         "elementary": elementary_text(called, real), "bound": bound, "nearest_slopes": controller.nearest_slopes, "sweeps": SWEEPS,
-        "constants": printed.printer.constants, "kernels": printed.kernels, "modes": modes, "motion": motion, "shares": shares,
+        "constants": printer.constants, "laws": printer.laws_text, "kernels": printed.kernels, "modes": modes, "motion": motion, "shares": shares,
         "shares_count": controller.composite_shares.size1_out(0) if shares else 0,
         "balance": balance, "secant_steps": SECANT_STEPS, "secant_fraction": SECANT_FRACTION,
         "composite_rounds": controller.composite_rounds,
@@ -123,6 +126,18 @@ class _Kernels:
     def calls(self) -> frozenset[str]:
         """The elementary functions that they call."""
         return frozenset().union(*(kernel.calls for kernel in self.kernels))
+
+
+def printed_laws(model: Model) -> list[Law]:
+    """The named parts of a model's physics for `Printer`, with the equations and sources of their docstrings."""
+    found = []
+    for law in model.laws:
+        stated = " ".join(" ".join((function.__doc__ or "").split()) for function in law.documented)
+        arguments = [model.x, model.z, model.u, model.p]
+        function = ca.Function(law.name, arguments, [law.expr], ["x", "z", "drive", "p"], ["force"])
+        about = f"{law.label[0].upper()}{law.label[1:]}" + (f": {stated}" if stated else ".")
+        found.append(Law(law.name, about, function))
+    return found
 
 
 def kernel_comments(controller: Controller) -> dict[Any, str]:

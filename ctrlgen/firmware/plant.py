@@ -122,7 +122,7 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
         "rate": f"{1 / plant.sample_time:.17g}", "n": len(m.axes), "nx": m.x.numel(), "nu": m.u.numel(),
         "x_names": [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)],
         "signals": list(zip(plant.signals, map(int, starts), strict=False)), "width": int(starts[-1]),
-        "inertial": plant.inertial, "constants": printer.constants, "kernels": kernels, "axes": m.axes,
+        "inertial": plant.inertial, "constants": printer.constants, "laws": printer.laws_text, "kernels": kernels, "axes": m.axes,
         "elementary": elementary_text(called, real),
         "rest": m.rest, "z_scale": m.z_scale, "x_near": ARRIVED[real] * m.x_scale, "z_near": ARRIVED[real] * m.z_scale,
         "newton": NEWTON_MOST, "rounds": ROUNDS,

@@ -6,7 +6,7 @@ u --(drive terms)--> drive --rates--> x --force(terms)--> balance with the stage
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysi
 from ctrlgen.devices.sensor import mounting_faults
 from ctrlgen.effects import Place
 from ctrlgen.model.effect_terms import EffectTerms
-from ctrlgen.model.model import Model
+from ctrlgen.model.model import Law, Model
 
 TYPICAL_RATE = 100.0  # 1/s: a typical velocity is a typical displacement times this
 STROKE_POINTS = 65  # points of the stroke, ends included, at which the tangent stiffness is checked
@@ -154,6 +154,10 @@ def _assemble(
         signals=signals,
         force_parts=physics.restoring_force_parts(z),
         limits=tuple(physics.limits(_limited(physics, signals, own_x, z))),
+        laws=tuple(
+            Law(name, f"{label} [{physics.force_unit}] of an axis", closed(expr), physics.documented.get(of, ()))
+            for name, label, of, expr in _named_forces(physics, z, v)
+        ),
         law_inputs=terms.law_inputs,
         x_names=(
             *(() if state is None else (f"{state.name}_{channel}" for channel in state.channels)),
@@ -179,6 +183,16 @@ def _assemble(
         u_scale=np.array(physics.drive.scale),
         force_scale=physics.force_scale,
     )  # fmt: skip
+
+
+def _named_forces(physics: DevicePhysics, z: ca.SX, v: ca.SX) -> Iterator[tuple[str, str, str, ca.SX]]:
+    """C name, label, map and value of the device's own forces."""
+    yield "restoring_force", "restoring force", "restoring_force", physics.restoring_force(z)
+    if isinstance(physics, BalancedPhysics):
+        x = NONE if physics.state is None else physics.state.expr
+        yield "actuator_force", "actuator force", "force", physics.force(physics.drive.expr, x, z)
+    if isinstance(physics, InertialPhysics) and physics.damping_force is not None:
+        yield "damping_force", "damping force", "damping_force", physics.damping_force(v)
 
 
 @lru_cache(maxsize=16)  # a diagnosis builds hundreds of models of one device, each with other effects

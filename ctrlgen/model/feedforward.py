@@ -61,9 +61,9 @@ class Controller:
         return None if self.sample_time is None else invert(self.nominal, self.follow, self.sample_time)
 
     @cached_property
-    def named(self) -> tuple[Inverse, Inverse | None, list[tuple[float, str]]]:
-        """The kernels for equilibria and for the next sample with an argument "p" more, and its values with their paths in the device:
-        the same numbers as those of `static` and `moving`, as formulas of the device's parameters."""
+    def named(self) -> tuple[Inverse, Inverse | None, Model, list[tuple[float, str]]]:
+        """The kernels for equilibria and for the next sample with an argument "p" more, their model, and the values of p with their
+        paths in the device: the same numbers as those of `static` and `moving`, as formulas of the device's parameters."""
         device = self.model.device
         values = dict(device.quantities())
         paths = [path for path in movable(device) if values[path].si != 0]
@@ -73,7 +73,7 @@ class Controller:
             own: replace(invert(model, self.follow, time, symbolic=True), displacement=own.displacement)  # of matrices inverted as here
             for own, time in ((self.static, None), (self.moving, self.sample_time)) if own is not None
         }  # fmt: skip
-        return named[self.static], None if self.moving is None else named[self.moving], numbers
+        return named[self.static], None if self.moving is None else named[self.moving], model, numbers
 
     @cached_property
     def nominal(self) -> Model:

@@ -7,16 +7,26 @@ z' = v. All SX, SI inside. `ctrlgen.model.assembly` builds it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, Limit, Signal
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A part of the physics that every axis has: its C `name`, what it is, its value (n,), what states its equation and source."""
+
+    name: str
+    label: str
+    expr: ca.SX
+    documented: Sequence[Callable[..., Any]] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +72,7 @@ class Model:
     ]  # drive, power, state where there are some, force, displacement, pose, reading; in this order
     force_parts: dict[str, ca.SX]  # parts of the restoring force by name
     limits: tuple[Limit, ...]
+    laws: tuple[Law, ...]  # parts of the equations that have a name
     law_inputs: Callable[
         ..., SimpleNamespace
     ]  # (place, channel, partner, states, stage) -> what an effect's law reads there

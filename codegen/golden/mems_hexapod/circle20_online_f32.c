@@ -85,17 +85,37 @@ static const float TIME_CONSTANT_1 = 0.18126924f;
 static const float TIME_CONSTANT_THERMAL_RESISTANCE_1 = 0.010030283f;
 static const float EXPANSION = 3e-06f; /* actuator.expansion */
 static const float EXPANSION_SLOPE = 3e-09f; /* actuator.expansion_slope */
-/* ((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long */
-static const float LEVER_LONG_LEVER_SHORT_2 = 1.03154003e+09f;
-static const float LEVER_LONG_2 = 1000.0f; /* 1 / stage.lever_long */
 /* sin(actuator.beam_angle) * (actuator.thickness * (actuator.beam_width * (actuator.young * 30))) */
 static const float BEAM_ANGLE_THICKNESS_2 = 177.2821f;
+
+/* Restoring force [N] of an axis: F = F^l + F^n [N] on the bar for a stage displacement `d` [m]. Source: S1 eq. (12).
+ * F^l = (K^t_14 / r + r N / (c e_4^2)) d [N] on the actuator bar, `d` [m] the stage displacement. r = e_4/e_3 is the
+ * lever ratio, N the number of notches, each rotating by d/e_4, and c = theta_z/M_z the rotational compliance of one.
+ * Source: S1 eq. (9), referred to the bar by virtual work. F^n = 2 r k_a sin(phi) cos(phi) delta_y [N] on the bar,
+ * sin(phi) = d/e_4, r = e_4/e_3. The axial stiffness k_a of one half stage, rotated by phi, resists the parasitic
+ * shortening delta_y of eq. (10). Source: S1 eq. (11), with K^n the rotated axial stiffness. */
+static inline float restoring_force(float z)
+{
+    const float t1 = z * z;
+    const float t2 = square_root(LEVER_LONG_1 - t1);
+    const float t3 = (z * t2) * (t1 / (LEVER_LONG + t2));
+    return (STAGE_1 * z) + (LEVER_LONG_LEVER_SHORT_1 * t3);
+}
+
+/* Actuator force [N] of an axis: F = 2 n alpha(T) (T - T_amb) E w_1 h sin(theta) [N] on the actuator bar, `T` [K].
+ * Source: S1 eq. (4), where T-bar is the average temperature above ambient. alpha(T) = alpha_0 + alpha_1 (T - 0 degC)
+ * [1/K], `T` [K]. Source: S1 Table 1. */
+static inline float actuator_force(float x)
+{
+    const float t1 = (EXPANSION + (EXPANSION_SLOPE * (x - 273.15f))) * (x - AMBIENT);
+    return BEAM_ANGLE_THICKNESS_2 * t1;
+}
 
 /* Displacement at which the platform pose is `target`, theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m],
  * delta_y [m], delta_z [m]. */
 static void wanted_displacement(const float target[6], float result[6])
 {
-    static const float K1[6][6] = {
+    static const float TABLE_1[6][6] = {
         { -0.0026423377f, -0.0037076124f, 0.0041873017f, 1.0f, 0.0f, 0.64624566f },
         { 0.0006915413f, 0.0026864675f, -0.002447848f, 0.0f, 1.0f, 1.1192472f },
         { -0.0018897178f, 0.0041421377f, 0.0041873017f, -0.5f, -0.8660254f, 0.64624566f },
@@ -111,8 +131,8 @@ static void wanted_displacement(const float target[6], float result[6])
     const float target_4 = target[4];
     const float target_5 = target[5];
     for (i = 0; i < 6; i++) {
-        result[i] = (K1[i][0] * target_0) + (K1[i][1] * target_1) + (K1[i][2] * target_2) + (K1[i][3] * target_3) +
-            (K1[i][4] * target_4) + (K1[i][5] * target_5);
+        result[i] = (TABLE_1[i][0] * target_0) + (TABLE_1[i][1] * target_1) + (TABLE_1[i][2] * target_2) +
+            (TABLE_1[i][3] * target_3) + (TABLE_1[i][4] * target_4) + (TABLE_1[i][5] * target_5);
     }
 }
 
@@ -178,21 +198,17 @@ static void balance_displacement(const float x[6], const float z[6], float resul
     for (i = 0; i < 6; i++) {
         float value = z[i];
         int step;
-        const float t1 = (EXPANSION + (EXPANSION_SLOPE * (x[i] - 273.15f))) * (x[i] - AMBIENT);
         for (step = 0; step < 6; step++) {
-            const float t2 = LEVER_LONG_LEVER_SHORT_2 * value;
-            const float t3 = value * value;
-            const float t4 = square_root(LEVER_LONG_1 - t3);
-            const float t5 = LEVER_LONG_2 * t4;
-            const float t6 = t2 * t5;
-            const float t7 = LEVER_LONG + t4;
-            const float t8 = t3 / t7;
-            const float t9 = (BEAM_ANGLE_THICKNESS_2 * t1) - ((STAGE_1 * value) + (t6 * t8));
-            const float t10 = value / t4;
-            const float t11 = (LEVER_LONG_LEVER_SHORT_2 * t5) - (LEVER_LONG_2 * (t2 * t10));
-            const float t12 = (2.0f * (value / t7)) + ((t8 / t7) * t10);
-            const float t13 = STAGE_1 + ((t8 * t11) + (t6 * t12));
-            value = value + (t9 / t13);
+            const float t1 = value * value;
+            const float t2 = square_root(LEVER_LONG_1 - t1);
+            const float t3 = LEVER_LONG + t2;
+            const float t4 = t1 / t3;
+            const float t5 = value / t2;
+            const float t6 = (LEVER_LONG_LEVER_SHORT_1 * t2) - (LEVER_LONG_LEVER_SHORT_1 * (value * t5));
+            const float t7 = (2.0f * (value / t3)) + ((t4 / t3) * t5);
+            const float t8 = (t4 * t6) + (LEVER_LONG_LEVER_SHORT_1 * ((value * t2) * t7));
+            const float t9 = (actuator_force(x[i]) - restoring_force(value)) / (STAGE_1 + t8);
+            value = value + t9;
         }
         result[i] = value;
     }
@@ -201,7 +217,7 @@ static void balance_displacement(const float x[6], const float z[6], float resul
 /* The square of each wire flexure stress over its limit at displacement `wanted`. */
 static void composite_shares(const float wanted[6], float result[12])
 {
-    static const float K1[6][6] = {
+    static const float TABLE_1[6][6] = {
         { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
         { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f },
         { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f },
@@ -209,7 +225,7 @@ static void composite_shares(const float wanted[6], float result[12])
         { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f },
         { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f }
     };
-    static const float K2[6][6] = {
+    static const float TABLE_2[6][6] = {
         { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f },
         { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f },
         { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f },
@@ -217,7 +233,7 @@ static void composite_shares(const float wanted[6], float result[12])
         { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f },
         { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f }
     };
-    static const float K3[12][6] = {
+    static const float TABLE_3[12][6] = {
         { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f, -1.5802731e+12f, -2.536233e+12f },
         { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f, -1.1851115e+12f, 1.3707138e+12f },
         { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f, -1.4328322e+12f, -2.6332991e+12f },
@@ -231,7 +247,7 @@ static void composite_shares(const float wanted[6], float result[12])
         { -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f, -1.1844611e+12f, -3.1986845e+12f },
         { 2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f, -1.4484263e+12f, 1.6090792e+12f }
     };
-    static const float K4[12][6] = {
+    static const float TABLE_4[12][6] = {
         { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f, 7.0338765e+10f, -1.9992656e+11f },
         { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f, -3.4923767e+12f, 2.1020536e+12f },
         { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f, 2.4708851e+11f, 7.325468e+10f },
@@ -255,20 +271,20 @@ static void composite_shares(const float wanted[6], float result[12])
     const float wanted_4 = wanted[4];
     const float wanted_5 = wanted[5];
     for (i = 0; i < 6; i++) {
-        const float t1 = (K1[i][0] * wanted_0) + (K1[i][1] * wanted_1) + (K1[i][2] * wanted_2) + (K1[i][3] * wanted_3) +
-            (K1[i][4] * wanted_4) + (K1[i][5] * wanted_5);
+        const float t1 = (TABLE_1[i][0] * wanted_0) + (TABLE_1[i][1] * wanted_1) + (TABLE_1[i][2] * wanted_2) +
+            (TABLE_1[i][3] * wanted_3) + (TABLE_1[i][4] * wanted_4) + (TABLE_1[i][5] * wanted_5);
         shared1[i] = (t1 < 0.0f) ? -t1 : t1;
     }
     for (i = 0; i < 6; i++) {
-        const float t1 = (K2[i][0] * wanted_0) + (K2[i][1] * wanted_1) + (K2[i][2] * wanted_2) + (K2[i][3] * wanted_3) +
-            (K2[i][4] * wanted_4) + (K2[i][5] * wanted_5);
+        const float t1 = (TABLE_2[i][0] * wanted_0) + (TABLE_2[i][1] * wanted_1) + (TABLE_2[i][2] * wanted_2) +
+            (TABLE_2[i][3] * wanted_3) + (TABLE_2[i][4] * wanted_4) + (TABLE_2[i][5] * wanted_5);
         shared2[i] = 3.0f * (t1 * t1);
     }
     for (i = 0; i < 12; i++) {
-        const float t1 = (K3[i][0] * wanted_0) + (K3[i][1] * wanted_1) + (K3[i][2] * wanted_2) + (K3[i][3] * wanted_3) +
-            (K3[i][4] * wanted_4) + (K3[i][5] * wanted_5);
-        const float t2 = (K4[i][0] * wanted_0) + (K4[i][1] * wanted_1) + (K4[i][2] * wanted_2) + (K4[i][3] * wanted_3) +
-            (K4[i][4] * wanted_4) + (K4[i][5] * wanted_5);
+        const float t1 = (TABLE_3[i][0] * wanted_0) + (TABLE_3[i][1] * wanted_1) + (TABLE_3[i][2] * wanted_2) +
+            (TABLE_3[i][3] * wanted_3) + (TABLE_3[i][4] * wanted_4) + (TABLE_3[i][5] * wanted_5);
+        const float t2 = (TABLE_4[i][0] * wanted_0) + (TABLE_4[i][1] * wanted_1) + (TABLE_4[i][2] * wanted_2) +
+            (TABLE_4[i][3] * wanted_3) + (TABLE_4[i][4] * wanted_4) + (TABLE_4[i][5] * wanted_5);
         const float t3 = ((t1 * t1) + (t2 * t2)) + 0.3025f;
         const float t4 = square_root(t3) + shared1[i / 2];
         result[i] = 3.3057851e-18f * ((t4 * t4) + shared2[i / 2]);
