@@ -98,7 +98,7 @@ class Printer:
         needed, found = {node.number for node in reached(rows)}, dict[int, Call]()
         for law in self.laws:
             names = [name for name in law.function.name_in() if name not in self.numbers]
-            standing = [[a for a in (name, *STANDS_FOR.get(name, ())) if a in arguments] for name in names]
+            standing = [[a for a in (name, *STANDS_FOR.get(name, ())) if a in arguments] or [name] for name in names]
             for chosen in product(*standing):
                 renamed = dict(zip(names, chosen, strict=True))
                 nodes = self._graph.rows(law.function, self.ranges, self.numbers, renamed)
@@ -498,8 +498,7 @@ class _Constants:
 
     def __init__(self, real: Real) -> None:
         self.real = real
-        self.names: dict[tuple[str, str], str] = dict.fromkeys([("", name) for name in RESERVED], "")
-        self.names = {key: key[1] for key in self.names}
+        self.names: dict[tuple[str, str], str] = {("", name): name for name in RESERVED}
         self.lines: list[str] = []
 
     def named(self, node: Node) -> str:

@@ -142,12 +142,9 @@ static void wanted_state(const float wanted[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        const float t1 = wanted[i] * wanted[i];
-        const float t2 = square_root(LEVER_LONG_1 - t1);
-        const float t3 = (wanted[i] * t2) * (t1 / (LEVER_LONG + t2));
-        const float t4 = (STAGE_1 * wanted[i]) + (LEVER_LONG_LEVER_SHORT_1 * t3);
-        const float t5 = BEAM_ANGLE_ACTUATOR_1 + square_root(BEAM_ANGLE_ACTUATOR_2 + (BEAM_ANGLE_THICKNESS_1 * t4));
-        result[i] = AMBIENT + (2.0f * (t4 / t5));
+        const float t1 = restoring_force(wanted[i]);
+        const float t2 = BEAM_ANGLE_ACTUATOR_1 + square_root(BEAM_ANGLE_ACTUATOR_2 + (BEAM_ANGLE_THICKNESS_1 * t1));
+        result[i] = AMBIENT + (2.0f * (t1 / t2));
     }
 }
 
