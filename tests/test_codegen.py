@@ -265,8 +265,8 @@ int main(void)
     if ({player}_at(-1.0f, u) != {player.upper()}_INPUT) {{ return 7; }}
     if ({player}_at(1e30f, u) != {player.upper()}_INPUT) {{ return 8; }}
     if ({player}_at(0.9999f, u) != 0) {{ return 9; }}
-    if ({player}_sample(4000000000UL, u) != 0) {{ return 10; }}
-    if ({player}_sample(0UL, NULL) != {player.upper()}_INPUT) {{ return 11; }}
+    if ({player}_sample(4000000000U, u) != 0) {{ return 10; }}
+    if ({player}_sample(0U, NULL) != {player.upper()}_INPUT) {{ return 11; }}
     return 0;
 }}
 """)

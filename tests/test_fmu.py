@@ -360,16 +360,16 @@ int main(void)
 {{
     {name}_state state;
     {name}_output out;
-    int status = {name}_init(&state, drives[0]);
+    uint32_t status = {name}_init(&state, drives[0]);
     int k;
     int i;
-    status += {name}_signals(&state, drives[0], &out);
+    status |= {name}_signals(&state, drives[0], &out);
     {show}
     for (k = 0; k < {len(drives)}; k++) {{
-        status += {name}_step(&state, drives[k], &out);
+        status |= {name}_step(&state, drives[k], &out);
         {show}
     }}
-    return status;
+    return (int)status;
 }}
 """)
     sources = [str(folder / "main.c"), str(folder / f"{name}.c")]

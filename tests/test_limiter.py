@@ -267,11 +267,11 @@ int main(void)
     limiter_output o;
     limiter_init(NULL);
     limiter_init(&s);
-    if (limiter_settle(NULL, in, &o) != 16 || limiter_settle(&s, NULL, &o) != 16 || limiter_settle(&s, in, NULL) != 16) {
+    if (limiter_settle(NULL, in, &o) != LIMITER_INPUT || limiter_settle(&s, NULL, &o) != LIMITER_INPUT || limiter_settle(&s, in, NULL) != LIMITER_INPUT) {
         return 1;
     }
 #ifdef MOVING
-    if (limiter_step(NULL, in, &o) != 16 || limiter_step(&s, NULL, &o) != 16 || limiter_step(&s, in, NULL) != 16) {
+    if (limiter_step(NULL, in, &o) != LIMITER_INPUT || limiter_step(&s, NULL, &o) != LIMITER_INPUT || limiter_step(&s, in, NULL) != LIMITER_INPUT) {
         return 1;
     }
 #endif

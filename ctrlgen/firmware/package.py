@@ -139,11 +139,11 @@ def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[
     x, n, n_s, m, count = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
-    vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} `int` of 4 B, constants; only if the test is called"
+    vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
     played = len(c["played"])
     if played:
         vectors = vectors.replace(
-            ", constants", f", {played} x {n} numbers and {played} `unsigned long` of 4 B, constants"
+            ", constants", f", {played} x {n} numbers and {played} indices of 4 B, constants"
         )
     rows = [
         _counted("state", x + n, 0, state),

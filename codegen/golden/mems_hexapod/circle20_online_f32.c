@@ -2,7 +2,6 @@
 #include "circle20_online_f32.h"
 
 #include <stddef.h>
-#include <stdint.h>
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0)) || defined(_M_FP_FAST)
 #error "compile this without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast: they remove the checks for NaN"
@@ -2026,16 +2025,16 @@ static void settle_safe(circle20_online_f32_state *state, circle20_online_f32_ou
 }
 
 /* Drives for out->displacement with every limit kept; advances the state to the next sample. */
-static int settle_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static uint32_t settle_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
-    int status = 0;
+    uint32_t status = 0U;
     int limited = 0;
     int i;
     wanted_state(out->displacement, out->state);
     {
         const int scaled = limit_composite(state, out->displacement);
         if (scaled > 1) {
-            status += CIRCLE20_ONLINE_F32_COMPOSITE;
+            status |= CIRCLE20_ONLINE_F32_COMPOSITE;
         }
         if (scaled > 0) {
             wanted_state(out->displacement, out->state);
@@ -2048,7 +2047,7 @@ static int settle_within(circle20_online_f32_state *state, circle20_online_f32_o
         } else {
             static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
             limited = settle_line_search(state, home, out);
-            status += CIRCLE20_ONLINE_F32_DRIVE;
+            status |= CIRCLE20_ONLINE_F32_DRIVE;
         }
     }
     if (limited != 0) {
@@ -2065,9 +2064,9 @@ static int settle_within(circle20_online_f32_state *state, circle20_online_f32_o
     return status;
 }
 
-int circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+uint32_t circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
 {
-    int status = CIRCLE20_ONLINE_F32_INPUT;
+    uint32_t status = CIRCLE20_ONLINE_F32_INPUT;
     if ((state != NULL) && (target != NULL) && (out != NULL)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
@@ -2085,7 +2084,7 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
             }
             status = settle_within(state, out);
             if (hit != 0) {
-                status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
+                status |= CIRCLE20_ONLINE_F32_DISPLACEMENT;
             }
         } else {
             settle_safe(state, out);
@@ -2107,16 +2106,16 @@ static void step_safe(circle20_online_f32_state *state, circle20_online_f32_outp
 }
 
 /* Drives for out->displacement with every limit kept; advances the state to the next sample. */
-static int step_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static uint32_t step_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
 {
-    int status = 0;
+    uint32_t status = 0U;
     int limited = 0;
     int i;
     wanted_state(out->displacement, out->state);
     {
         const int scaled = limit_composite(state, out->displacement);
         if (scaled > 1) {
-            status += CIRCLE20_ONLINE_F32_COMPOSITE;
+            status |= CIRCLE20_ONLINE_F32_COMPOSITE;
         }
         if (scaled > 0) {
             wanted_state(out->displacement, out->state);
@@ -2128,7 +2127,7 @@ static int step_within(circle20_online_f32_state *state, circle20_online_f32_out
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             limited = step_line_search(state, state->z, out);
-            status += CIRCLE20_ONLINE_F32_DRIVE;
+            status |= CIRCLE20_ONLINE_F32_DRIVE;
         }
     }
     if (limited != 0) {
@@ -2145,9 +2144,9 @@ static int step_within(circle20_online_f32_state *state, circle20_online_f32_out
     return status;
 }
 
-int circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+uint32_t circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
 {
-    int status = CIRCLE20_ONLINE_F32_INPUT;
+    uint32_t status = CIRCLE20_ONLINE_F32_INPUT;
     if ((state != NULL) && (target != NULL) && (out != NULL)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
@@ -2165,7 +2164,7 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
             }
             status = step_within(state, out);
             if (hit != 0) {
-                status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
+                status |= CIRCLE20_ONLINE_F32_DISPLACEMENT;
             }
         } else {
             step_safe(state, out);

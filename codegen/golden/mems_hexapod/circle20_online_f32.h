@@ -24,15 +24,17 @@
 #ifndef CIRCLE20_ONLINE_F32_H
 #define CIRCLE20_ONLINE_F32_H
 
+#include <stdint.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Status: 0, or a sum of these. The drive is within its limits in every case. */
-#define CIRCLE20_ONLINE_F32_DISPLACEMENT 1 /* target beyond the displacement range: the nearest target inside was taken */
-#define CIRCLE20_ONLINE_F32_COMPOSITE 2    /* wire flexure stress: displacement scaled toward home */
-#define CIRCLE20_ONLINE_F32_DRIVE 8        /* heater power at its limit: the target is approached as far as one sample allows */
-#define CIRCLE20_ONLINE_F32_INPUT 16       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
+/* Status: 0, or bits of these. The drive is within its limits in every case. */
+#define CIRCLE20_ONLINE_F32_DISPLACEMENT (1U) /* target beyond the displacement range: the nearest target inside was taken */
+#define CIRCLE20_ONLINE_F32_COMPOSITE (2U)    /* wire flexure stress: displacement scaled toward home */
+#define CIRCLE20_ONLINE_F32_DRIVE (8U)        /* heater power at its limit: the target is approached as far as one sample allows */
+#define CIRCLE20_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
 
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
@@ -49,9 +51,9 @@ typedef struct {
 void circle20_online_f32_init(circle20_online_f32_state *state);
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled. */
-int circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out);
+uint32_t circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out);
 /* Drive that brings the device to target at the next sample, held until then. Call once a sample. */
-int circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out);
+uint32_t circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out);
 #ifdef __cplusplus
 }
 #endif
