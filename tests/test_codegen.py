@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import importlib.util
 import re
 import shutil
@@ -21,6 +22,7 @@ from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.fmu import write_fmus
 from ctrlgen.firmware.folder import generate, write_harness
 from ctrlgen.firmware.plant import plant_of, write_plant
+from ctrlgen.firmware.templates import ABI, hertz
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.version import program
 
@@ -51,7 +53,7 @@ def test_golden_c_is_what_is_generated(folder, suffix, request):
 
     Golden files state the version alone: with the commit each commit would have to change them.
     """
-    name = f"circle20_online_{suffix}"
+    name = f"mems_hexapod_online_{suffix}"
     made = (folder.path / name).read_text()
     assert program() in made
     new = made.replace(program(), f"ctrlgen {__version__}")
@@ -68,7 +70,7 @@ def test_golden_c_is_what_is_generated(folder, suffix, request):
 
 def test_float_c_knows_no_double(folder):
     for path in folder.path.glob("*_f32.[ch]"):
-        text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.DOTALL)
+        text = re.sub(r'/\*.*?\*/|"[^"\n]*"', "", path.read_text(), flags=re.DOTALL)
         assert "double" not in text, path.name
         bare = [m[0] for m in NUMBER.finditer(text) if text[m.end()] != "f"]
         assert not bare, (path.name, bare[:3])
@@ -277,18 +279,78 @@ int main(void)
 
 
 def test_two_controllers_link_into_one_program(folder, compiler, tmp_path):
-    scenario = load_scenario(SCENARIOS / "spiral")
-    other = generate(scenario, build_model(scenario.device), tmp_path / "spiral")
+    scenario = load_scenario(SCENARIOS / "rrr_circle")
+    other = generate(scenario, build_model(scenario.device), tmp_path / "rrr")
     (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
     sources = [folder.path / f"{name}.c" for name in (*folder.online.values(), *folder.player.values())]
     sources += [other.path / f"{name}.c" for name in other.online.values()]
     build(compiler, [tmp_path / "main.c", *sources], tmp_path / "main")
 
 
+def test_two_trajectories_of_one_device_and_rate_have_the_same_online_controller(folder, circle, tmp_path):
+    spiral, raster = (load_scenario(SCENARIOS / name) for name in ("spiral", "raster"))
+    same, slower = (generate(s, build_model(s.device), tmp_path / s.name) for s in (spiral, raster))
+    for real in Real:
+        for ending in ("h", "c"):
+            here, there, elsewhere = (
+                (c.path / f"{c.online[real]}.{ending}").read_bytes() for c in (folder, same, slower)
+            )
+            assert here == there
+            assert ending == "c" or here != elsewhere  # 500 Hz instead of 1 kHz
+    for name in (circle.scenario.name, spiral.name):
+        assert name not in (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
+
+
+@pytest.mark.parametrize("piece", ["online", "player", "plant"])
+def test_a_firmware_can_pin_the_interface_at_compile_time(piece, folder, circle, tmp_path):
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is missing: _Static_assert was not compiled")
+    write_plant(circle.scenario, plant_of(circle.scenario), Real.FLOAT, tmp_path)
+    name = "mems_hexapod_plant_f32" if piece == "plant" else getattr(folder, piece)[Real.FLOAT]
+    source = circle.scenario.inputs["device"].path.read_bytes()
+    right = {
+        "ABI": f"{ABI}U",
+        "DEVICE_HASH": f"0x{hashlib.sha256(source).hexdigest()[:8]}U",
+        "RATE_HZ": "1000U",
+        "DRIVE_SIZE": "6U",
+    }
+    right |= {
+        "online": {"TARGET_SIZE": "6U", "STATE_SIZE": "6U", "DISPLACEMENT_SIZE": "6U"},
+        "player": {"SAMPLES": "1000U", "SCENARIO_HASH": f"0x{circle.scenario.digest['scenario'][:8]}U"},
+        "plant": {"MODEL_STATE_SIZE": "6U", "POSE_SIZE": "6U"},
+    }[piece]
+
+    def compiles(macro: str, value: str) -> bool:
+        asserted = f'_Static_assert({name.upper()}_{macro} == {value}, "{macro}");'
+        version = f"static const char version[] = {name.upper()}_VERSION; int main(void) {{ return version[0] == 0; }}"
+        (tmp_path / "main.c").write_text(f'#include "{name}.h"\n{asserted}\n{version}\n')
+        words = [
+            "gcc",
+            "-std=c11",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            f"-I{folder.path}",
+            f"-I{tmp_path}",
+            "-fsyntax-only",
+            "main.c",
+        ]
+        return subprocess.run(words, cwd=tmp_path, capture_output=True).returncode == 0
+
+    for macro, value in right.items():
+        assert compiles(macro, value), macro
+        assert not compiles(macro, f"{value} + 1U"), macro
+
+
+def test_a_rate_that_is_no_whole_number_stays_one():
+    assert hertz(1 / (1 / 44100.0), Real.FLOAT) == "44100U" and hertz(None, Real.FLOAT) == "0U"
+    assert hertz(0.25, Real.FLOAT) == "0.25f" and hertz(1000.5, Real.DOUBLE) == "1000.5"
+
+
 def test_headers_state_names_units_limits_and_provenance(folder, circle):
     text = (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
     for words in ("theta_x [rad]", "delta_z [m]", "1X [W]", "1000 Hz", "22 degC <= actuator temperature <= 550 degC",
-                  "wire flexure stress <= 550 MPa", circle.scenario.digest["device"][:16], "Mech. Mach. Theory"):  # fmt: skip
+                  "wire flexure stress <= 550 MPa", circle.scenario.device_sha256[:16], "Mech. Mach. Theory"):  # fmt: skip
         assert words in text, words
 
 

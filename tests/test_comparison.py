@@ -66,8 +66,8 @@ def test_c_that_hangs_up_is_reported(folder, circle):
         folder,
         Real.DOUBLE,
         "online",
-        r"    uint32_t status = CIRCLE20_ONLINE_F64_INPUT;",
-        "    uint32_t status = CIRCLE20_ONLINE_F64_INPUT;\n    if (target[5] > 0.0) { (void)*(volatile int *)0; }",
+        r"    uint32_t status = MEMS_HEXAPOD_ONLINE_F64_INPUT;",
+        "    uint32_t status = MEMS_HEXAPOD_ONLINE_F64_INPUT;\n    if (target[5] > 0.0) { (void)*(volatile int *)0; }",
     )
     with pytest.raises(ToolError):
         compare(folder, circle)

@@ -38,6 +38,7 @@ TARGET_LIMIT = np.full(N, 64.0)
 OUTCOMES = ("inside", "edge", "beyond")
 TRIALS = tuple("".join(outcome) for outcome in product("+-", repeat=3))  # "+": the drives of a trial are admissible
 PLAIN = ("inside", "inside", "kept", "inside")
+NOWHERE = SimpleNamespace(device_sha256="0" * 64)  # instead of a scenario: of it the controller's C says the device
 PATIENCE = 3000  # samples drawn for one combination; the rarest sequence of trials is one in some hundreds
 
 
@@ -260,6 +261,7 @@ MAIN = """
 #include <stdio.h>
 #include <string.h>
 #include "limiter.h"
+#define BAD LIMITER_INPUT
 int main(void)
 {
     double in[1 + NX + N + N];
@@ -267,11 +269,11 @@ int main(void)
     limiter_output o;
     limiter_init(NULL);
     limiter_init(&s);
-    if (limiter_settle(NULL, in, &o) != LIMITER_INPUT || limiter_settle(&s, NULL, &o) != LIMITER_INPUT || limiter_settle(&s, in, NULL) != LIMITER_INPUT) {
+    if (limiter_settle(NULL, in, &o) != BAD || limiter_settle(&s, NULL, &o) != BAD || limiter_settle(&s, in, NULL) != BAD) {
         return 1;
     }
 #ifdef MOVING
-    if (limiter_step(NULL, in, &o) != LIMITER_INPUT || limiter_step(&s, NULL, &o) != LIMITER_INPUT || limiter_step(&s, in, NULL) != LIMITER_INPUT) {
+    if (limiter_step(NULL, in, &o) != BAD || limiter_step(&s, NULL, &o) != BAD || limiter_step(&s, in, NULL) != BAD) {
         return 1;
     }
 #endif
@@ -304,10 +306,7 @@ int main(void)
 
 def run_c(device: Device, controller: Scripted, records: np.ndarray, folder: Path) -> np.ndarray:
     """The answers of the generated C, built so that its branches are counted."""
-    scenario = SimpleNamespace(
-        file=SimpleNamespace(follow="displacement"), digest={"device": "0" * 64, "scenario": "0" * 64}
-    )
-    context = online_context(scenario, controller, Real.DOUBLE, "limiter")
+    context = online_context(NOWHERE, controller, Real.DOUBLE, "limiter")
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"limiter.{end}")
     (folder / "main.c").write_text(MAIN)
@@ -389,9 +388,7 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
     same = (answers == printed) | (np.isnan(answers) & np.isnan(printed))
     wrong = np.flatnonzero(~same.all(axis=1))
     assert not wrong.size, (len(wrong), len(records), records[wrong[0]], answers[wrong[0]], printed[wrong[0]])
-    context = online_context(
-        SimpleNamespace(file=SimpleNamespace(follow="displacement"), digest={}), controller, Real.DOUBLE, "limiter"
-    )
+    context = online_context(NOWHERE, controller, Real.DOUBLE, "limiter")
     assert not unvisited(tmp_path, {kernel.name for kernel in context["kernels"]} | {"whole_below"})
 
 

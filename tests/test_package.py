@@ -159,12 +159,12 @@ def test_the_manifest_tells_a_spoiled_file(packages, tmp_path):
     assert files == {*manifest["files"], "manifest.json"} and "belongs to the user" in manifest["licence"]
     (folder / "build").mkdir()
     (folder / "build" / "a.c").write_text("")  # a build may stand there
-    spoiled = folder / "circle20_online_f32.c"
+    spoiled = folder / "mems_hexapod_online_f32.c"
     spoiled.write_text(spoiled.read_text().replace("5.5e-05f", "5.6e-05f", 1))
     (folder / "device" / "circle20" / "scenario.toml").unlink()
     (folder / "mine.c").write_text("")
     assert {(f.where, f.what.split(";")[0]) for f in verify_package(folder)} == {
-        ("circle20_online_f32.c", "was changed since it was generated"),
+        ("mems_hexapod_online_f32.c", "was changed since it was generated"),
         ("device/circle20/scenario.toml", "is missing"),
         ("mine.c", "was added"),
     }

@@ -153,9 +153,7 @@ def test_every_operation_is_printed_within_the_rules(tmp_path):
 @pytest.fixture(scope="module")
 def broken(folder, tmp_path_factory) -> dict[str, Check]:
     """Checks of a folder with planted faults: a goto and a double constant in float, a mandatory rule and a null pointer in double."""
-    jump = (
-        "    uint32_t status = {0};\n    double wide = (double)status * 1.5;\n    if (wide > 40.0) {{ goto end; }}\nend:\n"
-    )
+    jump = "    uint32_t status = {0};\n    double wide = (double)status * 1.5;\n    if (wide > 40.0) {{ goto end; }}\nend:\n"
     null = "    uint32_t status = {0};\n    int *nowhere = 0;\n    if (sizeof(status++) > 9u) {{ status = 3; }}\n    *nowhere = 1;\n"
     faults = {}
     for real, text in ((Real.FLOAT, jump), (Real.DOUBLE, null)):

@@ -130,7 +130,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
 def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
     controller = controller_of(plant.model, scenario.file.follow, plant.sample_time)
-    m, core = controller.nominal, f"{scenario.name}_online_{Real.DOUBLE.suffix}"
+    m, core = controller.nominal, f"{scenario.device.name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"{core}.{end}")

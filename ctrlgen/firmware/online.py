@@ -91,7 +91,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     return {
         "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(model.device.title),
         "source": comment(model.device.source),
-        "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
+        "device_sha256": scenario.device_sha256, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],

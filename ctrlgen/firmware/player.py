@@ -23,6 +23,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
     return {
         "prefix": prefix,
         "title": comment(solution.scenario.file.title),
+        "digest": solution.scenario.digest,
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
         "curve": curve,

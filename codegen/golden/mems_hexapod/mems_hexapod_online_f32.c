@@ -1,5 +1,5 @@
-/* circle20_online_f32: see circle20_online_f32.h. Made by ctrlgen 0.1.0; do not edit. */
-#include "circle20_online_f32.h"
+/* mems_hexapod_online_f32: see mems_hexapod_online_f32.h. Made by ctrlgen 0.1.0; do not edit. */
+#include "mems_hexapod_online_f32.h"
 
 #include <stddef.h>
 
@@ -1828,7 +1828,7 @@ static int is_usable(const float target[6])
     return usable;
 }
 /* Scales a displacement that breaks wire flexure stress toward home: 0 untouched, 1 scaled, 2 scaled by more than the slack. */
-static int limit_composite(const circle20_online_f32_state *state, float wanted[6])
+static int limit_composite(const mems_hexapod_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
     float bound[1];
@@ -1852,7 +1852,7 @@ static int limit_composite(const circle20_online_f32_state *state, float wanted[
     return hit;
 }
 /* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void settle_drives(const circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void settle_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
     wanted_drive(out->state, out->drive);
@@ -1861,7 +1861,7 @@ static void settle_drives(const circle20_online_f32_state *state, circle20_onlin
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int settle_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
+static int settle_line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
@@ -1926,7 +1926,7 @@ static int settle_line_search(const circle20_online_f32_state *state, const floa
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
 /* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void step_drives(const circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void step_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
     step_drive(state->x, out->state, out->drive);
@@ -1934,7 +1934,7 @@ static void step_drives(const circle20_online_f32_state *state, circle20_online_
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int step_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
+static int step_line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
@@ -1998,7 +1998,7 @@ static int step_line_search(const circle20_online_f32_state *state, const float 
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
-void circle20_online_f32_init(circle20_online_f32_state *state)
+void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 {
     static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     if (state != NULL) {
@@ -2012,7 +2012,7 @@ void circle20_online_f32_init(circle20_online_f32_state *state)
     }
 }
 /* Without a usable target: the safe drive, and the state it leads to. */
-static void settle_safe(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
@@ -2025,7 +2025,7 @@ static void settle_safe(circle20_online_f32_state *state, circle20_online_f32_ou
 }
 
 /* Drives for out->displacement with every limit kept; advances the state to the next sample. */
-static uint32_t settle_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
     int limited = 0;
@@ -2034,7 +2034,7 @@ static uint32_t settle_within(circle20_online_f32_state *state, circle20_online_
     {
         const int scaled = limit_composite(state, out->displacement);
         if (scaled > 1) {
-            status |= CIRCLE20_ONLINE_F32_COMPOSITE;
+            status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
         }
         if (scaled > 0) {
             wanted_state(out->displacement, out->state);
@@ -2047,7 +2047,7 @@ static uint32_t settle_within(circle20_online_f32_state *state, circle20_online_
         } else {
             static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
             limited = settle_line_search(state, home, out);
-            status |= CIRCLE20_ONLINE_F32_DRIVE;
+            status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
     if (limited != 0) {
@@ -2064,9 +2064,9 @@ static uint32_t settle_within(circle20_online_f32_state *state, circle20_online_
     return status;
 }
 
-uint32_t circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
-    uint32_t status = CIRCLE20_ONLINE_F32_INPUT;
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
     if ((state != NULL) && (target != NULL) && (out != NULL)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
@@ -2084,7 +2084,7 @@ uint32_t circle20_online_f32_settle(circle20_online_f32_state *state, const floa
             }
             status = settle_within(state, out);
             if (hit != 0) {
-                status |= CIRCLE20_ONLINE_F32_DISPLACEMENT;
+                status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
         } else {
             settle_safe(state, out);
@@ -2093,7 +2093,7 @@ uint32_t circle20_online_f32_settle(circle20_online_f32_state *state, const floa
     return status;
 }
 /* Without a usable target: the safe drive, and the state it leads to. */
-static void step_safe(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void step_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
@@ -2106,7 +2106,7 @@ static void step_safe(circle20_online_f32_state *state, circle20_online_f32_outp
 }
 
 /* Drives for out->displacement with every limit kept; advances the state to the next sample. */
-static uint32_t step_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
     int limited = 0;
@@ -2115,7 +2115,7 @@ static uint32_t step_within(circle20_online_f32_state *state, circle20_online_f3
     {
         const int scaled = limit_composite(state, out->displacement);
         if (scaled > 1) {
-            status |= CIRCLE20_ONLINE_F32_COMPOSITE;
+            status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
         }
         if (scaled > 0) {
             wanted_state(out->displacement, out->state);
@@ -2127,7 +2127,7 @@ static uint32_t step_within(circle20_online_f32_state *state, circle20_online_f3
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             limited = step_line_search(state, state->z, out);
-            status |= CIRCLE20_ONLINE_F32_DRIVE;
+            status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
     if (limited != 0) {
@@ -2144,9 +2144,9 @@ static uint32_t step_within(circle20_online_f32_state *state, circle20_online_f3
     return status;
 }
 
-uint32_t circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
-    uint32_t status = CIRCLE20_ONLINE_F32_INPUT;
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
     if ((state != NULL) && (target != NULL) && (out != NULL)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
@@ -2164,7 +2164,7 @@ uint32_t circle20_online_f32_step(circle20_online_f32_state *state, const float 
             }
             status = step_within(state, out);
             if (hit != 0) {
-                status |= CIRCLE20_ONLINE_F32_DISPLACEMENT;
+                status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
         } else {
             step_safe(state, out);
