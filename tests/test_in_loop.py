@@ -152,7 +152,7 @@ def test_counting_by_block_is_counting_every_instruction(cross, folder, referenc
     machine = Machine(M4F, program)
     single = Single()
     machine.emulator.hook_add(unicorn.UC_HOOK_CODE, single)
-    state, target, out = (machine.reserve(count, Real.FLOAT) for count in (12, 6, 18))
+    state, target, out = (machine.reserve(count, Real.FLOAT) for count in (13, 6, 18))
     machine.call(f"{name}_init", state)
     counts = []
     for wanted in [*reference.command[:5], *reference.random[-15:]]:

@@ -139,6 +139,7 @@ def controller_of(device: Device) -> Scripted:
         composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
         nearest=kernel("nearest", [u], ["beyond"], ca.fmin(ca.fmax(u, Z_LOW), Z_HIGH) * 0.75 + 0.125 * (Z_LOW + Z_HIGH)),
     )  # fmt: skip
+    assert controller.displacement_uses_state == (False, device.moving)  # worked out before the kernels are recorded
     return controller
 
 
@@ -250,6 +251,15 @@ def odd_cases(rng: np.random.Generator, device: Device) -> list[tuple[str, np.nd
             x, z, target = sample(rng, device, (mode, *PLAIN))
             x[i] = bad
             cases.append((mode, x, z, target))
+        x, z, target = sample(rng, device, (mode, *PLAIN))
+        cases.append((mode, np.full_like(x, np.nan), np.full_like(z, np.nan), target))  # in C: never initialised
+        for i, drive, command in product(range(device.n_x + N), ("edge", "origin"), (None, np.nan, 1.0)):  # absurd
+            x, z, target = sample(rng, device, (mode, *PLAIN[:-1], drive))
+            wanted = target + (0.25 * z if mode == "step" else 0)
+            (x if i < device.n_x else z)[i if i < device.n_x else i - device.n_x] = -(2.0**60)
+            target = wanted - (0.25 * z if mode == "step" else 0)
+            target[0] = target[0] if command is None else command * 10  # within its range, no command, beyond
+            cases.append((mode, x, z, target))
     return cases
 
 
@@ -258,6 +268,7 @@ def answer(step) -> np.ndarray:
 
 
 MAIN = """
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "limiter.h"
@@ -279,15 +290,31 @@ int main(void)
 #endif
     while (fread(in, sizeof in[0], 1 + NX + N + N, stdin) == 1 + NX + N + N) {
         double out[1];
+        int lost = 0;
 #if NX > 0
         memcpy(s.x, in + 1, sizeof s.x);
 #endif
         memcpy(s.z, in + 1 + NX, sizeof s.z);
+        if (isnan(s.z[0]) && isnan(s.z[1]) && isnan(s.z[2])) {
+            memset(&s, 0, sizeof s);
+        }
 #ifdef MOVING
         out[0] = in[0] != 0.0 ? limiter_step(&s, in + 1 + NX + N, &o) : limiter_settle(&s, in + 1 + NX + N, &o);
 #else
         out[0] = limiter_settle(&s, in + 1 + NX + N, &o);
 #endif
+        if (s.ready == 0U) { /* lost: in Python no number of the state is one then */
+            int i;
+            for (i = 0; i < N; i++) {
+                s.z[i] = NAN;
+            }
+#if NX > 0
+            for (i = 0; i < NX; i++) {
+                s.x[i] = NAN;
+            }
+#endif
+            lost = 1;
+        }
         fwrite(out, sizeof out, 1, stdout);
         fwrite(o.drive, sizeof o.drive, 1, stdout);
         fwrite(o.displacement, sizeof o.displacement, 1, stdout);
@@ -298,6 +325,13 @@ int main(void)
         fwrite(s.x, sizeof s.x, 1, stdout);
 #endif
         fwrite(s.z, sizeof s.z, 1, stdout);
+        if (lost) { /* it stays so until it is initialised */
+            memcpy(s.z, in + 1 + NX, sizeof s.z);
+            if (limiter_settle(&s, in + 1 + NX + N, &o) != LIMITER_LOST) {
+                return 2;
+            }
+            limiter_init(&s);
+        }
     }
     return 0;
 }

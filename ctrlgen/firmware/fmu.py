@@ -143,7 +143,7 @@ def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     if m.n_states:
         groups.append(("state", len(outputs)))
         outputs += _variables("state", m.signals["state"], "output", "discrete", 1 + len(inputs) + len(outputs))
-    what = "0, or the bits 1 displacement, 2 composite limit, 4 state, 8 drive limit, 16 unusable input"
+    what = "0, or the bits 1 displacement, 2 composite limit, 4 state, 8 drive limit, 16 unusable input, 32 lost state"
     status = Variable(1 + len(inputs) + len(outputs), "status", "output", "discrete", what, {}, "Int32")
     return _Unit(
         "controller", core, f"online controller of {m.device.title}", inputs, outputs, status,

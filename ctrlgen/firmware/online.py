@@ -11,12 +11,13 @@ from ctrlgen.core.units import base_unit, show
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
-from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.model.feedforward import FAR, SECANT_FRACTION, SECANT_STEPS, Controller
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
 FLOAT_SLACK = 4e-6  # as SLACK of the controller, in float: four roundings of a temperature, 0.4 mK
+READY = 0xA500A500  # marks an initialised state: an immediate operand of a Cortex-M, and no repeated byte, as memory set to one value has
 UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none beside one that has; its square is still a float
 
 
@@ -55,7 +56,10 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             uses_state = any(
                 {"x", "z"} & set(named[kernel].arguments) for kernel in ("state", "drive") if kernel in named
             )
-            modes.append({"name": name, "z": z, "uses_state": uses_state, **named})
+            modes.append({
+                "name": name, "z": z, "uses_state": uses_state,
+                "displacement_uses_state": controller.displacement_uses_state[name == "step"], **named,
+            })  # fmt: skip
     motion = {}
     if isinstance(controller, MotionController):
         motion = {name: printed(kernel, f"motion_{name}") for name, kernel in controller.motion.items()}
@@ -103,12 +107,19 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "composite_rounds": controller.composite_rounds,
         "ratio_uses_state": ratio is not None and bool({"x", "z"} & set(ratio.arguments)), "state_limited": controller.state_can_be_limited,
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack, "cost": {"step": step_cost, "worst": worst_cost},
-        "input_limits": controller.input_limits, "rest": model.rest,
+        "input_limits": controller.input_limits,
+        "plausible": [([_member(i, model.x.numel()) for i in those], most) for those, most in controller.plausible],
+        "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "z_centre": z_centre, "z_half": z_half,
         "s_low": s_low, "s_high": s_high, "s_slack": s_slack, "s_centre": s_centre, "s_half": s_half,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack, "u_centre": u_centre, "u_half": u_half,
-        "u_safe": controller.safe_drive,
+        "u_safe": controller.safe_drive, "ready": READY, "far": FAR,
     }  # fmt: skip
+
+
+def _member(i: int, x_count: int) -> str:
+    """Number `i` of x and then z in the C's state."""
+    return f"state->x[{i}]" if i < x_count else f"state->z[{i - x_count}]"
 
 
 def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:

@@ -144,14 +144,14 @@ def _context(
 def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
     """Rows of the README's table of memory, bytes in double and float; `chosen`: the player's form in each arithmetic."""
     x, n, n_s, m, count = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
-    state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers, RAM, one a device"
+    state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers and a word, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
     vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
     played = len(c["played"])
     if played:
         vectors = vectors.replace(", constants", f", {played} x {n} numbers and {played} indices of 4 B, constants")
     rows = [
-        _counted("state", x + n, 0, state),
+        _counted("state", x + n + 1, 0, state),  # a word is aligned as a number
         _counted("output", 2 * n + n_s, 0, output),
         _counted("vectors", count * (m + n) + played * n, 12 * count + 4 * played, vectors),
     ]

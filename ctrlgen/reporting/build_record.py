@@ -31,6 +31,7 @@ STATUS_WORDS = {
     ControllerStatus.STATE: "actuator state set to its limit",
     ControllerStatus.DRIVE: "drive at its limit: as far toward the target as it reaches in one sample",
     ControllerStatus.INPUT: "target is no number, or absurd: safe drives",
+    ControllerStatus.LOST: "state is no number, absurd, or was not initialised: safe drives until it is",
 }
 
 

@@ -76,7 +76,7 @@ def check_hostile(
 def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     nominal = controller.nominal
-    bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT
+    bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT | ControllerStatus.LOST
     bits |= (ControllerStatus.STATE if nominal.n_states else bits) | (
         ControllerStatus.COMPOSITE if controller.guarded_limits else bits
     )

@@ -11,6 +11,9 @@ static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
+
+#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
 
 /* Square root by Newton steps; 0 for 0, for negative numbers and for what is not a number. */
 static float root(float a)
@@ -2000,7 +2003,6 @@ static int step_line_search(const mems_hexapod_online_f32_state *state, const fl
 }
 void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 {
-    static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     if (state != NULL) {
         int i;
         for (i = 0; i < 6; i++) {
@@ -2009,7 +2011,33 @@ void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
         for (i = 0; i < 6; i++) {
             state->z[i] = 0.0f;
         }
+        state->ready = READY;
     }
+}
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked where a limit is met: until then a state either leads to
+ * drives within their limits or does not matter. Numbers with one range are judged by the sum of their squares, at most their count
+ * times (4 times the largest magnitude of the range) squared. */
+static int is_lost(const mems_hexapod_online_f32_state *state)
+{
+    const float squares0 = (((((state->x[0] * state->x[0]) + (state->x[1] * state->x[1])) + (state->x[2] * state->x[2])) + (state->x[3] * state->x[3])) + (state->x[4] * state->x[4])) + (state->x[5] * state->x[5]);
+    const float squares1 = (((((state->z[0] * state->z[0]) + (state->z[1] * state->z[1])) + (state->z[2] * state->z[2])) + (state->z[3] * state->z[3])) + (state->z[4] * state->z[4])) + (state->z[5] * state->z[5]);
+    return ((squares0 <= 6.504729e+07f) && (squares1 <= 2.904e-07f)) ? 0 : 1;
+}
+
+/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
+static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+{
+    int i;
+    state->ready = 0U;
+    for (i = 0; i < 6; i++) {
+        out->drive[i] = U_SAFE[i];
+        out->displacement[i] = 0.0f;
+    }
+    for (i = 0; i < 6; i++) {
+        out->state[i] = X_REST[i];
+    }
+    return MEMS_HEXAPOD_ONLINE_F32_LOST;
 }
 /* Without a usable target: the safe drive, and the state it leads to. */
 static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
@@ -2029,20 +2057,23 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
 {
     uint32_t status = 0U;
     int limited = 0;
-    int i;
+    int lost = 0;
     wanted_state(out->displacement, out->state);
     {
         const int scaled = limit_composite(state, out->displacement);
-        if (scaled > 1) {
-            status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
-        }
         if (scaled > 0) {
+            if (scaled > 1) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
+            }
             wanted_state(out->displacement, out->state);
         }
     }
     wanted_drive(out->state, out->drive);
     if (drive_inside(out->drive) == 0) {
-        if (drives_admissible(out->drive) != 0) {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+            lost = 1;
+        } else if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
@@ -2050,16 +2081,24 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
             status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
-    if (limited != 0) {
-        wanted_advance(out->drive, state->x);
-        balance_displacement(state->x, out->displacement, out->displacement);
-    } else {
-        for (i = 0; i < 6; i++) {
-            state->x[i] = out->state[i]; /* the drive was computed for it */
+    if (lost == 0) {
+        if (limited != 0) {
+            wanted_advance(out->drive, state->x);
+            balance_displacement(state->x, out->displacement, out->displacement);
+        } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
+            state->x[0] = out->state[0];
+            state->x[1] = out->state[1];
+            state->x[2] = out->state[2];
+            state->x[3] = out->state[3];
+            state->x[4] = out->state[4];
+            state->x[5] = out->state[5];
         }
-    }
-    for (i = 0; i < 6; i++) {
-        state->z[i] = out->displacement[i];
+        state->z[0] = out->displacement[0];
+        state->z[1] = out->displacement[1];
+        state->z[2] = out->displacement[2];
+        state->z[3] = out->displacement[3];
+        state->z[4] = out->displacement[4];
+        state->z[5] = out->displacement[5];
     }
     return status;
 }
@@ -2067,7 +2106,11 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
 uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
-    if ((state != NULL) && (target != NULL) && (out != NULL)) {
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if (state->ready != READY) {
+        status = set_lost(state, out);
+    } else {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
@@ -2083,9 +2126,11 @@ uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, co
                 nearest_displacement(beyond, out->displacement);
             }
             status = settle_within(state, out);
-            if (hit != 0) {
+            if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
+        } else if (is_lost(state) != 0) {
+            status = set_lost(state, out);
         } else {
             settle_safe(state, out);
         }
@@ -2110,36 +2155,47 @@ static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_o
 {
     uint32_t status = 0U;
     int limited = 0;
-    int i;
+    int lost = 0;
     wanted_state(out->displacement, out->state);
     {
         const int scaled = limit_composite(state, out->displacement);
-        if (scaled > 1) {
-            status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
-        }
         if (scaled > 0) {
+            if (scaled > 1) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
+            }
             wanted_state(out->displacement, out->state);
         }
     }
     step_drive(state->x, out->state, out->drive);
     if (drive_inside(out->drive) == 0) {
-        if (drives_admissible(out->drive) != 0) {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+            lost = 1;
+        } else if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             limited = step_line_search(state, state->z, out);
             status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
-    if (limited != 0) {
-        step_advance(state->x, out->drive, state->x);
-        balance_displacement(state->x, out->displacement, out->displacement);
-    } else {
-        for (i = 0; i < 6; i++) {
-            state->x[i] = out->state[i]; /* the drive was computed for it */
+    if (lost == 0) {
+        if (limited != 0) {
+            step_advance(state->x, out->drive, state->x);
+            balance_displacement(state->x, out->displacement, out->displacement);
+        } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
+            state->x[0] = out->state[0];
+            state->x[1] = out->state[1];
+            state->x[2] = out->state[2];
+            state->x[3] = out->state[3];
+            state->x[4] = out->state[4];
+            state->x[5] = out->state[5];
         }
-    }
-    for (i = 0; i < 6; i++) {
-        state->z[i] = out->displacement[i];
+        state->z[0] = out->displacement[0];
+        state->z[1] = out->displacement[1];
+        state->z[2] = out->displacement[2];
+        state->z[3] = out->displacement[3];
+        state->z[4] = out->displacement[4];
+        state->z[5] = out->displacement[5];
     }
     return status;
 }
@@ -2147,7 +2203,11 @@ static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_o
 uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
-    if ((state != NULL) && (target != NULL) && (out != NULL)) {
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if (state->ready != READY) {
+        status = set_lost(state, out);
+    } else {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = step_within(state, out);
@@ -2163,9 +2223,11 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
                 nearest_displacement(beyond, out->displacement);
             }
             status = step_within(state, out);
-            if (hit != 0) {
+            if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
+        } else if (is_lost(state) != 0) {
+            status = set_lost(state, out);
         } else {
             step_safe(state, out);
         }

@@ -5,7 +5,7 @@
  *
  * target[6]  platform pose: theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m], delta_y [m], delta_z [m]
  * drive[6]   heater power: 1X [W], 1Y [W], 2X [W], 2Y [W], 3X [W], 3Y [W]
- * displacement[6]: stage displacement [m] at the next sample (with status INPUT: the present one)
+ * displacement[6]: stage displacement [m] at the next sample (with status INPUT: the present one; LOST: zero)
  * state[6]   actuator temperature at the next sample: 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K]
  *
  * Limits kept:
@@ -45,10 +45,12 @@ extern "C" {
 #define MEMS_HEXAPOD_ONLINE_F32_COMPOSITE (2U)    /* wire flexure stress: displacement scaled toward home */
 #define MEMS_HEXAPOD_ONLINE_F32_DRIVE (8U)        /* heater power at its limit: the target is approached as far as one sample allows */
 #define MEMS_HEXAPOD_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
+#define MEMS_HEXAPOD_ONLINE_F32_LOST (32U)        /* the state was not initialised, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until mems_hexapod_online_f32_init */
 
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     float z[MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */
+    uint32_t ready; /* set by mems_hexapod_online_f32_init */
 } mems_hexapod_online_f32_state;
 
 typedef struct {
@@ -57,7 +59,7 @@ typedef struct {
     float state[MEMS_HEXAPOD_ONLINE_F32_STATE_SIZE]; /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
 } mems_hexapod_online_f32_output;
 
-/* A cold device at rest. */
+/* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
 void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state);
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled. */
