@@ -78,12 +78,12 @@ def effect_device(*effects: dict):
 
 @pytest.fixture(scope="session")
 def packages(tmp_path_factory, circle) -> dict[str, CFolder]:
-    """Two different scenarios, solved."""
-    scenario = load_scenario(SCENARIOS / "raster")
-    raster = solve(scenario, build_model(scenario.device))
+    """Two different scenarios of two devices, solved."""
+    scenario = load_scenario(SCENARIOS / "mirror_spiral")
+    spiral = solve(scenario, build_model(scenario.device))
     out = tmp_path_factory.mktemp("packages")
     return {
-        s.scenario.name: generate(s.scenario, s.model, out / s.scenario.name, s, draw_all(s)) for s in (circle, raster)
+        s.scenario.name: generate(s.scenario, s.model, out / s.scenario.name, s, draw_all(s)) for s in (circle, spiral)
     }
 
 

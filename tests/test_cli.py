@@ -103,7 +103,7 @@ def test_a_missing_compiler_is_named_before_any_work(scenario, tmp_path):
 
 def test_generate_needs_no_compiler(scenario, tmp_path):
     done = ctrlgen("generate", scenario, "--out", tmp_path / "c", PATH=str(tmp_path))
-    assert done.returncode == 0 and (tmp_path / "c" / "mine_online_f32.c").exists()
+    assert done.returncode == 0 and (tmp_path / "c" / "mems_hexapod_online_f32.c").exists()
 
 
 def test_an_unwritable_folder_is_refused(scenario, tmp_path):

@@ -8,8 +8,8 @@ import pytest
 
 from ctrlgen import ToolError
 from ctrlgen.firmware import toolchains
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import generate
+from ctrlgen.firmware.real import Real
 from ctrlgen.verification.comparison import compare
 
 
@@ -56,7 +56,7 @@ def test_a_forgotten_limit_is_found_by_the_hostile_sequence(folder, circle):
 
 
 def test_c_with_a_warning_is_refused_with_the_compilers_words(folder, circle):
-    spoil(folder, Real.DOUBLE, "online", r"int status = 0;", "int status = 0; int unused_thing;")
+    spoil(folder, Real.DOUBLE, "online", r"uint32_t status = 0U;", "uint32_t status = 0U; int unused_thing;")
     with pytest.raises(ToolError, match="unused_thing"):
         compare(folder, circle)
 
@@ -66,8 +66,8 @@ def test_c_that_hangs_up_is_reported(folder, circle):
         folder,
         Real.DOUBLE,
         "online",
-        r"    int status = CIRCLE20_ONLINE_F64_INPUT;",
-        "    int status = CIRCLE20_ONLINE_F64_INPUT;\n    if (target[5] > 0.0) { (void)*(volatile int *)0; }",
+        r"    uint32_t status = MEMS_HEXAPOD_ONLINE_F64_INPUT;",
+        "    uint32_t status = MEMS_HEXAPOD_ONLINE_F64_INPUT;\n    if (target[5] > 0.0) { (void)*(volatile int *)0; }",
     )
     with pytest.raises(ToolError):
         compare(folder, circle)

@@ -25,8 +25,8 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.hypotheses.priors import prior_of
 from ctrlgen.effects import Channel, Effect, Param, Place
 from ctrlgen.firmware.cprint import print_function
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model.effect_terms import available, channels, partner_channels
 

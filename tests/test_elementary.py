@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from ctrlgen.firmware import elementary
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import TURN_END, TURNS, elementary_text, polynomial
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import COMPILERS, FLAGS
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import Machine, available
@@ -141,7 +141,15 @@ def test_the_square_root_is_rounded_as_ieee_754_says(compiler, tmp_path, real, o
     squares = (odd * odd).astype(KIND[real])
     near = [np.nextafter(squares, KIND[real](side)) for side in (0, np.inf)]
     subnormal = np.arange(1, 2000).astype(word).view(KIND[real])
-    for a in (everything, digits, 2 * digits, squares, *near, subnormal, [kind.max, kind.tiny, np.inf, 0.0, -0.0, -1.0, np.nan]):
+    for a in (
+        everything,
+        digits,
+        2 * digits,
+        squares,
+        *near,
+        subnormal,
+        [kind.max, kind.tiny, np.inf, 0.0, -0.0, -1.0, np.nan],
+    ):
         a = np.asarray(a, dtype=KIND[real])
         with np.errstate(invalid="ignore"):
             assert np.array_equal(c("square_root", a), np.sqrt(a), equal_nan=True)

@@ -181,6 +181,23 @@ def test_beyond_the_range_the_nearest_target_inside_is_taken(model, controller, 
     assert np.array_equal(controller.nearest(inside).full().ravel(), inside)
 
 
+def test_a_lost_state_gets_the_safe_drive_until_one_starts_again_from_rest(controller):
+    target = np.array([0, 0, 0, 0, 0, 2e-5])
+    x, z = controller.rest()
+    for bad in (np.nan, np.inf, -1e4, 1e4):
+        lost = x.copy()
+        lost[3] = bad
+        step = controller.step((lost, z), target)
+        assert step.status == ControllerStatus.LOST and np.all(step.drive == controller.safe_drive)
+        for again in (controller.step(step.state, target), controller.step(step.state, target, settle=True)):
+            assert again.status == ControllerStatus.LOST
+    assert controller.step(controller.rest(), target, settle=True).status == 0
+    edge = np.max(controller.nominal.x_bounds[1])
+    assert not controller.is_lost(
+        np.full(6, edge), controller.nominal.z_bounds[1]
+    )  # every state within its limits is one
+
+
 def test_limits_that_the_stroke_implies_are_not_computed_online(controller):
     assert [limit.name for limit in controller.guarded_limits] == ["wire_stress"]
 

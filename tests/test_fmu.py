@@ -14,10 +14,10 @@ import pytest
 from conftest import AXIS_FILE, SCENARIOS, effect_device
 
 from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.deviations import permits
 from ctrlgen.firmware.fmu import write_fmus
 from ctrlgen.firmware.plant import plant_of, write_plant
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import FLAGS
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is missing, the units were not run: pip install 'ctrlgen[fmi]'")
@@ -360,16 +360,16 @@ int main(void)
 {{
     {name}_state state;
     {name}_output out;
-    int status = {name}_init(&state, drives[0]);
+    uint32_t status = {name}_init(&state, drives[0]);
     int k;
     int i;
-    status += {name}_signals(&state, drives[0], &out);
+    status |= {name}_signals(&state, drives[0], &out);
     {show}
     for (k = 0; k < {len(drives)}; k++) {{
-        status += {name}_step(&state, drives[k], &out);
+        status |= {name}_step(&state, drives[k], &out);
         {show}
     }}
-    return status;
+    return (int)status;
 }}
 """)
     sources = [str(folder / "main.c"), str(folder / f"{name}.c")]

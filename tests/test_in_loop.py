@@ -11,8 +11,8 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import ToolError, build_model, generate, load_scenario, solve
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.real import Real
 from ctrlgen.reporting.build_record import BUDGETS
 from ctrlgen.verification import cores, emulation, in_loop
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
@@ -152,7 +152,7 @@ def test_counting_by_block_is_counting_every_instruction(cross, folder, referenc
     machine = Machine(M4F, program)
     single = Single()
     machine.emulator.hook_add(unicorn.UC_HOOK_CODE, single)
-    state, target, out = (machine.reserve(count, Real.FLOAT) for count in (12, 6, 18))
+    state, target, out = (machine.reserve(count, Real.FLOAT) for count in (13, 6, 18))
     machine.call(f"{name}_init", state)
     counts = []
     for wanted in [*reference.command[:5], *reference.random[-15:]]:
@@ -233,8 +233,8 @@ def test_a_double_constant_in_float_code_costs_more_and_changes_bits(small, comp
     only(monkeypatch)
     reference, c = small
     (plain,) = run_in_loop(c, reference).runs
-    old = r"    int status = 0;\n    int limited = 0;"
-    bad = spoil_on_target(c, tmp_path / "c", old, "    int status = 0;\n    int limited = 0;\n"
+    old = r"    uint32_t status = 0U;\n    int limited = 0;"
+    bad = spoil_on_target(c, tmp_path / "c", old, "    uint32_t status = 0U;\n    int limited = 0;\n"
                           "    out->displacement[0] = (float)(out->displacement[0] * 1.0000001);")  # fmt: skip
     found = run_in_loop(bad, reference)
     if found.runs:  # zig links a library for double
@@ -263,8 +263,8 @@ def test_memory_of_its_own_fails_a_run(small, compiler, monkeypatch, tmp_path):
     bad = spoiled(
         c,
         tmp_path / "c",
-        r"    int status = 0;\n",
-        "    int status = 0;\n    static volatile int calls;\n    calls++;\n",
+        r"    uint32_t status = 0U;\n",
+        "    uint32_t status = 0U;\n    static volatile int calls;\n    calls++;\n",
     )
     (run,) = run_in_loop(bad, reference).runs
     assert run.writable == 4 and run.differing == 0 and not run.passed

@@ -22,8 +22,8 @@ import numpy as np
 import pytest
 
 from ctrlgen import Controller, ControllerStatus
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.online import online_context
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model import feedforward
@@ -38,6 +38,7 @@ TARGET_LIMIT = np.full(N, 64.0)
 OUTCOMES = ("inside", "edge", "beyond")
 TRIALS = tuple("".join(outcome) for outcome in product("+-", repeat=3))  # "+": the drives of a trial are admissible
 PLAIN = ("inside", "inside", "kept", "inside")
+NOWHERE = SimpleNamespace(device_sha256="0" * 64)  # instead of a scenario: of it the controller's C says the device
 PATIENCE = 3000  # samples drawn for one combination; the rarest sequence of trials is one in some hundreds
 
 
@@ -136,7 +137,12 @@ def controller_of(device: Device) -> Scripted:
         device=SimpleNamespace(title="scripted", source="none"),
     )  # fmt: skip
     controller = Scripted(nominal, "displacement", 1e-3 if device.moving else None, SLACK)
-    controller.__dict__["named"] = (inverse(0.0), inverse(0.25) if device.moving else None, SimpleNamespace(laws=()), [])
+    controller.__dict__["named"] = (
+        inverse(0.0),
+        inverse(0.25) if device.moving else None,
+        SimpleNamespace(laws=()),
+        [],
+    )
     guarded = device.composite != "none"
     controller.__dict__.update(
         nominal=nominal, rounds=device.rounds, state_can_be_limited=device.states and device.limited,
@@ -147,6 +153,7 @@ def controller_of(device: Device) -> Scripted:
         nearest_slopes=np.array([[1, 0.25, 0.0625], [0.25, 1, -0.125], [0.0625, -0.125, 1]]) if device.coupled else None,
         composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
     )  # fmt: skip
+    assert controller.displacement_uses_state == (False, device.moving)  # worked out before the kernels are recorded
     return controller
 
 
@@ -258,6 +265,15 @@ def odd_cases(rng: np.random.Generator, device: Device) -> list[tuple[str, np.nd
             x, z, target = sample(rng, device, (mode, *PLAIN))
             x[i] = bad
             cases.append((mode, x, z, target))
+        x, z, target = sample(rng, device, (mode, *PLAIN))
+        cases.append((mode, np.full_like(x, np.nan), np.full_like(z, np.nan), target))  # in C: never initialised
+        for i, drive, command in product(range(device.n_x + N), ("edge", "origin"), (None, np.nan, 1.0)):  # absurd
+            x, z, target = sample(rng, device, (mode, *PLAIN[:-1], drive))
+            wanted = target + (0.25 * z if mode == "step" else 0)
+            (x if i < device.n_x else z)[i if i < device.n_x else i - device.n_x] = -(2.0**60)
+            target = wanted - (0.25 * z if mode == "step" else 0)
+            target[0] = target[0] if command is None else command * 10  # within its range, no command, beyond
+            cases.append((mode, x, z, target))
     return cases
 
 
@@ -266,9 +282,11 @@ def answer(step) -> np.ndarray:
 
 
 MAIN = """
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "limiter.h"
+#define BAD LIMITER_INPUT
 int main(void)
 {
     double in[1 + NX + N + N];
@@ -276,25 +294,41 @@ int main(void)
     limiter_output o;
     limiter_init(NULL);
     limiter_init(&s);
-    if (limiter_settle(NULL, in, &o) != 16 || limiter_settle(&s, NULL, &o) != 16 || limiter_settle(&s, in, NULL) != 16) {
+    if (limiter_settle(NULL, in, &o) != BAD || limiter_settle(&s, NULL, &o) != BAD || limiter_settle(&s, in, NULL) != BAD) {
         return 1;
     }
 #ifdef MOVING
-    if (limiter_step(NULL, in, &o) != 16 || limiter_step(&s, NULL, &o) != 16 || limiter_step(&s, in, NULL) != 16) {
+    if (limiter_step(NULL, in, &o) != BAD || limiter_step(&s, NULL, &o) != BAD || limiter_step(&s, in, NULL) != BAD) {
         return 1;
     }
 #endif
     while (fread(in, sizeof in[0], 1 + NX + N + N, stdin) == 1 + NX + N + N) {
         double out[1];
+        int lost = 0;
 #if NX > 0
         memcpy(s.x, in + 1, sizeof s.x);
 #endif
         memcpy(s.z, in + 1 + NX, sizeof s.z);
+        if (isnan(s.z[0]) && isnan(s.z[1]) && isnan(s.z[2])) {
+            memset(&s, 0, sizeof s);
+        }
 #ifdef MOVING
         out[0] = in[0] != 0.0 ? limiter_step(&s, in + 1 + NX + N, &o) : limiter_settle(&s, in + 1 + NX + N, &o);
 #else
         out[0] = limiter_settle(&s, in + 1 + NX + N, &o);
 #endif
+        if (s.ready == 0U) { /* lost: in Python no number of the state is one then */
+            int i;
+            for (i = 0; i < N; i++) {
+                s.z[i] = NAN;
+            }
+#if NX > 0
+            for (i = 0; i < NX; i++) {
+                s.x[i] = NAN;
+            }
+#endif
+            lost = 1;
+        }
         fwrite(out, sizeof out, 1, stdout);
         fwrite(o.drive, sizeof o.drive, 1, stdout);
         fwrite(o.displacement, sizeof o.displacement, 1, stdout);
@@ -305,6 +339,13 @@ int main(void)
         fwrite(s.x, sizeof s.x, 1, stdout);
 #endif
         fwrite(s.z, sizeof s.z, 1, stdout);
+        if (lost) { /* it stays so until it is initialised */
+            memcpy(s.z, in + 1 + NX, sizeof s.z);
+            if (limiter_settle(&s, in + 1 + NX + N, &o) != LIMITER_LOST) {
+                return 2;
+            }
+            limiter_init(&s);
+        }
     }
     return 0;
 }
@@ -313,10 +354,7 @@ int main(void)
 
 def run_c(device: Device, controller: Scripted, records: np.ndarray, folder: Path) -> np.ndarray:
     """The answers of the generated C, built so that its branches are counted."""
-    scenario = SimpleNamespace(
-        file=SimpleNamespace(follow="displacement"), digest={"device": "0" * 64, "scenario": "0" * 64}
-    )
-    context = online_context(scenario, controller, Real.DOUBLE, "limiter")
+    context = online_context(NOWHERE, controller, Real.DOUBLE, "limiter")
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"limiter.{end}")
     (folder / "main.c").write_text(MAIN)
@@ -398,9 +436,7 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
     same = (answers == printed) | (np.isnan(answers) & np.isnan(printed))
     wrong = np.flatnonzero(~same.all(axis=1))
     assert not wrong.size, (len(wrong), len(records), records[wrong[0]], answers[wrong[0]], printed[wrong[0]])
-    context = online_context(
-        SimpleNamespace(file=SimpleNamespace(follow="displacement"), digest={}), controller, Real.DOUBLE, "limiter"
-    )
+    context = online_context(NOWHERE, controller, Real.DOUBLE, "limiter")
     assert not unvisited(tmp_path, {kernel.name for kernel in context["kernels"]} | {"whole_below", "square_root"})
 
 

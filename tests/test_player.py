@@ -20,8 +20,8 @@ from ctrlgen.firmware.compression import (
     compress,
     instructions,
 )
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import generate
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model.simulation import simulate
 

@@ -15,11 +15,11 @@ from conftest import SCENARIOS, effect_device
 
 from ctrlgen import Controller, build_model, load_scenario
 from ctrlgen.firmware.cprint import print_function
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.folder import CFolder, generate, write_harness
 from ctrlgen.firmware.misra import ADVISORY, MANDATORY, rule_class
+from ctrlgen.firmware.real import Real
 from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.verification.check import Check
 from ctrlgen.verification.host import run_host
@@ -154,14 +154,12 @@ def test_every_operation_is_printed_within_the_rules(tmp_path):
 @pytest.fixture(scope="module")
 def broken(folder, tmp_path_factory) -> dict[str, Check]:
     """Checks of a folder with planted faults: a goto and a double constant in float, a mandatory rule and a null pointer in double."""
-    jump = (
-        "    int status = {0};\n    double wide = (double)status * 1.5;\n    if (wide > 40.0) {{ goto end; }}\nend:\n"
-    )
-    null = "    int status = {0};\n    int *nowhere = 0;\n    if (sizeof(status++) > 9u) {{ status = 3; }}\n    *nowhere = 1;\n"
+    jump = "    uint32_t status = {0};\n    double wide = (double)status * 1.5;\n    if (wide > 40.0) {{ goto end; }}\nend:\n"
+    null = "    uint32_t status = {0};\n    int *nowhere = 0;\n    if (sizeof(status++) > 9u) {{ status = 3; }}\n    *nowhere = 1;\n"
     faults = {}
     for real, text in ((Real.FLOAT, jump), (Real.DOUBLE, null)):
         macro = f"{folder.online[real].upper()}_INPUT"
-        faults[real] = (f"    int status = {macro};\n", text.format(macro))
+        faults[real] = (f"    uint32_t status = {macro};\n", text.format(macro))
     return by_tool(check_rules(planted(folder, tmp_path_factory.mktemp("bad") / "c", faults)))
 
 
@@ -186,7 +184,7 @@ def test_a_planted_fault_is_reported(broken, folder, tool, real, rule):
 
 
 def test_a_double_constant_in_float_is_reported(folder, tmp_path):
-    status = f"    int status = {folder.online[Real.FLOAT].upper()}_INPUT;\n"
+    status = f"    uint32_t status = {folder.online[Real.FLOAT].upper()}_INPUT;\n"
     wide = status + "    const float wide = 1.5 * (float)status;\n    (void)wide;\n"
     check = ran(run_analyzer(ANALYZERS[1], planted(folder, tmp_path / "c", {Real.FLOAT: (status, wide)})))
     assert check.state == "failed" and {"-Wdouble-promotion", "-Wfloat-conversion"} & {f.rule for f in check.findings}

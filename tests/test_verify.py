@@ -22,8 +22,8 @@ from ctrlgen import ToolError, generate
 from ctrlgen.app import pipeline
 from ctrlgen.app.commands import controllers  # noqa: F401, it registers the command
 from ctrlgen.app.commands.app import app
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.package import verify_package
+from ctrlgen.firmware.real import Real
 from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import BUDGETS, Build, record
 from ctrlgen.verification.check import Check, CheckFinding, not_run

@@ -204,7 +204,9 @@ class _Body:
             self.calls.add(CALLS[op])
             return f"{CALLS[op]}({', '.join(self.parts[n.number][0] for n in node.operands)})", inside
         if op not in _FORMS:
-            raise CtrlgenError(f"CasADi operation {op} has no C99 form here; add it to ctrlgen/firmware/c_expression.py")
+            raise CtrlgenError(
+                f"CasADi operation {op} has no C99 form here; add it to ctrlgen/firmware/c_expression.py"
+            )
         return _FORMS[op].format(*a, zero=zero, one=one), inside
 
     def _operand(self, node: Node) -> str:

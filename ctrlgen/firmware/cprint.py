@@ -26,7 +26,9 @@ WIDTH = 120  # columns of a line of C
 FEWEST_OPERATIONS = 3  # of a law that is a function of its own
 STANDS_FOR = {"z": ("wanted",), "x": ("state",)}  # arguments of kernels that a law's argument may be
 SCALAR_NAMES = {"wanted": "z", "state": "x"}  # one element of them as the parameter of a law
-RESERVED = ("LOW", "HIGH", "SLACK", "P", "X_REST", "TARGET_LIMIT", "U_LOW", "U_HIGH", "U_SLACK", "U_LEAST", "U_MOST", "U_SAFE", "NULL")
+RESERVED = (  # names of the templates
+    "LOW", "HIGH", "SLACK", "P", "X_REST", "TARGET_LIMIT", "U_LOW", "U_HIGH", "U_SLACK", "U_LEAST", "U_MOST", "U_SAFE", "READY", "NULL",
+)  # fmt: skip
 DIVISORS = (1, 2, 3, 4, 6)  # of a loop's index, where several rows read the same element
 
 
@@ -132,7 +134,11 @@ class Printer:
             kind, k = match[1], int(match[2])
             if kind == "t":
                 return f"t{k + 1}"
-            return self._constants.named(text.constants[k]) if kind == "c" else SCALAR_NAMES.get(text.reads[k].array, text.reads[k].array)
+            return (
+                self._constants.named(text.constants[k])
+                if kind == "c"
+                else SCALAR_NAMES.get(text.reads[k].array, text.reads[k].array)
+            )
 
         lines = [_bare(PLACE.sub(filled, line)) for line in text.lines] + [f"return {PLACE.sub(filled, text.result)};"]
         parameters = ", ".join(f"{T} {SCALAR_NAMES.get(array, array)}" for array in arrays)
@@ -161,11 +167,20 @@ class Printer:
         parts = [(name, about, body.lines)]
         if steps:
             parts = _iterated(name, about, body, *steps, sizes)
-        arguments = [tuple(a for a in sizes if any(re.search(rf"\b{a}\[", line) for line in lines)) for _, _, lines in parts]
+        arguments = [
+            tuple(a for a in sizes if any(re.search(rf"\b{a}\[", line) for line in lines)) for _, _, lines in parts
+        ]
         if len(parts) > 1:
             arguments[1] = tuple(a for a in sizes if a in arguments[0] or a in arguments[1])
         texts = [
-            _function(one, words, {a: sizes[a] for a in read}, 0 if returned else function.size1_out(0), lines, self.real.value)
+            _function(
+                one,
+                words,
+                {a: sizes[a] for a in read},
+                0 if returned else function.size1_out(0),
+                lines,
+                self.real.value,
+            )
             for (one, words, lines), read in zip(parts, arguments, strict=True)
         ]
         operations = body.operations * (steps[1] if steps else 1)
@@ -200,7 +215,10 @@ def _iterated(
     call = ", ".join("result" if a == argument else a for a in read)
     start = [f"for (i = 0; i < {size}; i++) {{", f"    result[i] = {argument}[i];", "}"]
     again = [f"for (step = 0; step < {count}; step++) {{", f"    {name}_step({call}, result);", "}"]
-    return [(f"{name}_step", about, body.lines), (name, f"{count} such steps.", ["int i;", "int step;", *start, *again])]
+    return [
+        (f"{name}_step", about, body.lines),
+        (name, f"{count} such steps.", ["int i;", "int step;", *start, *again]),
+    ]
 
 
 def _function(name: str, about: str, arguments: Mapping[str, int], size: int, lines: Sequence[str], T: str) -> str:
@@ -246,7 +264,9 @@ class _Body:
         self.locals = self.parts = self.operations = 0
         self.calls: frozenset[str] = frozenset()
         self.loops = False
-        self.copies: dict[str, str] = {}  # elements that every turn of a loop reads, by the name of their copy: they stay in registers
+        self.copies: dict[
+            str, str
+        ] = {}  # elements that every turn of a loop reads, by the name of their copy: they stay in registers
         self.copied: set[str] = set()
         self.groups = 0
 
@@ -315,7 +335,9 @@ class _Body:
             index = str(group.places[0]) if len(group.places) == 1 else group.index("i", group.places)
             self._write(group, f"{result}[{index}] = ")
 
-    def _groups(self, roots: Sequence[Node], places: Sequence[int], linear: Linear, as_rows: Sequence[Node]) -> list[_Group]:
+    def _groups(
+        self, roots: Sequence[Node], places: Sequence[int], linear: Linear, as_rows: Sequence[Node]
+    ) -> list[_Group]:
         """Roots of equal shape whose elements follow the loop's index, in the order of the first of each."""
         groups: list[_Group] = []
         forced = {node.number for node in as_rows}
@@ -351,7 +373,9 @@ class _Body:
         if many:
             self.loops = True
             self.lines += [
-                f"const {self.real.value} {copy} = {element};" for copy, element in self.copies.items() if copy not in self.copied
+                f"const {self.real.value} {copy} = {element};"
+                for copy, element in self.copies.items()
+                if copy not in self.copied
             ]
             self.copied |= set(self.copies)
             self.lines += [f"for (i = 0; i < {len(group.places)}; i++) {{", *(f"    {line}" for line in written), "}"]

@@ -215,7 +215,12 @@ class Graph:
                 formula = a[0].formula
             if op == ca.OP_MUL and any(node.value == -1.0 and not node.formula for node in a):
                 formula = f"-{_term(next(node for node in a if node.formula))}"
-            if op == ca.OP_MUL and formula.count("(1 / ") == 1 and formula.endswith(")") and a[1].formula.startswith("1 / "):
+            if (
+                op == ca.OP_MUL
+                and formula.count("(1 / ") == 1
+                and formula.endswith(")")
+                and a[1].formula.startswith("1 / ")
+            ):
                 formula = f"{_term(a[0])} / {a[1].formula[4:]}"
         return self.constant(value, formula if len(formula) <= LONGEST_FORMULA else _short(formula))
 
@@ -269,7 +274,11 @@ def _short(formula: str) -> str:
     """What a long formula depends on: the parameters, or the sections of the device that they stand in."""
     paths = list(dict.fromkeys(re.findall(r"[a-z_]\w*(?:\[\d+\])?(?:\.[\w\[\].]+)+", formula)))
     text = f"f({', '.join(paths)})"
-    return text if len(text) <= LONGEST_FORMULA else f"f({', '.join(dict.fromkeys(path.partition('.')[0] for path in paths))})"
+    return (
+        text
+        if len(text) <= LONGEST_FORMULA
+        else f"f({', '.join(dict.fromkeys(path.partition('.')[0] for path in paths))})"
+    )
 
 
 def _by_products(exponent: float) -> bool:

@@ -22,10 +22,10 @@ import numpy as np
 from ctrlgen.core.errors import CtrlgenError, Fault, InputError, ToolError
 from ctrlgen.core.files import whole_folder, write_bytes
 from ctrlgen.core.units import base_unit, exponents, from_si
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.fmi_calls import FOREIGN_TYPES, REFUSED_2, REFUSED_3
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.plant import Plant, plant_of, write_plant
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.firmware.toolchains import compile_c, find_compilers
 from ctrlgen.model.motion_feedforward import controller_of
@@ -130,7 +130,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
 def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
     controller = controller_of(plant.model, scenario.file.follow, plant.sample_time)
-    m, core = controller.nominal, f"{scenario.name}_online_{Real.DOUBLE.suffix}"
+    m, core = controller.nominal, f"{scenario.device.name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"{core}.{end}")
@@ -143,7 +143,7 @@ def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     if m.n_states:
         groups.append(("state", len(outputs)))
         outputs += _variables("state", m.signals["state"], "output", "discrete", 1 + len(inputs) + len(outputs))
-    what = "0, or a sum of 1 displacement, 2 composite limit, 4 state, 8 drive limit, 16 unusable input"
+    what = "0, or the bits 1 displacement, 2 composite limit, 4 state, 8 drive limit, 16 unusable input, 32 lost state"
     status = Variable(1 + len(inputs) + len(outputs), "status", "output", "discrete", what, {}, "Int32")
     return _Unit(
         "controller", core, f"online controller of {m.device.title}", inputs, outputs, status,

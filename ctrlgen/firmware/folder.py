@@ -16,20 +16,18 @@ from pathlib import Path
 from typing import Any
 
 from ctrlgen.firmware.compression import Compression, compress
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.deviations import deviations_context
 from ctrlgen.firmware.misra import CPPCHECK
 from ctrlgen.firmware.online import online_context
-from ctrlgen.firmware.package import write_package
+from ctrlgen.firmware.package import PIECES, owners, write_package
 from ctrlgen.firmware.player import player_context
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.vectors import played_vectors, vectors
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.trajectory.scenario import Scenario, motion_targets
 from ctrlgen.trajectory.solution import Solution
-
-PIECES = ("online", "player", "selftest", "vectors")
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,9 @@ def generate(
     played = solution if scenario.sample_time else None
     command = scenario.command(model) if solution is None else solution.command
     targets = motion_targets(scenario, model) if model.inertial else command
-    names = {piece: {real: f"{scenario.name}_{piece}_{real.suffix}" for real in Real} for piece in PIECES}
+    names = {
+        piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
+    }
     compression = compress(played) if played else {}
     contexts, written = {}, []
     for real in Real:

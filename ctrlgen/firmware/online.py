@@ -11,10 +11,10 @@ import numpy as np
 
 from ctrlgen.core.units import base_unit, show
 from ctrlgen.firmware.cprint import Kernel, Law, Printer
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment
-from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, SWEEPS, Controller
+from ctrlgen.model.feedforward import FAR, SECANT_FRACTION, SECANT_STEPS, SWEEPS, Controller
 from ctrlgen.model.inverse import NEWTON_STEPS
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import MotionController
@@ -22,6 +22,7 @@ from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
 FLOAT_SLACK = 4e-6  # as SLACK of the controller, in float: four roundings of a temperature, 0.4 mK
+READY = 0xA500A500  # marks an initialised state: an immediate operand of a Cortex-M, and no repeated byte, as memory set to one value has
 UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none beside one that has; its square is still a float
 
 
@@ -50,15 +51,17 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
                 if getattr(inverse, part).size1_out(0)
             }
             uses_state = any({"x", "z"} & set(named[part].arguments) for part in ("state", "drive") if part in named)
-            modes.append({"name": name, "z": z, "uses_state": uses_state, **named})
+            modes.append({
+                "name": name, "z": z, "uses_state": uses_state,
+                "displacement_uses_state": controller.displacement_uses_state[name == "step"], **named,
+            })  # fmt: skip
     motion = {}
     if isinstance(controller, MotionController):
         motion = {
-            part: printed.kernel(kernel, ("motion", part), (f"motion_{part}",)) for part, kernel in controller.motion.items()
+            part: printed.kernel(kernel, ("motion", part), (f"motion_{part}",))
+            for part, kernel in controller.motion.items()
         }
-    balance = printed.kernel(
-        static.newton, "balance", ("balance_displacement",), steps=("z", NEWTON_STEPS)
-    )
+    balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=("z", NEWTON_STEPS))
     shares = bound = None
     if controller.guarded_limits:
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
@@ -74,7 +77,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     return {
         "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(model.device.title),
         "source": comment(model.device.source),
-        "digest": scenario.digest, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
+        "device_sha256": scenario.device_sha256, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
@@ -88,11 +91,13 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "shares_use_state": shares is not None and bool({"x", "z"} & set(shares.arguments)), "state_limited": controller.state_can_be_limited,
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack,
         "cost": _cost(controller, modes[-1], motion, balance, bound, shares),
-        "input_limits": controller.input_limits, "rest": model.rest,
+        "input_limits": controller.input_limits,
+        "plausible": [([_member(i, model.x.numel()) for i in those], most) for those, most in controller.plausible],
+        "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "z_centre": z_centre, "z_half": z_half,
         "s_low": s_low, "s_high": s_high, "s_slack": s_slack, "s_centre": s_centre, "s_half": s_half,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack, "u_centre": u_centre, "u_half": u_half,
-        "u_safe": controller.safe_drive,
+        "u_safe": controller.safe_drive, "ready": READY, "far": FAR,
     }  # fmt: skip
 
 
@@ -107,7 +112,12 @@ class _Kernels:
         self._by_body: dict[str, Kernel] = {}
 
     def kernel(
-        self, function: Any, what: Any, names: tuple[str, ...], steps: tuple[str, int] | None = None, returned: bool = False
+        self,
+        function: Any,
+        what: Any,
+        names: tuple[str, ...],
+        steps: tuple[str, int] | None = None,
+        returned: bool = False,
     ) -> Kernel:
         """`function` as C, named by the first of `names` that no other body has."""
         may_be_result = ["x"] if what[-1] == "advance" else []
@@ -142,7 +152,11 @@ def printed_laws(model: Model) -> list[Law]:
 
 def kernel_comments(controller: Controller) -> dict[Any, str]:
     """What each kernel computes, in words, by mode and part or by name."""
-    m, follow, drive = controller.nominal, controller.model.signals[controller.follow], controller.nominal.signals["drive"]
+    m, follow, drive = (
+        controller.nominal,
+        controller.model.signals[controller.follow],
+        controller.nominal.signals["drive"],
+    )
     state, within = m.signals.get("state"), f"one sample of {controller.sample_time} s"
     holds = f"the {state.label}s `state`" if state and m.n_states else "the displacement `wanted`"
     states = ", ".join(f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True))
@@ -184,6 +198,11 @@ def _cost(
     worst += mode["advance"].operations if "advance" in mode and not advance else 0
     worst += 2 * n * n * (1 + SWEEPS) if controller.nearest_slopes is not None else 0
     return {"step": step, "worst": worst}
+
+
+def _member(i: int, x_count: int) -> str:
+    """Number `i` of x and then z in the C's state."""
+    return f"state->x[{i}]" if i < x_count else f"state->z[{i - x_count}]"
 
 
 def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:

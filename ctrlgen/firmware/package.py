@@ -20,11 +20,17 @@ from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, commit
 
 MANIFEST = "manifest.json"
+PIECES = ("online", "player", "selftest", "vectors")
 LICENCE = "The generated code belongs to the user of ctrlgen who generated it; no warranty."
 TEMPLATES = {
     "package/README.md": "README.md", "CMakeLists.txt": "CMakeLists.txt", "package/library.properties": "library.properties",
     "package/module.yml": "zephyr/module.yml", "package/zephyr.cmake": "zephyr/CMakeLists.txt", "package/Kconfig": "zephyr/Kconfig",
 }  # fmt: skip
+
+
+def owners(scenario: Scenario) -> dict[str, str]:
+    """Piece -> what its files and functions are named after: the scenario, but the device for the controller, which knows no trajectory."""
+    return dict.fromkeys(PIECES, scenario.name) | {"online": scenario.device.name}
 
 
 def write_package(
@@ -119,6 +125,7 @@ def _context(
         "name": scenario.name,
         "title": comment(scenario.file.title),
         "device": scenario.device.name,
+        "owners": owners(scenario),
         "pieces": ["online", *(["player"] if c["player"] else []), "selftest", "vectors"],
         "arrays": arrays,
         "elements": lambda signal: [
@@ -137,16 +144,14 @@ def _context(
 def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
     """Rows of the README's table of memory, bytes in double and float; `chosen`: the player's form in each arithmetic."""
     x, n, n_s, m, count = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
-    state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers, RAM, one a device"
+    state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers and a word, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
-    vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} `int` of 4 B, constants; only if the test is called"
+    vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
     played = len(c["played"])
     if played:
-        vectors = vectors.replace(
-            ", constants", f", {played} x {n} numbers and {played} `unsigned long` of 4 B, constants"
-        )
+        vectors = vectors.replace(", constants", f", {played} x {n} numbers and {played} indices of 4 B, constants")
     rows = [
-        _counted("state", x + n, 0, state),
+        _counted("state", x + n + 1, 0, state),  # a word is aligned as a number
         _counted("output", 2 * n + n_s, 0, output),
         _counted("vectors", count * (m + n) + played * n, 12 * count + 4 * played, vectors),
     ]
@@ -173,7 +178,9 @@ def _platformio(context: dict[str, Any]) -> dict[str, Any]:
         "description": context["title"],
         "keywords": ["control", "feedforward", "inverse", "flexure", "positioning"],
         "authors": [{"name": "ctrlgen"}],
-        "headers": [f"{context['name']}_{piece}_f32.h" for piece in context["pieces"] if piece in ("online", "player")],
+        "headers": [
+            f"{context['owners'][piece]}_{piece}_f32.h" for piece in context["pieces"] if piece in ("online", "player")
+        ],
         "frameworks": "*",
         "platforms": "*",
         "build": {"srcDir": ".", "includeDir": ".", "srcFilter": ["+<*.c>"]},

@@ -21,8 +21,8 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.cprint import Kernel, Printer
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.elementary import elementary_text
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import balanced, held_step, one_step_map
@@ -118,8 +118,8 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
     starts = np.cumsum([0, *(len(signal.channels) for signal in plant.signals)])
     return {
         "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(m.device.title),
-        "source": comment(m.device.source), "digest": scenario.digest, "si": si_text, "drive": m.signals["drive"],
-        "rate": f"{1 / plant.sample_time:.17g}", "n": len(m.axes), "nx": m.x.numel(), "nu": m.u.numel(),
+        "source": comment(m.device.source), "device_sha256": scenario.device_sha256, "si": si_text, "drive": m.signals["drive"],
+        "rate": 1 / plant.sample_time, "n": len(m.axes), "nx": m.x.numel(), "nu": m.u.numel(),
         "x_names": [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)],
         "signals": list(zip(plant.signals, map(int, starts), strict=False)), "width": int(starts[-1]),
         "inertial": plant.inertial, "constants": printer.constants, "laws": printer.laws_text, "kernels": kernels, "axes": m.axes,
@@ -130,8 +130,8 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
 
 
 def write_plant(scenario: Scenario, plant: Plant, real: Real, out: Path) -> str:
-    """Writes `{scenario}_plant_{f64, f32}.c` and `.h` to the folder `out`; their common name. Raises CtrlgenError."""
-    name = f"{scenario.name}_plant_{real.suffix}"
+    """Writes `{device}_plant_{f64, f32}.c` and `.h` to the folder `out`; their common name. Raises CtrlgenError."""
+    name = f"{scenario.device.name}_plant_{real.suffix}"
     context = plant_context(scenario, plant, real, name)
     for end in ("h", "c"):
         write(f"plant.{end}", context, out / f"{name}.{end}")

@@ -10,6 +10,7 @@ from ctrlgen.firmware.compression import INSTRUCTION_BUDGET, Candidate, Compress
 from ctrlgen.firmware.spline import Spline
 from ctrlgen.firmware.templates import comment
 from ctrlgen.trajectory.solution import Solution
+from ctrlgen.version import __version__
 
 
 def player_context(solution: Solution, compression: Compression, prefix: str) -> dict[str, Any]:
@@ -23,6 +24,9 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
     return {
         "prefix": prefix,
         "title": comment(solution.scenario.file.title),
+        "version": __version__,
+        "device_sha256": solution.scenario.device_sha256,
+        "digest": solution.scenario.digest,
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
         "curve": curve,

@@ -9,6 +9,11 @@ import jinja2
 
 from ctrlgen.core.files import write_text
 from ctrlgen.core.shipped_files import shipped
+from ctrlgen.firmware.cprint import Real
+
+# Of the interface of the generated C, in every header: raised when code that was written for an older header must be changed because a
+# function, a structure or the meaning of an argument or a status changed. Additions do not raise it.
+ABI = 1
 
 
 def codegen_folder() -> Path:
@@ -22,7 +27,16 @@ def render(template: str, context: dict[str, Any]) -> str:
         loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
+    environment.globals |= {"abi": ABI, "hertz": hertz}
     return environment.get_template(f"{template}.j2").render(context)
+
+
+def hertz(rate: float | None, real: Real | None = None) -> str:
+    """A sample rate as text; with `real` as a constant of C, an unsigned integer where it is a whole number, 0U for None."""
+    value = rate or 0.0
+    if abs(value - round(value)) <= 1e-9 * value:  # 1 / (1 / rate) is off by a rounding
+        return f"{round(value)}" + ("U" if real else "")
+    return real.literal(value) if real else f"{value:.17g}"
 
 
 def write(template: str, context: dict[str, Any], path: Path) -> Path:

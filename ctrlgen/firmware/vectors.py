@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.firmware.compression import Compression
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.online import FLOAT_SLACK
+from ctrlgen.firmware.real import Real
 from ctrlgen.model.feedforward import Controller, ControllerStatus
 
 VECTORS = 48  # reference vectors along the command; 16 more lie beyond the limits

@@ -28,6 +28,8 @@ SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the driv
 # Of coordinate descent toward the nearest pose. On the shipped devices it ends 0.5 % farther than the optimum at most;
 # clipping alone ends 50 to 85 % farther.
 SWEEPS = 3
+FAR = 4  # times the largest magnitude in its range: a number of a state that is farther was never computed
+ENDLESS = 1e15  # SI: the magnitude taken for a state without a range; its square, of many together, is still a float
 NEGLIGIBLE = 1e-6  # of a limit: a direction that uses less of it over the whole range is left out of the bound
 
 
@@ -39,6 +41,7 @@ class ControllerStatus(IntFlag):
     STATE = 4  # the actuator state (temperature) was set to its limit
     DRIVE = 8  # a drive is at its limit: the target is reached later than commanded
     INPUT = 16  # the target is not a number or absurdly large: it is ignored, drives at zero or the nearest admissible value
+    LOST = 32  # the state is none that the controller left: drives as for INPUT until it is initialised again
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,12 @@ class Controller:
         ]  # fmt: skip
         names = ["x", "z", "wanted"]
         return ca.Function(
-            "composite_shares", [m.x, m.z, wanted], [ca.vertcat(ca.SX(0, 1), *squares)], names, ["shares"], {"cse": True}
+            "composite_shares",
+            [m.x, m.z, wanted],
+            [ca.vertcat(ca.SX(0, 1), *squares)],
+            names,
+            ["shares"],
+            {"cse": True},
         )
 
     @cached_property
@@ -117,7 +125,9 @@ class Controller:
         arguments = [ca.SX.sym(name, *self.composite_shares.size_in(name)) for name in self.composite_shares.name_in()]
         shares = self.composite_shares(*arguments)
         worst = ca.sqrt(ca.mmax(shares)) if shares.numel() else ca.SX(0)  # one root at the end
-        return ca.Function("composite_ratio", arguments, [worst], self.composite_shares.name_in(), ["ratio"], {"cse": True})
+        return ca.Function(
+            "composite_ratio", arguments, [worst], self.composite_shares.name_in(), ["ratio"], {"cse": True}
+        )
 
     @property
     def composite_rounds(self) -> int:
@@ -246,6 +256,38 @@ class Controller:
         drives = [_row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
         return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
+    @cached_property
+    def plausible(self) -> tuple[tuple[tuple[int, ...], float], ...]:
+        """(indices into x and then z, largest sum of squares) of the numbers of a state that have the same range.
+
+        A state of which one such sum is larger, or no number, is lost: |v| > `FAR` times the largest magnitude of the range, in the
+        root mean square of the group. Equal ranges are taken together because a sum costs less than comparisons.
+        """
+        m = self.nominal
+        low, high = (np.concatenate(bound) for bound in zip(m.x_bounds, m.z_bounds, strict=True))
+        reach = np.maximum(np.abs(low), np.abs(high))
+        groups: dict[tuple[bool, float], list[int]] = {}  # of states and of displacements
+        for i, size in enumerate(np.where(np.isfinite(reach) & (reach > 0), reach, ENDLESS).tolist()):
+            groups.setdefault((i < m.x.numel(), size), []).append(i)
+        return tuple((tuple(those), len(those) * (FAR * size) ** 2) for (_, size), those in groups.items())
+
+    @cached_property
+    def displacement_uses_state(self) -> tuple[bool, bool]:
+        """Whether the displacement of a target to settle at, or to step to, depends on the state: one that is lost must then be found
+        before the displacement is limited."""
+        m = self.nominal
+        kernels = [k.displacement for k in (self.static, self.moving or self.static)]
+        targets = [ca.SX.sym("target", k.size1_in("target")) for k in kernels]
+        settle, step = (
+            ca.depends_on(k(m.x, m.z, target), ca.vertcat(m.x, m.z)) for k, target in zip(kernels, targets, strict=True)
+        )
+        return settle, step
+
+    def is_lost(self, x: np.ndarray, z: np.ndarray) -> bool:
+        """Whether the state (x, z) cannot be one that the controller left (`plausible`)."""
+        numbers = [*map(float, x), *map(float, z)]
+        return not all(sum(numbers[i] * numbers[i] for i in those) <= most for those, most in self.plausible)
+
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
         """State (x, z) of a device at rest at ambient temperature."""
         return self.model.rest.copy(), np.zeros(len(self.model.axes))
@@ -254,16 +296,23 @@ class Controller:
         """Drives that bring the followed signal to `target` (channels,) [SI] at the next sample, from `state` (x, z).
 
         With `settle`: the equilibrium at `target`, and its state. Every limit is kept; `ControllerStatus` says which ones acted.
+        Where a limit is met the state is examined: one that is lost (`is_lost`) is answered with the safe drive, and is NaN from then on,
+        which is answered so too; go on from `rest` once the device is there. A lost state that meets no limit does not matter.
         A target that the drives cannot reach in one sample is approached along the straight line of displacements, on
         which convex limits hold.
         """
         m, (x, z) = self.nominal, state
+        if np.all(np.isnan([*x, *z])):
+            return self._without_state()
         k = self.static if settle or self.moving is None else self.moving
         n, static = m.n_states, k is self.static
         z_slack, _, u_slack = self.slacks
         wanted, status = _row(k.displacement(x, z, target)), ControllerStatus(0)
         if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
-            if not np.all(np.abs(target) <= self.input_limits[: len(target)]):
+            usable = np.all(np.abs(target) <= self.input_limits[: len(target)])
+            if (self.displacement_uses_state[not static] or not usable) and self.is_lost(x, z):
+                return self._without_state()
+            if not usable:
                 return self._without_target(k, x, z)
             beyond = wanted
             wanted, hit = _clamp(beyond, *m.z_bounds, z_slack)
@@ -280,6 +329,8 @@ class Controller:
         if worst > 1 + self.slack:
             status |= ControllerStatus.COMPOSITE
         drive = _row(k.drive(x, z, wanted, state_wanted))
+        if not np.all((drive >= m.u_bounds[0]) & (drive <= m.u_bounds[1])) and self.is_lost(x, z):
+            return self._without_state()
         u, limited = _clamp(drive, *m.u_bounds, u_slack)
         if limited:
             wanted, state_wanted, drive = self._line_search(k, x, z, np.zeros_like(z) if static else z, wanted, drive)
@@ -290,6 +341,12 @@ class Controller:
         x_next = _row(k.advance(x, wanted if static else z, u))
         z_next = _row(k.settle(x_next, wanted, u)) if limited else wanted
         return ControllerStep(status, z_next, state_wanted, u, (x_next, z_next))
+
+    def _without_state(self) -> ControllerStep:
+        """The safe drive, where nothing is known of the device; a device that is left alone comes to rest."""
+        rest, home = self.rest()
+        lost = (np.full_like(rest, np.nan), np.full_like(home, np.nan))
+        return ControllerStep(ControllerStatus.LOST, home, rest[: self.nominal.n_states], self.safe_drive, lost)
 
     def _without_target(self, k: Inverse, x: np.ndarray, z: np.ndarray) -> ControllerStep:
         """The safe drive, and what the device does under it for one sample."""

@@ -72,8 +72,11 @@ class MotionController(Controller):
 
     def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> ControllerStep:
         """Drives for the motion that `target` says, or with `settle` for the equilibrium at its position. `state` (x, z) is kept where
-        the target is no command; else that of the motion follows."""
-        if not np.all(np.abs(target) <= self.input_limits):
+        the target is no command; else that of the motion follows. A state that is lost is answered with the safe drive."""
+        usable = bool(np.all(np.abs(target) <= self.input_limits))
+        if (not settle or not usable) and self.is_lost(*state):
+            return self._without_state()
+        if not usable:
             return self._without_target(self.static, *state)
         position = target[: len(self.model.signals[self.follow].channels)]
         if settle:

@@ -10,8 +10,8 @@ import numpy as np
 
 from ctrlgen.core.units import base_unit, from_si, show
 from ctrlgen.firmware.compression import INSTRUCTION_BUDGET
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.real import Real
 from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.reporting.report import passed, summary
@@ -31,6 +31,7 @@ STATUS_WORDS = {
     ControllerStatus.STATE: "actuator state set to its limit",
     ControllerStatus.DRIVE: "drive at its limit: as far toward the target as it reaches in one sample",
     ControllerStatus.INPUT: "target is no number, or absurd: safe drives",
+    ControllerStatus.LOST: "state is no number, absurd, or was not initialised: safe drives until it is",
 }
 
 

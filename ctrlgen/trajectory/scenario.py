@@ -119,6 +119,12 @@ class Scenario:
         return {name: read.sha256 for name, read in self.inputs.items()}
 
     @property
+    def device_sha256(self) -> str:
+        """SHA-256 of the device's description: of its file, followed by the Python file that it names, if any."""
+        texts = [read.text for name, read in self.inputs.items() if name in ("device", "device_code")]
+        return hashlib.sha256("".join(texts).encode()).hexdigest()
+
+    @property
     def sample_time(self) -> float | None:
         """Seconds between samples; None for a static scenario, whose samples are separate equilibria."""
         return None if self.file.sample_rate is None else 1 / self.file.sample_rate.si

@@ -20,8 +20,8 @@ import numpy as np
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.firmware import compression as compressed
 from ctrlgen.firmware.compression import Compression
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder, write_harness
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import COMPILERS, find_compilers
 from ctrlgen.model.feedforward import SECANT_FRACTION, ControllerStatus
 from ctrlgen.model.model import Model

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import write
 from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.model import Model
@@ -76,7 +76,7 @@ def check_hostile(
 def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     nominal = controller.nominal
-    bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT
+    bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT | ControllerStatus.LOST
     bits |= (ControllerStatus.STATE if nominal.n_states else bits) | (
         ControllerStatus.COMPOSITE if controller.guarded_limits else bits
     )

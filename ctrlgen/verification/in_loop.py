@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.real import Real
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import MISSING, Machine, available
 from ctrlgen.verification.host import Host
@@ -164,7 +164,7 @@ def _sequences(
     """What is run, its answers, and this computer's."""
     online, real, machine = folder.online[host.real], host.real, machines["online"]
     n, n_s, m = len(ref.model.axes), ref.model.n_states, ref.random.shape[1]
-    state, target, out = (machine.reserve(count, real) for count in (ref.model.x.numel() + n, m, 2 * n + n_s))
+    state, target, out = (machine.reserve(count, real) for count in (ref.model.x.numel() + n + 1, m, 2 * n + n_s))
 
     def answers(function: str, targets: np.ndarray) -> Answers:
         for wanted in targets:
@@ -175,6 +175,7 @@ def _sequences(
 
     random = ref.random[:: max(1, len(ref.random) // RANDOM)]
     if ref.scenario.sample_time is not None:
+        machine.call(f"{online}_init", state)
         machine.write(state, np.concatenate(ref.start), real)
         yield "step, along the scenario", answers("step", ref.command), host.followed(ref.command, ref.start)
         rest = ref.controller.rest()

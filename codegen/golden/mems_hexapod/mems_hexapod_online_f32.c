@@ -1,8 +1,7 @@
-/* circle20_online_f32: see circle20_online_f32.h. Made by ctrlgen 0.1.0; do not edit. */
-#include "circle20_online_f32.h"
+/* mems_hexapod_online_f32: see mems_hexapod_online_f32.h. Made by ctrlgen 0.1.0; do not edit. */
+#include "mems_hexapod_online_f32.h"
 
 #include <stddef.h>
-#include <stdint.h>
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0)) || defined(_M_FP_FAST)
 #error "compile this without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast: they remove the checks for NaN"
@@ -14,6 +13,9 @@ static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4
 static const float U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
 static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f };
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
+
+#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
 
 /* Square root as IEEE 754 has it: rounded correctly, not a number for a negative one. The core's own instruction where it has one, or
    the caller's CTRLGEN_SQRT(a), which must be rounded correctly too. Elsewhere, and with CTRLGEN_PORTABLE_SQRT, Newton steps and a
@@ -385,7 +387,7 @@ static int is_usable(const float target[6])
     return usable;
 }
 /* Scales a displacement that breaks wire flexure stress toward home: 0 untouched, 1 scaled, 2 scaled by more than the slack. */
-static int limit_composite(const circle20_online_f32_state *state, float wanted[6])
+static int limit_composite(const mems_hexapod_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
     if (!(composite_bound(wanted) <= 1.0f)) {
@@ -452,7 +454,7 @@ static void nearest_displacement(const float beyond[6], float value[6])
     }
 }
 /* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void settle_drives(const circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void settle_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
     wanted_drive(out->state, out->drive);
@@ -461,7 +463,7 @@ static void settle_drives(const circle20_online_f32_state *state, circle20_onlin
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int settle_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
+static int settle_line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
@@ -526,7 +528,7 @@ static int settle_line_search(const circle20_online_f32_state *state, const floa
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
 /* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void step_drives(const circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void step_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
     step_drive(state->x, out->state, out->drive);
@@ -534,7 +536,7 @@ static void step_drives(const circle20_online_f32_state *state, circle20_online_
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int step_line_search(const circle20_online_f32_state *state, const float origin[6], circle20_online_f32_output *out)
+static int step_line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
@@ -598,9 +600,8 @@ static int step_line_search(const circle20_online_f32_state *state, const float 
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
-void circle20_online_f32_init(circle20_online_f32_state *state)
+void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 {
-    static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     if (state != NULL) {
         int i;
         for (i = 0; i < 6; i++) {
@@ -609,10 +610,36 @@ void circle20_online_f32_init(circle20_online_f32_state *state)
         for (i = 0; i < 6; i++) {
             state->z[i] = 0.0f;
         }
+        state->ready = READY;
     }
 }
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked where a limit is met: until then a state either leads to
+ * drives within their limits or does not matter. Numbers with one range are judged by the sum of their squares, at most their count
+ * times (4 times the largest magnitude of the range) squared. */
+static int is_lost(const mems_hexapod_online_f32_state *state)
+{
+    const float squares0 = (((((state->x[0] * state->x[0]) + (state->x[1] * state->x[1])) + (state->x[2] * state->x[2])) + (state->x[3] * state->x[3])) + (state->x[4] * state->x[4])) + (state->x[5] * state->x[5]);
+    const float squares1 = (((((state->z[0] * state->z[0]) + (state->z[1] * state->z[1])) + (state->z[2] * state->z[2])) + (state->z[3] * state->z[3])) + (state->z[4] * state->z[4])) + (state->z[5] * state->z[5]);
+    return ((squares0 <= 6.504729e+07f) && (squares1 <= 2.904e-07f)) ? 0 : 1;
+}
+
+/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
+static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+{
+    int i;
+    state->ready = 0U;
+    for (i = 0; i < 6; i++) {
+        out->drive[i] = U_SAFE[i];
+        out->displacement[i] = 0.0f;
+    }
+    for (i = 0; i < 6; i++) {
+        out->state[i] = X_REST[i];
+    }
+    return MEMS_HEXAPOD_ONLINE_F32_LOST;
+}
 /* Without a usable target: the safe drive, and the state it leads to. */
-static void settle_safe(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
@@ -625,49 +652,64 @@ static void settle_safe(circle20_online_f32_state *state, circle20_online_f32_ou
 }
 
 /* Drives for out->displacement with every limit kept; advances the state to the next sample. */
-static int settle_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
-    int status = 0;
+    uint32_t status = 0U;
     int limited = 0;
-    int i;
+    int lost = 0;
     wanted_state(out->displacement, out->state);
     {
         const int scaled = limit_composite(state, out->displacement);
-        if (scaled > 1) {
-            status += CIRCLE20_ONLINE_F32_COMPOSITE;
-        }
         if (scaled > 0) {
+            if (scaled > 1) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
+            }
             wanted_state(out->displacement, out->state);
         }
     }
     wanted_drive(out->state, out->drive);
     if (drive_inside(out->drive) == 0) {
-        if (drives_admissible(out->drive) != 0) {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+            lost = 1;
+        } else if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
             limited = settle_line_search(state, home, out);
-            status += CIRCLE20_ONLINE_F32_DRIVE;
+            status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
-    if (limited != 0) {
-        wanted_advance(out->drive, state->x);
-        balance_displacement(state->x, out->displacement, out->displacement);
-    } else {
-        for (i = 0; i < 6; i++) {
-            state->x[i] = out->state[i]; /* the drive was computed for it */
+    if (lost == 0) {
+        if (limited != 0) {
+            wanted_advance(out->drive, state->x);
+            balance_displacement(state->x, out->displacement, out->displacement);
+        } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
+            state->x[0] = out->state[0];
+            state->x[1] = out->state[1];
+            state->x[2] = out->state[2];
+            state->x[3] = out->state[3];
+            state->x[4] = out->state[4];
+            state->x[5] = out->state[5];
         }
-    }
-    for (i = 0; i < 6; i++) {
-        state->z[i] = out->displacement[i];
+        state->z[0] = out->displacement[0];
+        state->z[1] = out->displacement[1];
+        state->z[2] = out->displacement[2];
+        state->z[3] = out->displacement[3];
+        state->z[4] = out->displacement[4];
+        state->z[5] = out->displacement[5];
     }
     return status;
 }
 
-int circle20_online_f32_settle(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
-    int status = CIRCLE20_ONLINE_F32_INPUT;
-    if ((state != NULL) && (target != NULL) && (out != NULL)) {
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if (state->ready != READY) {
+        status = set_lost(state, out);
+    } else {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
@@ -683,9 +725,11 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
                 nearest_displacement(beyond, out->displacement);
             }
             status = settle_within(state, out);
-            if (hit != 0) {
-                status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
+            if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
+        } else if (is_lost(state) != 0) {
+            status = set_lost(state, out);
         } else {
             settle_safe(state, out);
         }
@@ -693,7 +737,7 @@ int circle20_online_f32_settle(circle20_online_f32_state *state, const float tar
     return status;
 }
 /* Without a usable target: the safe drive, and the state it leads to. */
-static void step_safe(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static void step_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
@@ -706,48 +750,63 @@ static void step_safe(circle20_online_f32_state *state, circle20_online_f32_outp
 }
 
 /* Drives for out->displacement with every limit kept; advances the state to the next sample. */
-static int step_within(circle20_online_f32_state *state, circle20_online_f32_output *out)
+static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
-    int status = 0;
+    uint32_t status = 0U;
     int limited = 0;
-    int i;
+    int lost = 0;
     wanted_state(out->displacement, out->state);
     {
         const int scaled = limit_composite(state, out->displacement);
-        if (scaled > 1) {
-            status += CIRCLE20_ONLINE_F32_COMPOSITE;
-        }
         if (scaled > 0) {
+            if (scaled > 1) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
+            }
             wanted_state(out->displacement, out->state);
         }
     }
     step_drive(state->x, out->state, out->drive);
     if (drive_inside(out->drive) == 0) {
-        if (drives_admissible(out->drive) != 0) {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+            lost = 1;
+        } else if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             limited = step_line_search(state, state->z, out);
-            status += CIRCLE20_ONLINE_F32_DRIVE;
+            status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
-    if (limited != 0) {
-        step_advance(state->x, out->drive, state->x);
-        balance_displacement(state->x, out->displacement, out->displacement);
-    } else {
-        for (i = 0; i < 6; i++) {
-            state->x[i] = out->state[i]; /* the drive was computed for it */
+    if (lost == 0) {
+        if (limited != 0) {
+            step_advance(state->x, out->drive, state->x);
+            balance_displacement(state->x, out->displacement, out->displacement);
+        } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
+            state->x[0] = out->state[0];
+            state->x[1] = out->state[1];
+            state->x[2] = out->state[2];
+            state->x[3] = out->state[3];
+            state->x[4] = out->state[4];
+            state->x[5] = out->state[5];
         }
-    }
-    for (i = 0; i < 6; i++) {
-        state->z[i] = out->displacement[i];
+        state->z[0] = out->displacement[0];
+        state->z[1] = out->displacement[1];
+        state->z[2] = out->displacement[2];
+        state->z[3] = out->displacement[3];
+        state->z[4] = out->displacement[4];
+        state->z[5] = out->displacement[5];
     }
     return status;
 }
 
-int circle20_online_f32_step(circle20_online_f32_state *state, const float target[6], circle20_online_f32_output *out)
+uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
-    int status = CIRCLE20_ONLINE_F32_INPUT;
-    if ((state != NULL) && (target != NULL) && (out != NULL)) {
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if (state->ready != READY) {
+        status = set_lost(state, out);
+    } else {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = step_within(state, out);
@@ -763,9 +822,11 @@ int circle20_online_f32_step(circle20_online_f32_state *state, const float targe
                 nearest_displacement(beyond, out->displacement);
             }
             status = step_within(state, out);
-            if (hit != 0) {
-                status += CIRCLE20_ONLINE_F32_DISPLACEMENT;
+            if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
+        } else if (is_lost(state) != 0) {
+            status = set_lost(state, out);
         } else {
             step_safe(state, out);
         }
