@@ -19,7 +19,7 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Model, Signal
-from ctrlgen.trajectory.violations import violations
+from ctrlgen.trajectory.violations import Before, Violation, violations
 
 HOME_DRIVE = 1e-3  # of the full drive, at which the slopes near home are taken: a heater's power has none at zero volt
 PERIODS = 20  # of a closed path, after which a memory that still changes is left to IPOPT
@@ -48,6 +48,15 @@ class InverseTrajectory:
     def exact(self) -> bool:
         """Whether nothing else follows the command: the equations hold, and a closed path repeats."""
         return self.solved and self.unsettled == 0.0
+
+    def before(self, closed: bool) -> np.ndarray:
+        """(n, n_u) the drive before each sample of a motion: of a closed path the last one comes before the first."""
+        return np.vstack([self.u[-1:] if closed else self.u_start[None], self.u[:-1]])
+
+    def violations(self, model: Model, sample_time: float | None, closed: bool, margin: float = 0.0) -> list[Violation]:
+        """The limits that it breaks, those on the rates of drives too where there is a `sample_time` [s]."""
+        before = None if sample_time is None else Before(self.before(closed), sample_time)
+        return violations(model, self.x, self.z, self.u, margin, before)
 
 
 def count_faults(model: Model, follow: str) -> list[Fault]:
@@ -157,9 +166,9 @@ class PathInverse:
     ) -> bool:
         """Whether `command` can be followed with a `margin`, a share of each limit; judged by the samples `chosen` and those after them,
         where these are given and nothing is remembered from sample to sample."""
-        if chosen is None or self.remembers or self.moving is None:
+        if chosen is None or self.remembers or self.moving is None or self.model.rate_limits:
             needed = self.trajectory(command, closed, periods)
-            return needed.solved and not violations(self.model, needed.x, needed.z, needed.u, margin)
+            return needed.solved and not needed.violations(self.model, self.sample_time, closed, margin)
         x, z, _ = self._at_rest(command[chosen])
         x_then, z_then, _ = self._at_rest(command[_following(len(command), closed)[chosen]])
         u = self._drive(x, z, x_then, z_then)
@@ -214,9 +223,7 @@ class PathInverse:
     def _checked(self, command: np.ndarray, found: InverseTrajectory, closed: bool) -> InverseTrajectory:
         """`found`, solved where it is finite and satisfies the model's own equations."""
         m, n = self.model, len(command)
-        before = found.u
-        if self.sample_time is not None:
-            before = np.vstack([found.u[-1:] if closed else found.u_start[None], found.u[:-1]])
+        before = found.u if self.sample_time is None else found.before(closed)
         signal = m.signals[self.follow]
         p = np.tile(m.p_nominal[:, None], (1, n))
         reached, balance = (v.full().T for v in self._equations.map(n)(found.x.T, found.z.T, before.T, p))

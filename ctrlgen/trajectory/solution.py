@@ -19,6 +19,7 @@ from ctrlgen.trajectory.motion import Motion
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
 from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.violations import Before, limited_values, violations
 
 LOOKED_AT_BETWEEN = 4  # parts of a sample at whose ends the motion between samples is looked at
 
@@ -115,7 +116,7 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
     progress(f"sampled inverse, {len(motion)} samples")
     found = inverse.sampled(motion, scenario.closed)
     u = np.clip(found.u, *model.u_bounds)  # what NEGLIGIBLE lets pass is rounding
-    needed = InverseTrajectory(found.x, found.z, found.u, found.u[0], True)
+    needed = inverse.needed(found, motion, scenario.closed)
     if (error := unreachable(scenario, inverse, motion, needed)) is not None:
         raise error
     reached = simulate(model, u, inverse.sample_time, found.x[0], found.z[0])
@@ -129,7 +130,9 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
             f"drives held for {show(inverse.sample_time, 's')} follow the path only to {off.max():.1g} of its typical size, worst at "
             f"sample {int(off.argmax())}; raise sample_rate, or make the path slower or smoother"
         )
-    margins = tuple(_margins(model, samples.x, samples.z, u))
+    margins = tuple(
+        _margins(model, samples.x, samples.z, u, Before(needed.before(scenario.closed), inverse.sample_time))
+    )
     between = error_between_samples(scenario, model, samples, u)
     return Solution(scenario, model, motion.position, samples, u, margins, found.iterations, (), between)
 
@@ -177,17 +180,18 @@ def _solve_balanced(scenario: Scenario, model: Model, progress: Callable[[str], 
             )
         result, rows = programme.exact(needed), []
     added = tuple(limit.name for limit in rows)
-    margins = tuple(_margins(model, result.x, result.z, result.u))
+    before = None if scenario.sample_time is None else Before(result.before, scenario.sample_time)
+    if broken := violations(model, result.x, result.z, result.u, before=before):
+        names = ", ".join(dict.fromkeys(v.limit.label for v in broken))
+        raise SolverError(f"what the solver calls a solution breaks limits ({names}); command a smaller or slower path")
+    margins = tuple(_margins(model, result.x, result.z, result.u, before))
     return Solution(scenario, model, command, result.trace, result.u, margins, result.iterations, added)
 
 
-def _margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> list[Margin]:
-    """One Margin per limit: the smallest distance to its nearer side."""
-    n = len(u)
-    values = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
+def _margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: Before | None) -> list[Margin]:
+    """One Margin per limit, with the drives `before` also of their rates: the smallest distance to its nearer side."""
     margins = []
-    for limit, value in zip(model.limits, values, strict=True):
-        table = value.full().T
+    for limit, table in limited_values(model, x, z, u, before):
         sides = []
         for bound, sign in ((limit.lower, 1.0), (limit.upper, -1.0)):
             if bound is None:

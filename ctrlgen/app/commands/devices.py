@@ -101,7 +101,7 @@ def check(
     )
     for line in summary(device) if isinstance(device, Mechanism) else ():
         out.print(f"  {line}", markup=False, soft_wrap=True)
-    for limit in model.limits:
+    for limit in (*model.limits, *model.rate_limits):
         low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
         out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
     units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
