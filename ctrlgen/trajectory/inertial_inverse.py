@@ -15,6 +15,7 @@ import numpy as np
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.effects import Effect
+from ctrlgen.model.allocation import ganged_as
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
 from ctrlgen.model.model import Model
@@ -149,7 +150,7 @@ class InertialInverse:
         device = self.model.device
         kept = tuple(e for e in device.effect if not left_out(e))
         plain = build_model(device.model_copy(update={"effect": kept}), sample_time=self.sample_time)
-        return InertialInverse(plain, self.follow, self.sample_time, approximate)
+        return InertialInverse(ganged_as(plain, self.model), self.follow, self.sample_time, approximate)
 
     @cached_property
     def _equilibrium(self) -> ca.Function:

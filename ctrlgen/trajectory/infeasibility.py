@@ -44,8 +44,9 @@ def unreachable(
         f"cannot follow {len(samples)} of {n} samples ({_runs(samples)}); the worst is sample {worst}{at(worst)}: "
         f"{_point(signal, wanted[worst])}"
     ]
-    x, z, u = inverse.at_rest(wanted[worst])
-    held = violations(model, x[None], z[None], u[None])
+    leads = (worst + 1) % n if scenario.closed else min(worst + 1, n - 1)  # where the drive of the worst sample leads
+    x, z, u = (np.array(v) for v in zip(*map(inverse.at_rest, wanted[[worst, leads]]), strict=True))
+    held = violations(model, x, z, u)
     listed, also = _grouped(model, causes)
     lines += [
         f"  {_said(model, cause, bool(held))}, worst at sample {cause.worst}{at(cause.worst)}, in {len(cause.samples)} of {n} "

@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.model.allocation import ganged_as, why_not_ganged
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Model, Signal
@@ -60,17 +61,19 @@ class InverseTrajectory:
 
 
 def count_faults(model: Model, follow: str) -> list[Fault]:
-    """What keeps a model from being inverted: it takes one drive and one axis for each channel that is followed."""
+    """What keeps a model from being inverted: it takes a drive or more and one axis for each channel that is followed."""
     signal, drives, axes = model.signals[follow], model.u.numel(), len(model.axes)
     channels = len(signal.channels)
-    if drives > axes:
-        what = f"has {drives} drives for {axes} axes, so that many drives lead to one pose; let one drive act on several actuators"
+    if drives > axes and not model.redundant:
+        return [Fault("device", f"{model.name} has an imposed motion and no drives; nothing leads it along a path")]
+    if model.redundant and (why := why_not_ganged(model)) is not None:
+        what = f"has {drives} drives for {axes} axes and {why}; let one drive act on several actuators"
         return [Fault("device", f"{model.name} {what}")]
     if drives < channels:
         ways = "; ".join(_direction(signal, way) for way in _reached(model, signal).T)
         what = f"has {drives} drives for {channels} channels of the {follow}; near home it moves only along {ways}"
         return [Fault("device", f"{model.name} {what}; follow a signal of {drives} channels, or add drives")]
-    if channels != axes and not model.inertial:  # with inertia the other axes are flexible modes, which follow
+    if channels != axes and (not model.inertial or model.redundant):  # with inertia the other axes are flexible modes, which follow
         return [
             Fault(
                 "follow",
@@ -120,14 +123,14 @@ class PathInverse:
             return self
         device = self.model.device
         plain = device.model_copy(update={"effect": tuple(e for e in device.effect if not e.states)})
-        return PathInverse(build_model(plain), self.follow, self.sample_time)
+        return PathInverse(ganged_as(build_model(plain), self.model), self.follow, self.sample_time)
 
     def trajectory(self, command: np.ndarray, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
         """What `command` (n, channels) [SI] takes; not finite where the equations have no solution. A closed path is run through
         `periods` times at most."""
         if self.remembers and self.moving is not None:
             return self._carried(command, closed, periods)
-        x, z, u_held = self._at_rest(command)
+        x, z, u_held = self.equilibria(command)
         if self.moving is None:
             return self._checked(command, InverseTrajectory(x, z, u_held, u_held[0]), closed)
         following = _following(len(command), closed)
@@ -137,7 +140,7 @@ class PathInverse:
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x (n_x,), z (n_axes,) and u (n_u,) of the equilibrium at `target` (channels,)."""
-        x, z, u = self._at_rest(target[None])
+        x, z, u = self.equilibria(target[None])
         return x[0], z[0], u[0]
 
     def slope(self, target: np.ndarray) -> np.ndarray:
@@ -146,8 +149,8 @@ class PathInverse:
         z = self.static.displacement(ca.DM(m.rest), ca.DM.zeros(m.z.numel()), r)
         return ca.Function("slope", [r], [ca.jacobian(z, r)])(target).full()
 
-    def _at_rest(self, command: np.ndarray) -> list[np.ndarray]:
-        """x, z and u of the equilibria at each command."""
+    def equilibria(self, command: np.ndarray) -> list[np.ndarray]:
+        """x (n, n_x), z (n, n_axes) and u (n, n_u) of the equilibria at each command (n, channels)."""
         return [v.full().T for v in self._equilibria.map(len(command))(command.T)]
 
     def _drive(self, x: np.ndarray, z: np.ndarray, x_then: np.ndarray, z_then: np.ndarray) -> np.ndarray:
@@ -169,8 +172,8 @@ class PathInverse:
         if chosen is None or self.remembers or self.moving is None or self.model.rate_limits:
             needed = self.trajectory(command, closed, periods)
             return needed.solved and not needed.violations(self.model, self.sample_time, closed, margin)
-        x, z, _ = self._at_rest(command[chosen])
-        x_then, z_then, _ = self._at_rest(command[_following(len(command), closed)[chosen]])
+        x, z, _ = self.equilibria(command[chosen])
+        x_then, z_then, _ = self.equilibria(command[_following(len(command), closed)[chosen]])
         u = self._drive(x, z, x_then, z_then)
         return bool(np.all(np.isfinite(u))) and not violations(self.model, x, z, u, margin)
 
