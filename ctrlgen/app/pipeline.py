@@ -16,6 +16,7 @@ from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
 from ctrlgen.firmware.folder import CFolder, generate
+from ctrlgen.firmware.player_only import check_online, generate_player
 from ctrlgen.firmware.toolchains import find_compilers
 from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting import plots, report
@@ -76,6 +77,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
     Raises InputError, Unreachable, SolverError, ToolError. A value out of tolerance is no error: `passed` is then False.
     """
     find_compilers()
+    scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
@@ -96,6 +98,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
     C); whatever else fails is in `failures` of what is returned, and what did not run in `not_run`.
     """
     find_compilers()
+    scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
@@ -131,15 +134,31 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
 
 def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> CFolder:
     """Solves and writes only the folder of C, which needs no compiler. Raises InputError, Unreachable, SolverError."""
+    scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         c = generate(solution.scenario, solution.model, draft, solution, plots.draw_all(solution))
     return replace(c, path=Path(out))
 
 
+def player_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> list[Path]:
+    """Solves and writes only the player; the paths of its C. Raises InputError, Unreachable, SolverError."""
+    with whole_folder(Path(out)) as draft:
+        written = generate_player(solve_scenario(scenario, progress), draft)
+    return [Path(out) / path.name for path in written]
+
+
+def _with_online(scenario: Scenario | Path | str) -> Scenario:
+    """The scenario, of a device whose drives the online C can compute. Raises InputError before anything is solved."""
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    check_online(build_model(scenario.device))
+    return scenario
+
+
 def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) -> Outcome:
     """Solves, generates into a temporary folder and compares; nothing is kept. Raises as `run`."""
     find_compilers()
+    scenario = _with_online(scenario)
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         solution = solve_scenario(scenario, progress)
         progress("C sources")
