@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +25,7 @@ from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import Build
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.metrics import ExpectationResult, expectations
-from ctrlgen.trajectory.scenario import Scenario, load_scenario
+from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, solve
 from ctrlgen.trajectory.workspace import Ball, Workspace
 from ctrlgen.verification.comparison import Comparison, compare
@@ -63,7 +64,7 @@ def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) 
     """Loads and solves a scenario. Raises InputError, Unreachable, SolverError."""
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     progress("symbolic model")
-    solution = solve(scenario, build_model(scenario.device), progress)
+    solution = solve(scenario, model_of(scenario), progress)
     if scenario.file.outcome == "unreachable":
         raise SolverError(
             f"{scenario.path}: outcome = 'unreachable', but the path can be followed; remove that line or move the path"
@@ -151,7 +152,9 @@ def player_into(scenario: Scenario | Path | str, out: Path | str, progress: Prog
 def _with_online(scenario: Scenario | Path | str) -> Scenario:
     """The scenario, of a device whose drives the online C can compute. Raises InputError before anything is solved."""
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
-    check_online(build_model(scenario.device))
+    with warnings.catch_warnings():  # solving says them
+        warnings.simplefilter("ignore")
+        check_online(model_of(scenario))
     return scenario
 
 

@@ -189,11 +189,17 @@ class _ArgumentReader:
         for name, q in found.items():
             if name not in drive:
                 self.faults.append(Fault(f"drive_rate.{name}", f"is no drive; there are {', '.join(drive) or 'none'}"))
-            elif q is not PLACEHOLDER and not same_dimension(written_unit(q.text), f"({written_unit(drive[name].text)})/s"):
+            elif q is not PLACEHOLDER and not same_dimension(
+                written_unit(q.text), f"({written_unit(drive[name].text)})/s"
+            ):
                 what = f"{q.text!r} is no rate of a drive in {written_unit(drive[name].text)}"
-                self.faults.append(Fault(f"drive_rate.{name}", f"{what}; write for example {written_unit(drive[name].text)}/ms"))
+                self.faults.append(
+                    Fault(f"drive_rate.{name}", f"{what}; write for example {written_unit(drive[name].text)}/ms")
+                )
             elif not (pair := self.ranges.get(("drive_rate", name), (-1.0, 1.0)))[0] < 0 < pair[1]:
-                self.faults.append(Fault(f"drive_rate.{name}", "must be a rate below zero and one above; else it never returns"))
+                self.faults.append(
+                    Fault(f"drive_rate.{name}", "must be a rate below zero and one above; else it never returns")
+                )
         return {name: q for name, q in found.items() if name in drive}
 
     def weights(self, given: Mapping[str, Any], sizes: Mapping[str, Mapping[str, Quantity]]) -> dict[str, float]:
@@ -201,7 +207,9 @@ class _ArgumentReader:
         drive, axes = sizes["drive"], sizes["axes"]
         for name, weight in given.items():
             if name not in drive:
-                self.faults.append(Fault(f"drive_weight.{name}", f"is no drive; there are {', '.join(drive) or 'none'}"))
+                self.faults.append(
+                    Fault(f"drive_weight.{name}", f"is no drive; there are {', '.join(drive) or 'none'}")
+                )
             elif isinstance(weight, bool) or not isinstance(weight, (int, float)) or not 0 < weight < np.inf:
                 self.faults.append(Fault(f"drive_weight.{name}", f"{weight!r} must be a number above zero"))
         if given and len(drive) <= len(axes):
@@ -287,8 +295,9 @@ def user_device(
     the readings are the axes unless `pose` is given. Drives and axes are kept within plus and minus that size, or within a range
     given as a pair, {"stack": ("0 V", "150 V")}; states only within a range. `drive_rate` limits how fast a drive may change,
     {"stack": "5 V/ms"}, or down and up, ("-2 V/ms", "5 V/ms"). Of more drives than axes those with the least sum of `drive_weight`
-    (1 where it is not given) times the square of the drive as a share of its range move the axes. `limits` are of any expression, {"stress":
-    (lambda d, p: p.k * d.x, "300 MPa")}: its magnitude stays below the value. `parameters` are "0.5 kg", ("0.5 kg", sd) or
+    (1 where it is not given) times the square of the drive as a share of its range move the axes. `limits` are of any
+    expression, {"stress": (lambda d, p: p.k * d.x, "300 MPa")}: its magnitude stays below the value. `parameters` are "0.5 kg",
+    ("0.5 kg", sd) or
     {value, sd, source, domain}: the diagnosis takes a number with an sd as uncertain, one without as exact until the data
     contradict it; its path is 'mechanism.NAME'. A law takes any of u, x, d, v, p as arguments of these names (see the
     module) and returns one number for each axis, state or reading: a vector, a list, or {name: number}. It may be a
@@ -318,11 +327,20 @@ def user_device(
         "rates": rates, "pose": pose, "needed_force": needed_force,
     }  # fmt: skip
     if imposed:
-        others = {"drive": drive, "drive_rate": drive_rate, "drive_weight": drive_weight, "state": state, "reading": reading}
+        others = {
+            "drive": drive,
+            "drive_rate": drive_rate,
+            "drive_weight": drive_weight,
+            "state": state,
+            "reading": reading,
+        }
         read.imposed(given, others, sizes)
     elif speed is not None:
         read.faults.append(Fault("speed", "is of an imposed motion; give needed_force, or leave it out"))
-    rates_of_drives, weights = read.drive_rates(drive_rate or {}, sizes["drive"]), read.weights(drive_weight or {}, sizes)
+    rates_of_drives, weights = (
+        read.drive_rates(drive_rate or {}, sizes["drive"]),
+        read.weights(drive_weight or {}, sizes),
+    )
     expressions = read.limits({} if limits is None else limits)
     laws = read.laws(given, sizes["state"], reading is None or list(reading) == list(axes))
     size = None if force_size is None else read.ports("force_size", {"force_size": force_size})["force_size"]

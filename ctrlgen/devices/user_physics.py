@@ -34,7 +34,9 @@ ARGUMENTS = {  # of each law
 class UserDescription:
     """What the user gave: components {name: largest size} of each vector, domains and units of the parameters, the laws by
     name, the typical `force` if any, the `ranges` [SI] of components given by a lowest and a highest value, the `limits` on
-    expressions, the largest `drive_rates`, the `weights` of drives of which there are more than axes, the largest `speed` of each axis whose motion is imposed. Faults of the laws are collected as they are evaluated."""
+    expressions, the largest `drive_rates`, the
+    `weights` of drives where there are more than axes, the largest `speed` of each axis whose motion is imposed. Faults of the laws
+    are collected as they are evaluated."""
 
     name: str
     axes: dict[str, Quantity]

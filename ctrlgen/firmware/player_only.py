@@ -23,7 +23,9 @@ def check_online(model: Model) -> None:
     """Raises InputError for a device whose drives the online C cannot compute yet."""
     faults = []
     if model.rate_limits:
-        faults.append(Fault("device", f"has limits on rates of drives ({', '.join(r.label for r in model.rate_limits)})"))
+        faults.append(
+            Fault("device", f"has limits on rates of drives ({', '.join(r.label for r in model.rate_limits)})")
+        )
     if model.redundant:
         faults.append(Fault("device", f"has more drives ({model.u.numel()}) than axes ({len(model.axes)})"))
     if faults:

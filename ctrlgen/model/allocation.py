@@ -97,15 +97,22 @@ def inverse_of(model: Model, follow: str, sample_time: float | None) -> Inverse:
         what = "has more drives than axes and effects with memories: there is no controller for it; use the player of a solved path"
         raise InputError(model.name, [Fault("drive", what)])
     inverse = invert(allocation.ganged, follow, sample_time)
-    x, z, wanted, u = (ca.SX.sym(n, k) for n, k in (("x", model.x.numel()), ("z", model.z.numel()), ("w", model.z.numel()), ("u", model.u.numel())))
+    x, z, wanted, u = (
+        ca.SX.sym(n, k)
+        for n, k in (("x", model.x.numel()), ("z", model.z.numel()), ("w", model.z.numel()), ("u", model.u.numel()))
+    )
     state = ca.SX(0, 1)
     drive = allocation.drive(wanted, inverse.drive(x, z, wanted, state))
-    balance = ca.substitute(model.balance, ca.vertcat(model.x, model.u, model.p), ca.vertcat(x, u, ca.DM(model.p_nominal)))
+    balance = ca.substitute(
+        model.balance, ca.vertcat(model.x, model.u, model.p), ca.vertcat(x, u, ca.DM(model.p_nominal))
+    )
     settled = newton_root(ca.substitute(balance, model.z, z), z, z, NEWTON_STEPS)
     still = inverse.advance(x, z, ca.SX.zeros(len(model.axes), 1))  # nothing remembers the drive
     return replace(
         inverse,
-        drive=ca.Function("drive", [x, z, wanted, state], [drive], ["x", "z", "wanted", "state"], ["result"], {"cse": True}),
+        drive=ca.Function(
+            "drive", [x, z, wanted, state], [drive], ["x", "z", "wanted", "state"], ["result"], {"cse": True}
+        ),
         advance=ca.Function("advance", [x, z, u], [still], ["x", "z", "drive"], ["result"], {"cse": True}),
         settle=ca.Function("settle", [x, z, u], [settled], ["x", "z", "drive"], ["result"], {"cse": True}),
     )

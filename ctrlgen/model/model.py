@@ -63,7 +63,9 @@ class Model:
     force_parts: dict[str, ca.SX]  # parts of the restoring force by name
     limits: tuple[Limit, ...]
     rate_limits: tuple[Limit, ...]  # on the change by time of a drive, which is their `expr`
-    drive_weights: np.ndarray  # (n_u,) how much each drive counts where there are more than axes; none of an imposed motion
+    drive_weights: (
+        np.ndarray
+    )  # (n_u,) how much each drive counts where there are more than axes; none of an imposed motion
     law_inputs: Callable[
         ..., SimpleNamespace
     ]  # (place, channel, partner, states, stage) -> what an effect's law reads there

@@ -50,7 +50,14 @@ class LeastEffortInverse:
 
     def trajectory(self, command: Command, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
         """What a path takes; the drives break limits only where none keep them."""
-        return self._allocated(self.inner.trajectory(command, closed, periods), samples_of(command)[0], closed)
+        return self._allocated(self._forces(command, closed, periods), samples_of(command)[0], closed)
+
+    def _forces(self, command: Command, closed: bool, periods: int) -> InverseTrajectory:
+        """What a path takes, with forces instead of drives."""
+        if isinstance(self.inner, InertialInverse):
+            return self.inner.trajectory(command, closed, periods)
+        assert isinstance(command, np.ndarray)  # of devices in balance only samples are followed
+        return self.inner.trajectory(command, closed, periods)
 
     def sampled(self, command: Motion, closed: bool) -> SampledTrajectory:
         """The drives that lead a device with inertia along the samples of `command` while each is held. Raises SolverError."""
@@ -60,7 +67,11 @@ class LeastEffortInverse:
 
     def needed(self, found: SampledTrajectory, command: Motion, closed: bool) -> InverseTrajectory:
         """Sampled forces, or drives, as what the motion takes."""
-        forces = found.u if found.u.shape[1] == len(self.model.axes) else np.einsum("kij,kj->ki", self._slopes(found.z), found.u)
+        forces = (
+            found.u
+            if found.u.shape[1] == len(self.model.axes)
+            else np.einsum("kij,kj->ki", self._slopes(found.z), found.u)
+        )
         begin = InverseTrajectory(found.x, found.z, forces, forces[0], True)
         return self._allocated(begin, command.position[0], closed)
 
@@ -89,9 +100,7 @@ class LeastEffortInverse:
             x, z, f = self.inner.equilibria(command if chosen is None else command[chosen])
             u = np.clip(self.allocation.drive.map(len(z))(z.T, f.T).full().T, *self._bounds(margin))
             return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
-        found = self._allocated(
-            self.inner.trajectory(command, closed, periods), samples_of(command)[0], closed, margin
-        )
+        found = self._allocated(self._forces(command, closed, periods), samples_of(command)[0], closed, margin)
         return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
 
     def _allocated(
@@ -114,7 +123,7 @@ class LeastEffortInverse:
 
     def drives(self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0) -> np.ndarray:
         """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other."""
-        m, timed = self.model, self.sample_time is not None and bool(self.model.rate_limits)
+        timed = self.sample_time is not None and bool(self.model.rate_limits)
         n = len(f)
         u = self.allocation.drive.map(n)(z.T, f.T).full().T
         low, high = (np.tile(bound, (n, 1)) for bound in self._bounds(margin))
@@ -164,7 +173,9 @@ class LeastEffortInverse:
     @cached_property
     def _B(self) -> ca.Function:
         m = self.model
-        return ca.Function("B", [m.z], [ca.densify(ca.substitute(ca.jacobian(m.balance, m.u), m.p, ca.DM(m.p_nominal)))])
+        return ca.Function(
+            "B", [m.z], [ca.densify(ca.substitute(ca.jacobian(m.balance, m.u), m.p, ca.DM(m.p_nominal)))]
+        )
 
     def _bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
         return _narrowed(self.model.u_bounds, margin)
@@ -183,7 +194,9 @@ class LeastEffortInverse:
         span = 1 / np.sqrt(effort_weights(m) / m.drive_weights)
         row = np.linalg.norm(B * span, axis=2)  # what full drives push
         U = ca.MX.sym("u", n_u, n)
-        pushed = ca.Function("pushed", [S := ca.SX.sym("b", row.shape[1], n_u), v := ca.SX.sym("v", n_u)], [ca.mtimes(S, v)])
+        pushed = ca.Function(
+            "pushed", [S := ca.SX.sym("b", row.shape[1], n_u), v := ca.SX.sym("v", n_u)], [ca.mtimes(S, v)]
+        )
         shares = np.hstack(list(B * span / row[:, :, None]))
         limited, low, high = [U], [np.tile(bounds[0] / span, n)], [np.tile(bounds[1] / span, n)]
         if rates is not None:
@@ -205,7 +218,8 @@ class LeastEffortInverse:
             "print_time": False,
             "ipopt": {
                 "print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "nlp_scaling_method": "none",
-                "mu_strategy": "adaptive", "bound_relax_factor": 0.0, "jac_c_constant": "yes", "jac_d_constant": "yes", "hessian_constant": "yes",
+                "mu_strategy": "adaptive", "bound_relax_factor": 0.0, "jac_c_constant": "yes", "jac_d_constant": "yes", 
+                "hessian_constant": "yes",
             },
         }  # fmt: skip
         solver = ca.nlpsol("least_effort", "ipopt", problem, options)

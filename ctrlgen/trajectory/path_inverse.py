@@ -73,7 +73,9 @@ def count_faults(model: Model, follow: str) -> list[Fault]:
         ways = "; ".join(_direction(signal, way) for way in _reached(model, signal).T)
         what = f"has {drives} drives for {channels} channels of the {follow}; near home it moves only along {ways}"
         return [Fault("device", f"{model.name} {what}; follow a signal of {drives} channels, or add drives")]
-    if channels != axes and (not model.inertial or model.redundant):  # with inertia the other axes are flexible modes, which follow
+    if channels != axes and (
+        not model.inertial or model.redundant
+    ):  # with inertia the other axes are flexible modes, which follow
         return [
             Fault(
                 "follow",

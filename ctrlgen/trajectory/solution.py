@@ -14,8 +14,8 @@ from ctrlgen.model.discretisation import one_step_map
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, simulate
 from ctrlgen.trajectory.inertial_inverse import InertialInverse
-from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
+from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
 from ctrlgen.trajectory.motion import Motion
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
