@@ -94,14 +94,19 @@ class LeastEffortInverse:
     ) -> bool:
         """Whether `command` can be followed with a `margin`, a share of each limit; where nothing but the samples matters, judged by
         those `chosen`."""
-        apart = isinstance(command, np.ndarray) and not self.model.rate_limits and not self.inner.remembers
-        if apart and self._facets is not None:
-            assert isinstance(self.inner, PathInverse) and isinstance(command, np.ndarray)
+        if self.model.rate_limits or self._facets is None:
+            found = self._forces(command, closed, periods)
+            found = self._allocated(found, samples_of(command)[0], closed, margin)
+            return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
+        if isinstance(command, np.ndarray) and isinstance(self.inner, PathInverse) and not self.inner.remembers:
             x, z, f = self.inner.equilibria(command if chosen is None else command[chosen])
-            u = np.clip(self.allocation.drive.map(len(z))(z.T, f.T).full().T, *self._bounds(margin))
-            return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
-        found = self._allocated(self._forces(command, closed, periods), samples_of(command)[0], closed, margin)
-        return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
+        else:
+            found = self._forces(command, closed, periods)
+            x, z, f = found.x, found.z, found.u
+            if not found.solved:
+                return False
+        u = np.clip(self.allocation.drive.map(len(z))(z.T, f.T).full().T, *self._bounds(margin))
+        return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
 
     def _allocated(
         self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0
