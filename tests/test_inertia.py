@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from command_line import ctrlgen as run
-from conftest import AXIS_FILE, DEVICES
+from conftest import AXIS_FILE
 from numpy.polynomial import Polynomial
 from scipy.integrate import solve_ivp
 
@@ -451,8 +451,16 @@ def test_a_delay_of_the_reading_changes_no_drive_and_a_warning_says_so(tmp_path)
 
 
 def test_a_delay_in_the_reading_of_a_loop_is_refused(tmp_path):
-    text = (DEVICES.parent / "rotary_axis" / "device.toml").read_text()
-    (tmp_path / "servo.toml").write_text(text + '\n[[effect]]\nkind = "delay"\nat = "axis"\ndelay = "0.5 ms"\n')
-    late = scenario(tmp_path, "servo.toml", LINE)
-    with pytest.raises(InputError, match=r"has delay in the reading of its feedback loop.*leave it out"):
-        model_of(late)
+    """It is left out where the loop reads the displacement by an encoder of its own."""
+    loop = '[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\nmeasures = "{}"\n'
+    delay = '[[effect]]\nkind = "delay"\nat = "axis"\ndelay = "0.5 ms"\n'
+    for measured in ("reading", "displacement"):
+        text = AXIS_FILE.read_text() + loop.format(measured) + delay
+        (tmp_path / "loop.toml").write_text(text)
+        late = scenario(tmp_path, "loop.toml", LINE)
+        if measured == "reading":
+            with pytest.raises(InputError, match=r"has delay in the reading of its feedback loop.*leave it out"):
+                model_of(late)
+        else:
+            with pytest.warns(UserWarning, match="changes no drive"):
+                model_of(late)

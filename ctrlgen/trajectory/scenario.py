@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
+import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
@@ -237,13 +238,18 @@ def model_of(scenario: Scenario) -> Model:
     if not late:
         return model
     kinds = ", ".join(sorted({effect.kind for effect in late}))
-    if model.held.numel():
+    if model.held.numel() and _read_by_the_loop(build_model(device, sample_time=scenario.sample_time or 1.0)):
         what = (
             f"has {kinds} in the reading of its feedback loop, which is not inverted yet: leave it out to follow a path"
         )
         raise InputError(device.name, [Fault("effect", what)])
     warnings.warn(f"{device.name}: {kinds} is of the reading and changes no drive along a path; left out", stacklevel=2)
     return model
+
+
+def _read_by_the_loop(model: Model) -> bool:
+    """Whether states that change once a sample, as those of late readings do, act on the output of the feedback loop."""
+    return bool(ca.depends_on(model.held_value, model.x[list(model.stepped)]))
 
 
 def motion_targets(scenario: Scenario, model: Model) -> np.ndarray:
