@@ -21,6 +21,7 @@ from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
 from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.model.simulation import simulate
+from ctrlgen.trajectory.scenario import model_of
 
 MASS, DAMPING, STIFFNESS, CUBIC, FORCE, LAG = 0.5, 30.0, 2e5, 1e13, 10.0, 1e-3
 TRAVEL = 100e-6
@@ -422,3 +423,44 @@ def test_a_pendulum_is_led_to_45_degrees_and_its_c_agrees(tmp_path, compiler):
     outcome = ctrlgen.run(scenario(tmp_path, pendulum, path, rate="1 kHz", duration="0.5 s"), tmp_path / "out")
     assert outcome.passed
     assert outcome.solution.drive[-1] == pytest.approx([20e-3 * np.sin(np.pi / 4) / 15e-3], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("device", "path", "least"),
+    [
+        (stage(), 'kind = "line"\nend = { x = "1 nm" }\n', 3),  # a force on the mass: at rest, pushed, at rest
+        (coil(), 'kind = "line"\nend = { axis = "1 nm" }\n', 4),  # its current has to be led back too
+        (stage(), 'kind = "circle"\ndiameter = "1 nm"\nplane = ["x", "y"]\n', 3),
+    ],
+)
+def test_a_motion_of_too_few_samples_is_a_fault_that_says_how_many_it_takes(tmp_path, device, path, least):
+    with pytest.raises(
+        InputError, match=rf"has 2 samples; {device.name}, which has inertia, takes {least} or more: raise"
+    ):
+        solved(tmp_path, device, path, duration="0.4 ms")
+    if device.name == "stage":
+        assert len(solved(tmp_path, device, path, duration="0.6 ms").drive) == 3
+
+
+def test_a_delay_of_the_reading_changes_no_drive_and_a_warning_says_so(tmp_path):
+    plain = solved(tmp_path, str(AXIS_FILE), LINE)
+    late = scenario(tmp_path, with_effect(tmp_path, "delay", 'delay = "0.5 ms"'), LINE)
+    with pytest.warns(UserWarning, match="flexure_axis: delay is of the reading and changes no drive"):
+        model = model_of(late)
+    assert np.array_equal(solve(late, model).drive, plain.drive)
+
+
+def test_a_delay_in_the_reading_of_a_loop_is_refused(tmp_path):
+    """It is left out where the loop reads the displacement by an encoder of its own."""
+    loop = '[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\nmeasures = "{}"\n'
+    delay = '[[effect]]\nkind = "delay"\nat = "axis"\ndelay = "0.5 ms"\n'
+    for measured in ("reading", "displacement"):
+        text = AXIS_FILE.read_text() + loop.format(measured) + delay
+        (tmp_path / "loop.toml").write_text(text)
+        late = scenario(tmp_path, "loop.toml", LINE)
+        if measured == "reading":
+            with pytest.raises(InputError, match=r"has delay in the reading of its feedback loop.*leave it out"):
+                model_of(late)
+        else:
+            with pytest.warns(UserWarning, match="changes no drive"):
+                model_of(late)

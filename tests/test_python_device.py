@@ -124,7 +124,10 @@ def with_ports(drive, axes, force):
 @pytest.mark.parametrize(
     ("device", "says"),
     [
-        (with_ports("abc", "xy", lambda u, p: [p.g * (u.a - u.b), p.g * u.c]), "has 3 drives for 2 axes"),
+        (
+            with_ports("abc", "xy", lambda u, p: [p.g * u.a * u.b, p.g * u.c]),
+            "has 3 drives for 2 axes and has forces that are not linear",
+        ),
         (with_ports("a", "xy", lambda u, p: [p.g * u.a, -0.5 * p.g * u.a]), "it moves only along x - 0.5 y"),
     ],
 )

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import rrr_direct as direct
+from command_line import ctrlgen as command
 from conftest import DEVICES
 from matrices import array
 
@@ -90,6 +91,18 @@ def test_the_hinges_may_choose_their_own_equations(tmp_path: Any) -> None:
     path.write_text("\n".join(line for line in auto if not line.startswith("outside = ")))
     with pytest.warns(circular_hinge_table.HingeRangeWarning, match="recommends no printed equation here"):
         load_device(path)
+
+
+def test_a_command_gives_each_warning_once(tmp_path: Any) -> None:
+    """Although the model is built for the check of the device and for the solution."""
+    lines = (DEVICES / "rrr_case2.toml").read_text().splitlines()
+    changed = ['equation = "auto"' if line.startswith("equation = ") else line for line in lines]
+    (tmp_path / "device.toml").write_text("\n".join(line for line in changed if not line.startswith("outside = ")))
+    done = command(
+        "run", DEVICES.parent / "rrr_circle", "--device", tmp_path / "device.toml", "--out", tmp_path / "out"
+    )
+    warned = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+    assert warned and len(warned) == len(set(warned))
 
 
 def test_a_stage_says_which_equations_stand_outside_their_range(case: int) -> None:

@@ -11,7 +11,7 @@ import typer
 
 from ctrlgen.app.commands import controllers, devices, examples, recordings  # noqa: F401, they register their commands
 from ctrlgen.app.commands.app import app
-from ctrlgen.app.console import CHECK, complain, err, show_warning
+from ctrlgen.app.console import CHECK, complain, err, shows_warnings
 from ctrlgen.core.errors import CtrlgenError, Unreachable
 from ctrlgen.core.files import explained
 
@@ -26,7 +26,7 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     """
     try:
         CHECK.set(check)
-        warnings.showwarning = show_warning
+        warnings.showwarning = shows_warnings()
         status = app(standalone_mode=False)  # typer turns Ctrl-C into the status 130
         return status if isinstance(status, int) else 0
     except Unreachable as error:

@@ -314,9 +314,17 @@ def complain(error: CtrlgenError) -> None:
     err.print(str(error), markup=False, soft_wrap=True)
 
 
-def show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """A warning in one line, without its place in our code, which tells a user nothing."""
-    err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
+def shows_warnings() -> Callable[..., None]:
+    """What shows a warning in one line, without its place in our code, which tells a user nothing; each text once, although a model is
+    built several times on the way."""
+    shown: set[str] = set()
+
+    def show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+        if str(message) not in shown:
+            shown.add(str(message))
+            err.print(f"[yellow]warning[/yellow]: {escape(str(message))}", soft_wrap=True)
+
+    return show_warning
 
 
 def print_workspace(found: pipeline.WorkspaceSummary) -> None:

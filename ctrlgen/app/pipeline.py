@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
 from ctrlgen.firmware.folder import CFolder, generate
+from ctrlgen.firmware.player_only import check_online, generate_player
 from ctrlgen.firmware.toolchains import find_compilers
 from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting import plots, report
@@ -23,7 +25,7 @@ from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import Build
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.metrics import ExpectationResult, expectations
-from ctrlgen.trajectory.scenario import Scenario, load_scenario
+from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, solve
 from ctrlgen.trajectory.workspace import Ball, Workspace
 from ctrlgen.verification.comparison import Comparison, compare
@@ -62,7 +64,7 @@ def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) 
     """Loads and solves a scenario. Raises InputError, Unreachable, SolverError."""
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     progress("symbolic model")
-    solution = solve(scenario, build_model(scenario.device), progress)
+    solution = solve(scenario, model_of(scenario), progress)
     if scenario.file.outcome == "unreachable":
         raise SolverError(
             f"{scenario.path}: outcome = 'unreachable', but the path can be followed; remove that line or move the path"
@@ -76,6 +78,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
     Raises InputError, Unreachable, SolverError, ToolError. A value out of tolerance is no error: `passed` is then False.
     """
     find_compilers()
+    scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
@@ -96,6 +99,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
     C); whatever else fails is in `failures` of what is returned, and what did not run in `not_run`.
     """
     find_compilers()
+    scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
@@ -131,15 +135,33 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
 
 def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> CFolder:
     """Solves and writes only the folder of C, which needs no compiler. Raises InputError, Unreachable, SolverError."""
+    scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         c = generate(solution.scenario, solution.model, draft, solution, plots.draw_all(solution))
     return replace(c, path=Path(out))
 
 
+def player_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> list[Path]:
+    """Solves and writes only the player; the paths of its C. Raises InputError, Unreachable, SolverError."""
+    with whole_folder(Path(out)) as draft:
+        written = generate_player(solve_scenario(scenario, progress), draft)
+    return [Path(out) / path.name for path in written]
+
+
+def _with_online(scenario: Scenario | Path | str) -> Scenario:
+    """The scenario, of a device whose drives the online C can compute. Raises InputError before anything is solved."""
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    with warnings.catch_warnings():  # solving says them
+        warnings.simplefilter("ignore")
+        check_online(model_of(scenario))
+    return scenario
+
+
 def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) -> Outcome:
     """Solves, generates into a temporary folder and compares; nothing is kept. Raises as `run`."""
     find_compilers()
+    scenario = _with_online(scenario)
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         solution = solve_scenario(scenario, progress)
         progress("C sources")

@@ -55,6 +55,12 @@ class Limit:
     upper: float | None = None
 
 
+def rate_limit(drive: Signal, i: int, low: float, high: float, unit: str) -> Limit:
+    """low <= du/dt <= high [SI] of component i of the drive: `expr` is the drive itself, whose change by time is limited."""
+    name = drive.channels[i]
+    return Limit(f"rate_{name}", f"rate of {name}", (name,), unit, drive.expr[i], low, high)
+
+
 @dataclass(frozen=True)
 class AxisSignal:
     """How a signal with one channel an axis is shown: label, unit, prefix of its CSV columns, typical size in SI."""
@@ -95,8 +101,9 @@ class DevicePhysics:
     `restoring_force` (d) pulls the axes home; `restoring_force_parts` (d) gives its parts by name for plots.
     `limits` is given the namespace drive, command, state, force, displacement, mechanism_displacement of expressions.
     `displacement_scale` and `force_scale` are typical sizes in SI, in the units `travel_unit` and `force_unit`.
-    `bipolar` says whether the drive has both signs. `documented`: for a map, the functions whose docstrings state its equation and
-    source; the generated C repeats them.
+    `documented`: for a map, the functions whose docstrings state its equation and source; the generated C repeats them.
+    `bipolar` says whether the drive has both signs. `rate_limits` are on the change of drives by time (`rate_limit`).
+    `drive_weights` say how much each drive counts where there are more of them than axes, all the same where it is empty.
     """
 
     axes: tuple[str, ...]
@@ -109,6 +116,8 @@ class DevicePhysics:
     restoring_force: Callable[[ca.SX], ca.SX]
     pose: Callable[[ca.SX], ca.SX]
     limits: Callable[[SimpleNamespace], Sequence[Limit]]
+    rate_limits: tuple[Limit, ...] = ()
+    drive_weights: tuple[float, ...] = ()
     state: Signal | None = None
     rest: tuple[float | ca.SX, ...] = ()
     restoring_force_parts: Callable[[ca.SX], dict[str, ca.SX]] = lambda d: {}

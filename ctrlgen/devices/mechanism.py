@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 from ctrlgen.devices.base import BalancedPhysics, Device, Section
@@ -126,6 +126,8 @@ class Actuator(Section):
     """Lowest drive; its unit is that of the drive."""
     high: PerDrive
     """Highest drive."""
+    rate: tuple[PerDrive, PerDrive] | None = None
+    """Largest change of the drive by time, such as "5 V/ms", or the lowest and the highest, such as ["-2 V/ms", "5 V/ms"]."""
     time_constant: Annotated[Quantity, In("ms", positive=True)] | None = None
     """Time constant with which the force or displacement follows the drive; left out: at once."""
     stiffness: Annotated[Quantity, In("N/um", positive=True)] | None = None
@@ -135,10 +137,22 @@ class Actuator(Section):
     pattern: str = ""
     """The pattern by which it is copied."""
 
+    @field_validator("rate", mode="before")
+    @classmethod
+    def _is_to_both_sides(cls, stated: Any) -> Any:
+        """One rate is the largest to both sides."""
+        return (f"-{stated}", stated) if isinstance(stated, str) else stated
+
     @model_validator(mode="after")
     def _fits_together(self) -> Actuator:
         faults = []
         drive = written_unit(self.low.text)
+        if self.rate is not None:
+            slowest, fastest = self.rate
+            if any(not same_dimension(written_unit(q.text), f"({drive})/s") for q in self.rate):
+                faults.append(f"rate: {fastest.text!r} is no rate of a drive in {drive}; write for example {drive}/ms")
+            elif not slowest.si < 0 < fastest.si:
+                faults.append("rate: must be above zero, or a rate below zero and one above")
         if not same_dimension(drive, written_unit(self.high.text)):
             faults.append(f"high: {self.high.text!r} is not of the dimension of low = {self.low.text!r}")
         elif not self.low.si < self.high.si:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from ctrlgen.core.units import show, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Limit, Signal
+from ctrlgen.devices.base import BalancedPhysics, Limit, Signal, rate_limit
 from ctrlgen.devices.mechanism_elements import TWIST, Copied, Direction, Flexible, Placed
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
@@ -253,6 +253,10 @@ class Condensed:
             force=lambda u, x, d: gain * (x if lagging else u),
             restoring_force=lambda d: ca.mtimes(K, d) + stack * d,
             pose=lambda d: ca.mtimes(J, d), limits=limits,
+            rate_limits=tuple(
+                rate_limit(drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
+                for i, s in enumerate(sections) if s.rate is not None
+            ),
         )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from ctrlgen.devices.base import (
     Limit,
     Signal,
     imposed_motion,
+    rate_limit,
 )
 from ctrlgen.devices.ports import Law, Ports, evaluate_law
 
@@ -33,7 +34,9 @@ ARGUMENTS = {  # of each law
 class UserDescription:
     """What the user gave: components {name: largest size} of each vector, domains and units of the parameters, the laws by
     name, the typical `force` if any, the `ranges` [SI] of components given by a lowest and a highest value, the `limits` on
-    expressions, the largest `speed` of each axis whose motion is imposed. Faults of the laws are collected as they are evaluated."""
+    expressions, the largest `drive_rates`, the
+    `weights` of drives where there are more than axes, the largest `speed` of each axis whose motion is imposed. Faults of the laws
+    are collected as they are evaluated."""
 
     name: str
     axes: dict[str, Quantity]
@@ -46,6 +49,8 @@ class UserDescription:
     force: Quantity | None = None
     ranges: dict[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
     limits: dict[str, tuple[Law, Quantity]] = field(default_factory=dict)
+    drive_rates: dict[str, Quantity] = field(default_factory=dict)
+    weights: dict[str, float] = field(default_factory=dict)
     speed: dict[str, Quantity] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
 
@@ -166,8 +171,10 @@ class PhysicsBuilder:
             force_unit=written_unit(given.force.text) if given.force else "N*m" if same_dimension(unit, "rad") else "N",
             restoring_force=self.restoring_force, limits=self.limits,
             pose=(lambda d: given.evaluate("pose", self.p, d=d)) if "pose" in given.laws else (lambda d: d),
+            drive_weights=tuple(given.weights.get(name, 1.0) for name in given.drive),
             bipolar=any(given.ranges.get(("drive", name), (-1.0, 1.0))[0] < 0 for name in given.drive),
         )  # fmt: skip
+        common["rate_limits"] = self.rate_limits(common["drive"])
         self.limits(SimpleNamespace(drive=u, displacement=d, mechanism_displacement=d))  # collects its faults too
         if not self.inertial:
             return BalancedPhysics(
@@ -179,6 +186,16 @@ class PhysicsBuilder:
             damping_force=(lambda v: given.evaluate("damping_force", self.p, v=v)) if "damping_force" in given.laws else None,
             dynamics=lambda u, x, d, v: (self.applied_force(u, x, d, v), given.evaluate("rates", self.p, u=u, x=x, d=d, v=v)),
         )  # fmt: skip
+
+    def rate_limits(self, drive: Signal) -> tuple[Limit, ...]:
+        """Of the drives that have one."""
+        found = []
+        for i, name in enumerate(self.given.drive):
+            if name in self.given.drive_rates:
+                q = self.given.drive_rates[name]
+                low, high = self.given.ranges.get(("drive_rate", name), (-q.si, q.si))
+                found.append(rate_limit(drive, i, low, high, written_unit(q.text)))
+        return tuple(found)
 
     def limits(self, signal: SimpleNamespace) -> list[Limit]:
         """Drives and displacements stay within their ranges or largest sizes, states within ranges, expressions below their limits."""

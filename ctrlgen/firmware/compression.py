@@ -60,6 +60,8 @@ class SampleTable:
 
 
 Curve = SampleTable | Spline
+BETWEEN = 4  # moments a sample at which the rates of a curve are looked at
+RATE_ROUNDING = 1e-3  # of the range of a rate: of drives in float over a quarter of a sample
 
 
 @dataclass(frozen=True)
@@ -133,6 +135,8 @@ def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | N
         compression = Compression(real, curve, closed, *_kept(curve, bounds, real), ())
         values = compression.drives(np.arange(n))
         length, angle = _error(solution, values)
+        if isinstance(curve, Spline) and not _keeps_rates(solution, compression):
+            length = np.inf
         off = float(np.abs(values - solution.drive).max())
         cost = instructions(curve, int(np.isfinite([compression.low, compression.high]).sum()))
         return Candidate(
@@ -210,6 +214,21 @@ def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
         for unit in ("m", "rad")
     )
     return length, angle
+
+
+def _keeps_rates(solution: Solution, compression: Compression) -> bool:
+    """Whether the drives, looked at between samples too, change no faster than they may; where those of the solution do not either."""
+    m, n, h = solution.model, len(solution.drive), solution.scenario.sample_time or 1.0
+    if not m.rate_limits:
+        return True
+    k = np.repeat(np.arange(n), BETWEEN)
+    drives = compression.drives(k, np.tile(np.arange(BETWEEN) / BETWEEN, n))
+    if solution.scenario.closed:
+        drives = np.vstack([drives, drives[:1]])
+    change = np.diff(drives, axis=0) / (h / BETWEEN)
+    low, high = m.rate_bounds
+    rounded = np.where(np.isfinite(high - low), RATE_ROUNDING * (high - low), 0.0)
+    return bool(np.all(change >= low - rounded) and np.all(change <= high + rounded))
 
 
 def _within(c: Candidate) -> bool:

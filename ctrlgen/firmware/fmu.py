@@ -26,6 +26,7 @@ from ctrlgen.firmware.fmi_calls import FOREIGN_TYPES, REFUSED_2, REFUSED_3
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.plant import Plant, plant_of, write_plant
 from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.player_only import check_online
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.firmware.toolchains import compile_c, find_compilers
 from ctrlgen.model.motion_feedforward import controller_of
@@ -119,7 +120,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
         try:
             units.insert(0, _controller_unit(scenario, plant, Path(scratch)))
         except InputError as error:
-            if not plant.inertial:
+            if not (plant.inertial or plant.model.redundant or plant.model.rate_limits):
                 raise
             remark = f"{remark} no controller: {'; '.join(fault.what for fault in error.faults)}"
         names = [_write_unit(scenario, plant, unit, fmi, Path(scratch), compiler, draft) for unit in units]
@@ -129,6 +130,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
 
 def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
+    check_online(plant.model)
     controller = controller_of(plant.model, scenario.file.follow, plant.sample_time)
     m, core = controller.nominal, f"{scenario.device.name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)

@@ -22,6 +22,7 @@ from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.package import PIECES, owners, write_package
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.player_only import check_online
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.vectors import played_vectors, vectors
 from ctrlgen.model.model import Model
@@ -65,6 +66,7 @@ def generate(
 
     `figures` (name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives) are put beside the README.
     """
+    check_online(model)
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     played = solution if scenario.sample_time else None
     command = scenario.command(model) if solution is None else solution.command

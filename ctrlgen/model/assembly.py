@@ -158,6 +158,8 @@ def _assemble(
             Law(name, f"{label} [{physics.force_unit}] of an axis", closed(expr), physics.documented.get(of, ()))
             for name, label, of, expr in _named_forces(physics, z, v)
         ),
+        rate_limits=physics.rate_limits,
+        drive_weights=_drive_weights(physics),
         law_inputs=terms.law_inputs,
         x_names=(
             *(() if state is None else (f"{state.name}_{channel}" for channel in state.channels)),
@@ -310,6 +312,13 @@ def _set_valued_axes(terms: EffectTerms, v: ca.SX, own_force: ca.SX) -> tuple[in
     nonlinear = {i for i in range(v.numel()) if ca.depends_on(ca.jacobian(own_force[i], v[i]), v[i])}
     by_effect = {m.index for m in terms.members if m.effect.set_valued and m.effect.place is Place.FORCE}
     return tuple(sorted(nonlinear | by_effect))
+
+
+def _drive_weights(physics: DevicePhysics) -> np.ndarray:
+    """(n_u,) how much each drive counts; none of an imposed motion, which leaves nothing to choose."""
+    if isinstance(physics, ImposedPhysics):
+        return np.zeros(0)
+    return np.array(physics.drive_weights or (1.0,) * len(physics.drive.channels))
 
 
 def _numbers(values: Sequence[float | ca.SX], p: ca.SX, p_nominal: np.ndarray) -> np.ndarray:

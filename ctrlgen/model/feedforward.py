@@ -14,6 +14,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Limit, Model, Signal
@@ -56,12 +57,12 @@ class Controller:
     @cached_property
     def static(self) -> Inverse:
         """Kernels for equilibria."""
-        return invert(self.nominal, self.follow, None)
+        return inverse_of(self.nominal, self.follow, None)
 
     @cached_property
     def moving(self) -> Inverse | None:
         """Kernels for the next sample; None where there is no sample time."""
-        return None if self.sample_time is None else invert(self.nominal, self.follow, self.sample_time)
+        return None if self.sample_time is None else inverse_of(self.nominal, self.follow, self.sample_time)
 
     @cached_property
     def named(self) -> tuple[Inverse, Inverse | None, Model, list[tuple[float, str]]]:

@@ -21,6 +21,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.model.allocation import allocate
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 from ctrlgen.model.model import Model
 
@@ -56,6 +57,8 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
 
     Raises InputError where the drives do not move the channels independently, so that no motion has one drive.
     """
+    if model.redundant:
+        return _of_least_effort(model, follow)
     chains = _chains(model, follow)
     degrees = tuple(len(chain) - 1 for chain in chains)
     target = ca.SX.sym("target", len(chains), max(degrees) + 1)
@@ -87,6 +90,17 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
     result = [ca.substitute(ca.substitute(e, unknowns, solution), held, at_rest) for e in (x, z, u)]
     kernel = ca.Function("inverse_dynamics", [target], result, ["target"], ["x", "z", "u"], {"cse": True})
     return InverseDynamics(kernel, degrees, internal)
+
+
+def _of_least_effort(model: Model, follow: str) -> InverseDynamics:
+    """With more drives than axes: those of the least effort among all that do it."""
+    allocation = allocate(model)
+    dynamics = inverse_dynamics(allocation.ganged, follow)
+    target = ca.SX.sym("target", *dynamics.kernel.size_in(0))
+    x, z, f = dynamics.kernel(target)
+    results = [x, z, allocation.drive(z, f)]
+    kernel = ca.Function("inverse_dynamics", [target], results, ["target"], ["x", "z", "u"], {"cse": True})
+    return InverseDynamics(kernel, dynamics.degrees, dynamics.internal)
 
 
 def _chains(model: Model, follow: str) -> list[list[ca.SX]]:

@@ -73,6 +73,10 @@ class Model:
     force_parts: dict[str, ca.SX]  # parts of the restoring force by name
     limits: tuple[Limit, ...]
     laws: tuple[Law, ...]  # parts of the equations that have a name
+    rate_limits: tuple[Limit, ...]  # on the change by time of a drive, which is their `expr`
+    drive_weights: (
+        np.ndarray
+    )  # (n_u,) how much each drive counts where there are more than axes; none of an imposed motion
     law_inputs: Callable[
         ..., SimpleNamespace
     ]  # (place, channel, partner, states, stage) -> what an effect's law reads there
@@ -191,10 +195,36 @@ class Model:
                     high[i] = min(high[i], limit.upper)
         return low, high
 
-    def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u"] | None:
-        """Whether a limit is on one of the states, displacements or drives itself; None where it is on an expression of them."""
+    def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u", "rate"] | None:
+        """Whether a limit is on one of the states, displacements or drives itself, or on the rate of a drive; None where it is on an
+        expression of them."""
+        if any(limit is own for own in self.rate_limits):
+            return "rate"
         variables: tuple[tuple[Literal["x", "z", "u"], ca.SX], ...] = (("x", self.x), ("z", self.z), ("u", self.u))
         return next((name for name, s in variables if channel in dict(_positions(limit, s))), None)
+
+    def limited_rates(self, u: np.ndarray, before: np.ndarray, sample_time: float) -> list[np.ndarray]:
+        """(n,) [SI] of each of the `rate_limits`: the change by time of its drive to `u` (n, n_u) from the one `before` (n, n_u)."""
+        change = (u - before) / sample_time
+        return [change[:, i] for i in self.rate_places]
+
+    @cached_property
+    def rate_places(self) -> tuple[int, ...]:
+        """The drive of each of the `rate_limits`, by its place in u."""
+        return tuple(_positions(limit, self.u)[0][1] for limit in self.rate_limits)
+
+    @cached_property
+    def rate_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds (n_u,) of the drives' rates; infinite where there is none."""
+        low, high = np.full(self.u.numel(), -np.inf), np.full(self.u.numel(), np.inf)
+        for i, limit in zip(self.rate_places, self.rate_limits, strict=True):
+            low[i], high[i] = limit.lower, limit.upper
+        return low, high
+
+    @property
+    def redundant(self) -> bool:
+        """Whether there are more drives than axes, so that many drives hold one pose."""
+        return len(self.drive_weights) > len(self.axes)
 
     def composite_limits(self) -> list[Limit]:
         """Limits on an expression, such as a stress, and not on a state, displacement or drive itself."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.effects import Effect
+from ctrlgen.model.allocation import ganged_as
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
 from ctrlgen.model.model import Model
@@ -22,7 +23,6 @@ from ctrlgen.numerics.newton import newton_solver
 from ctrlgen.trajectory.motion import Command, Motion
 from ctrlgen.trajectory.path_inverse import PERIODS, InverseTrajectory
 from ctrlgen.trajectory.sampled_inverse import SampledInverse, SampledTrajectory
-from ctrlgen.trajectory.violations import violations
 
 MOST_EQUILIBRIUM_STEPS = 50  # of Newton's method, from the device without effects
 LAPS = 3  # of a closed path, after which memories are near enough to where they repeat to begin there
@@ -57,12 +57,20 @@ class InertialInverse:
         assert isinstance(command, Motion)  # of devices in balance only samples are followed
         x, z, u = self._continuous(command)
         if self._exact(u):
-            return InverseTrajectory(x, z, u, u[0], True)
+            return InverseTrajectory(x, z, u, self._at_start(command, closed, u), True)
         try:
             found = self.sampled(command, closed)
         except SolverError:
             return InverseTrajectory(x, z, u * np.nan, u[0])
-        return InverseTrajectory(found.x, found.z, found.u, found.u[0], True)
+        return self.needed(found, command, closed)
+
+    def needed(self, found: SampledTrajectory, command: Motion, closed: bool) -> InverseTrajectory:
+        """Sampled drives as what the motion takes."""
+        return InverseTrajectory(found.x, found.z, found.u, self._at_start(command, closed, found.u), True)
+
+    def _at_start(self, command: Motion, closed: bool, u: np.ndarray) -> np.ndarray:
+        """(n_u,) the drive before the motion: that at rest where it starts, if that is asked for."""
+        return u[0] if closed or not self.model.rate_limits else self.at_rest(command.position[0])[2]
 
     def sampled(self, command: Motion, closed: bool) -> SampledTrajectory:
         """The drives that lead along the samples of `command` while each is held. Raises SolverError where none are found."""
@@ -116,7 +124,7 @@ class InertialInverse:
     ) -> bool:
         """Whether `command` can be followed with a `margin`, a share of each limit. All samples are judged, whichever are `chosen`."""
         needed = self.trajectory(command, closed, periods)
-        return needed.solved and not violations(self.model, needed.x, needed.z, needed.u, margin)
+        return needed.solved and not needed.violations(self.model, self.sample_time, closed, margin)
 
     def _continuous(self, command: Motion) -> list[np.ndarray]:
         """x (n, n_x), z (n, n_axes), u (n, n_u) in continuous time, internal states at rest."""
@@ -142,7 +150,7 @@ class InertialInverse:
         device = self.model.device
         kept = tuple(e for e in device.effect if not left_out(e))
         plain = build_model(device.model_copy(update={"effect": kept}), sample_time=self.sample_time)
-        return InertialInverse(plain, self.follow, self.sample_time, approximate)
+        return InertialInverse(ganged_as(plain, self.model), self.follow, self.sample_time, approximate)
 
     @cached_property
     def _equilibrium(self) -> ca.Function:

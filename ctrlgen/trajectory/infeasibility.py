@@ -29,7 +29,7 @@ def unreachable(
     """The error that names the samples, the actuators and limits, by how much, and what can be followed instead; None where
     what is `needed` breaks no limit, or perhaps none, unless it is `certain` from elsewhere that the path cannot be followed."""
     model, n, wanted = inverse.model, len(command), samples_of(command)
-    causes = primary(model, violations(model, needed.x, needed.z, needed.u))
+    causes = primary(model, needed.violations(model, scenario.sample_time, scenario.closed))
     if not needed.exact and not certain:
         # of what may still change, or is out of the equations' range, only displacements far enough out of theirs
         least = 0.0 if not needed.solved else 2 * needed.unsettled * float(model.z_scale.max())
@@ -44,8 +44,9 @@ def unreachable(
         f"cannot follow {len(samples)} of {n} samples ({_runs(samples)}); the worst is sample {worst}{at(worst)}: "
         f"{_point(signal, wanted[worst])}"
     ]
-    x, z, u = inverse.at_rest(wanted[worst])
-    held = violations(model, x[None], z[None], u[None])
+    leads = (worst + 1) % n if scenario.closed else min(worst + 1, n - 1)  # where the drive of the worst sample leads
+    x, z, u = (np.array(v) for v in zip(*map(inverse.at_rest, wanted[[worst, leads]]), strict=True))
+    held = violations(model, x, z, u)
     listed, also = _grouped(model, causes)
     lines += [
         f"  {_said(model, cause, bool(held))}, worst at sample {cause.worst}{at(cause.worst)}, in {len(cause.samples)} of {n} "
@@ -105,6 +106,8 @@ def _said(model: Model, cause: Violation, held: bool) -> str:
         return f"{limit.label} at {channel} would be {amount}"
     whose = limit.label if channel in limit.label.split() else f"{limit.label} of {channel}"
     own = f"{whose} would have to be {amount}"
+    if variable == "rate":
+        return f"{own} (the path is too fast)"
     if variable == "u" and not held:
         heated = below and "power" in model.signals
         return f"{own} ({'it cannot cool faster than passively' if heated else 'the path is too fast'})"

@@ -61,7 +61,9 @@ def metric(solution: Solution, name: str) -> tuple[float, str]:
     if group == "margin":
         margin = next((margin for margin in solution.margins if margin.limit.name == channel), None)
         if margin is None:
-            raise ValueError(f"{name!r}: limits are {', '.join(limit.name for limit in m.limits)}; write one of them")
+            raise ValueError(
+                f"{name!r}: limits are {', '.join(margin.limit.name for margin in solution.margins)}; write one of them"
+            )
         return margin.distance, "delta_degC" if margin.limit.unit == "degC" else margin.limit.unit
     followed = solution.scenario.file.follow
     tables = {

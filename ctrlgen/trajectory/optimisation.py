@@ -4,7 +4,7 @@
     subject to  followed(x_k, z_k, u_k-1) = command_k + s_k      pose (or displacement); s_k is a slack
                 g(x_k, z_k, u_k-1) = 0                           force balance of the stage
                 x_k+1 = step(x_k, z_k, u_k)                      actuator dynamics (static: rates = 0)
-                every limit of the device
+                every limit of the device, those on the rate of a drive as bounds of u_k - u_k-1
 
 in variables divided by their typical sizes; derivatives are exact and sparse. Closed paths are periodic; open ones
 start in equilibrium at their first sample. With s = 0 the trajectory is followed; otherwise the solution is the nearest
@@ -36,7 +36,7 @@ DRIVE_GUESS = 0.2  # of its typical size, where IPOPT begins
 
 @dataclass(frozen=True)
 class OptimisationResult:
-    """IPOPT's solution in SI, one row a sample: states `x`, displacements `z`, drives `u`, and their `trace`.
+    """IPOPT's solution in SI, one row a sample: states `x`, displacements `z`, drives `u`, those held `before`, and their `trace`.
 
     `unreachable_by`: the slack, by which the followed signal is off the command, in its typical sizes.
     """
@@ -44,6 +44,7 @@ class OptimisationResult:
     x: np.ndarray
     z: np.ndarray
     u: np.ndarray
+    before: np.ndarray
     unreachable_by: np.ndarray
     trace: Trace
     iterations: int
@@ -83,6 +84,11 @@ class TrajectoryProgramme:
         motion = at(m.settling, u) / m.x_scale if h is None else x_1 - (at(held_step(m, h), u) - m.rest) / m.x_scale
         equal = [at(self.signal.expr, v) / self.signal.scale - commanded - s, at(m.balance, v) / m.force_scale, motion]
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
+        for i, limit in zip(m.rate_places, m.rate_limits, strict=True):
+            if h is not None:
+                rows.append(u[i] - v[i])
+                low.append(np.array([(-np.inf if limit.lower is None else limit.lower) * h / m.u_scale[i]]))
+                high.append(np.array([(np.inf if limit.upper is None else limit.upper) * h / m.u_scale[i]]))
         for limit in limits:
             unit = limit.upper or m.force_scale
             rows.append(at(limit.expr, v) / unit)
@@ -184,9 +190,7 @@ class TrajectoryProgramme:
 
     def exact(self, needed: InverseTrajectory) -> OptimisationResult:
         """What the path needs as the solution: an optimum where it keeps every limit, as its slack is zero."""
-        before = needed.u
-        if self.sample_time is not None:
-            before = np.vstack([needed.u[-1:] if self.closed else needed.u_start[None], needed.u[:-1]])
+        before = needed.u if self.sample_time is None else needed.before(self.closed)
         none, m = np.zeros((self.n_command, self.sizes[3])), self.model
         x, z, u = (
             np.clip(needed.x, *m.x_bounds),
@@ -203,7 +207,7 @@ class TrajectoryProgramme:
         if self.sample_time is not None:
             reached = trace(self.model, result.time, x, z, before)
             result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
-        return OptimisationResult(x, z, u, slack, result, iterations)
+        return OptimisationResult(x, z, u, before, slack, result, iterations)
 
     def _start(self, begin: InverseTrajectory | None, starts_settled: bool) -> np.ndarray:
         """Where IPOPT begins, scaled, inside the bounds."""

@@ -16,10 +16,11 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.model.allocation import ganged_as, why_not_ganged
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Model, Signal
-from ctrlgen.trajectory.violations import violations
+from ctrlgen.trajectory.violations import Before, Violation, violations
 
 HOME_DRIVE = 1e-3  # of the full drive, at which the slopes near home are taken: a heater's power has none at zero volt
 PERIODS = 20  # of a closed path, after which a memory that still changes is left to IPOPT
@@ -49,19 +50,32 @@ class InverseTrajectory:
         """Whether nothing else follows the command: the equations hold, and a closed path repeats."""
         return self.solved and self.unsettled == 0.0
 
+    def before(self, closed: bool) -> np.ndarray:
+        """(n, n_u) the drive before each sample of a motion: of a closed path the last one comes before the first."""
+        return np.vstack([self.u[-1:] if closed else self.u_start[None], self.u[:-1]])
+
+    def violations(self, model: Model, sample_time: float | None, closed: bool, margin: float = 0.0) -> list[Violation]:
+        """The limits that it breaks, those on the rates of drives too where there is a `sample_time` [s]."""
+        before = None if sample_time is None else Before(self.before(closed), sample_time)
+        return violations(model, self.x, self.z, self.u, margin, before)
+
 
 def count_faults(model: Model, follow: str) -> list[Fault]:
-    """What keeps a model from being inverted: it takes one drive and one axis for each channel that is followed."""
+    """What keeps a model from being inverted: it takes a drive or more and one axis for each channel that is followed."""
     signal, drives, axes = model.signals[follow], model.u.numel(), len(model.axes)
     channels = len(signal.channels)
-    if drives > axes:
-        what = f"has {drives} drives for {axes} axes, so that many drives lead to one pose; let one drive act on several actuators"
+    if drives > axes and not model.redundant:
+        return [Fault("device", f"{model.name} has an imposed motion and no drives; nothing leads it along a path")]
+    if model.redundant and (why := why_not_ganged(model)) is not None:
+        what = f"has {drives} drives for {axes} axes and {why}: which are least is not computed; let one drive act on several actuators"
         return [Fault("device", f"{model.name} {what}")]
     if drives < channels:
         ways = "; ".join(_direction(signal, way) for way in _reached(model, signal).T)
         what = f"has {drives} drives for {channels} channels of the {follow}; near home it moves only along {ways}"
         return [Fault("device", f"{model.name} {what}; follow a signal of {drives} channels, or add drives")]
-    if channels != axes and not model.inertial:  # with inertia the other axes are flexible modes, which follow
+    if channels != axes and (
+        not model.inertial or model.redundant
+    ):  # with inertia the other axes are flexible modes, which follow
         return [
             Fault(
                 "follow",
@@ -111,14 +125,14 @@ class PathInverse:
             return self
         device = self.model.device
         plain = device.model_copy(update={"effect": tuple(e for e in device.effect if not e.states)})
-        return PathInverse(build_model(plain), self.follow, self.sample_time)
+        return PathInverse(ganged_as(build_model(plain), self.model), self.follow, self.sample_time)
 
     def trajectory(self, command: np.ndarray, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
         """What `command` (n, channels) [SI] takes; not finite where the equations have no solution. A closed path is run through
         `periods` times at most."""
         if self.remembers and self.moving is not None:
             return self._carried(command, closed, periods)
-        x, z, u_held = self._at_rest(command)
+        x, z, u_held = self.equilibria(command)
         if self.moving is None:
             return self._checked(command, InverseTrajectory(x, z, u_held, u_held[0]), closed)
         following = _following(len(command), closed)
@@ -128,7 +142,7 @@ class PathInverse:
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x (n_x,), z (n_axes,) and u (n_u,) of the equilibrium at `target` (channels,)."""
-        x, z, u = self._at_rest(target[None])
+        x, z, u = self.equilibria(target[None])
         return x[0], z[0], u[0]
 
     def slope(self, target: np.ndarray) -> np.ndarray:
@@ -137,8 +151,8 @@ class PathInverse:
         z = self.static.displacement(ca.DM(m.rest), ca.DM.zeros(m.z.numel()), r)
         return ca.Function("slope", [r], [ca.jacobian(z, r)])(target).full()
 
-    def _at_rest(self, command: np.ndarray) -> list[np.ndarray]:
-        """x, z and u of the equilibria at each command."""
+    def equilibria(self, command: np.ndarray) -> list[np.ndarray]:
+        """x (n, n_x), z (n, n_axes) and u (n, n_u) of the equilibria at each command (n, channels)."""
         return [v.full().T for v in self._equilibria.map(len(command))(command.T)]
 
     def _drive(self, x: np.ndarray, z: np.ndarray, x_then: np.ndarray, z_then: np.ndarray) -> np.ndarray:
@@ -157,11 +171,11 @@ class PathInverse:
     ) -> bool:
         """Whether `command` can be followed with a `margin`, a share of each limit; judged by the samples `chosen` and those after them,
         where these are given and nothing is remembered from sample to sample."""
-        if chosen is None or self.remembers or self.moving is None:
+        if chosen is None or self.remembers or self.moving is None or self.model.rate_limits:
             needed = self.trajectory(command, closed, periods)
-            return needed.solved and not violations(self.model, needed.x, needed.z, needed.u, margin)
-        x, z, _ = self._at_rest(command[chosen])
-        x_then, z_then, _ = self._at_rest(command[_following(len(command), closed)[chosen]])
+            return needed.solved and not needed.violations(self.model, self.sample_time, closed, margin)
+        x, z, _ = self.equilibria(command[chosen])
+        x_then, z_then, _ = self.equilibria(command[_following(len(command), closed)[chosen]])
         u = self._drive(x, z, x_then, z_then)
         return bool(np.all(np.isfinite(u))) and not violations(self.model, x, z, u, margin)
 
@@ -214,9 +228,7 @@ class PathInverse:
     def _checked(self, command: np.ndarray, found: InverseTrajectory, closed: bool) -> InverseTrajectory:
         """`found`, solved where it is finite and satisfies the model's own equations."""
         m, n = self.model, len(command)
-        before = found.u
-        if self.sample_time is not None:
-            before = np.vstack([found.u[-1:] if closed else found.u_start[None], found.u[:-1]])
+        before = found.u if self.sample_time is None else found.before(closed)
         signal = m.signals[self.follow]
         p = np.tile(m.p_nominal[:, None], (1, n))
         reached, balance = (v.full().T for v in self._equations.map(n)(found.x.T, found.z.T, before.T, p))

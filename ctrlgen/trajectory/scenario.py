@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import re
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
+import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
@@ -17,6 +19,8 @@ from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.units import In, Quantity, read_quantity, show, written_unit
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.base import Section
+from ctrlgen.effects import Place
+from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse_dynamics import relative_degrees
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.frame import Frame
@@ -27,6 +31,7 @@ FILE = "scenario.toml"
 MOST_SAMPLES = 1_000_000  # of one path: what memory holds
 WHOLE = 1e-6  # of the number of samples, by which rate times duration may be off a whole one: durations are written with six digits
 SMOOTHER = 1  # derivatives more than the drive follows: it then starts without a bend too
+LEAST_CLOSED = 3  # samples of a closed motion: of two, drives that change at each of them show nothing of one between
 RESOLVED = 0.5  # of the largest value of a derivative, by which it may change from one listed sample to the next
 
 
@@ -166,6 +171,10 @@ class Scenario:
             what = f'is missing: {model.name} has inertia, what it needs depends on time; write sample_rate = "1 kHz" and duration'
             raise InputError(self.path, [Fault("sample_rate", what)])
         samples, order = self.command(model), max(relative_degrees(model, self.file.follow))
+        least = LEAST_CLOSED if self.closed else order + 1
+        if len(samples) < least:
+            what = f"has {len(samples)} samples; {model.name}, which has inertia, takes {least} or more"
+            raise InputError(self.path, [Fault("path", f"{what}: raise sample_rate, or make the path longer")])
         self._check_smoothness(model, samples, order)
         places = np.arange(len(samples)) if at is None else at
         tables = self._on_path(model, lambda path, frame, n: path.derivatives(frame, n, order, places))
@@ -224,6 +233,29 @@ class Scenario:
         if what:
             raise InputError(self.path, [Fault("duration", what)])
         return n
+
+
+def model_of(scenario: Scenario) -> Model:
+    """The model that is led along the path: without laws of readings that look back by samples (delay, clock offset), which change no
+    drive; a warning names them. Raises InputError where a feedback loop reads what they do, so that they do change its drive."""
+    device = scenario.device
+    late = [effect for effect in device.effect if "sample_time" in effect.requires and effect.place is Place.SENSOR]
+    model = build_model(device.model_copy(update={"effect": tuple(e for e in device.effect if e not in late)}))
+    if not late:
+        return model
+    kinds = ", ".join(sorted({effect.kind for effect in late}))
+    if model.held.numel() and _read_by_the_loop(build_model(device, sample_time=scenario.sample_time or 1.0)):
+        what = (
+            f"has {kinds} in the reading of its feedback loop, which is not inverted yet: leave it out to follow a path"
+        )
+        raise InputError(device.name, [Fault("effect", what)])
+    warnings.warn(f"{device.name}: {kinds} is of the reading and changes no drive along a path; left out", stacklevel=2)
+    return model
+
+
+def _read_by_the_loop(model: Model) -> bool:
+    """Whether states that change once a sample, as those of late readings do, act on the output of the feedback loop."""
+    return bool(ca.depends_on(model.held_value, model.x[list(model.stepped)]))
 
 
 def motion_targets(scenario: Scenario, model: Model) -> np.ndarray:

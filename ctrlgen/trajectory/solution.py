@@ -15,10 +15,12 @@ from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, simulate
 from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
+from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
 from ctrlgen.trajectory.motion import Motion
-from ctrlgen.trajectory.optimisation import TrajectoryProgramme
+from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
 from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.violations import Before, limited_values, violations
 
 LOOKED_AT_BETWEEN = 4  # parts of a sample at whose ends the motion between samples is looked at
 
@@ -66,23 +68,27 @@ class Solution:
         return min((m for m in self.margins if m.share is not None), key=lambda m: m.share or 0.0)
 
 
-def check_feasibility(scenario: Scenario, model: Model, command: np.ndarray) -> tuple[PathInverse, InverseTrajectory]:
+def check_feasibility(
+    scenario: Scenario, model: Model, command: np.ndarray
+) -> tuple[PathInverse | LeastEffortInverse, InverseTrajectory]:
     """The inverse of `command` (n, channels) [SI] and what it needs, without IPOPT. Raises Unreachable where that breaks a limit, and
     InputError for a device that cannot be inverted, with too many or few drives, or a closed path of one that changes with time."""
     _check_invertible(scenario, model)
-    inverse = PathInverse(model, scenario.file.follow, scenario.sample_time)
+    inverse = path_inverse(model, scenario.file.follow, scenario.sample_time)
     needed = inverse.trajectory(command, scenario.closed)
     if (error := unreachable(scenario, inverse, command, needed)) is not None:
         raise error
     return inverse, needed
 
 
-def check_motion(scenario: Scenario, model: Model) -> tuple[InertialInverse, Motion, InverseTrajectory]:
+def check_motion(
+    scenario: Scenario, model: Model
+) -> tuple[InertialInverse | LeastEffortInverse, Motion, InverseTrajectory]:
     """The inverse of a device with inertia, the commanded motion and what it needs. Raises as `check_feasibility`, and InputError for
     a path that is not as smooth as the drive needs."""
     _check_invertible(scenario, model)
     motion = scenario.motion(model)
-    inverse = InertialInverse(model, scenario.file.follow, scenario.sample_time or 0.0)
+    inverse = motion_inverse(model, scenario.file.follow, scenario.sample_time or 0.0)
     needed = inverse.trajectory(motion, scenario.closed)
     if (error := unreachable(scenario, inverse, motion, needed)) is not None:
         raise error
@@ -112,10 +118,11 @@ def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = la
 def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], None]) -> Solution:
     """By the sampled inverse; the trace is that of the model driven so by the shipped integrator."""
     inverse, motion, _ = check_motion(scenario, model)
+    assert inverse.sample_time is not None
     progress(f"sampled inverse, {len(motion)} samples")
     found = inverse.sampled(motion, scenario.closed)
     u = np.clip(found.u, *model.u_bounds)  # what NEGLIGIBLE lets pass is rounding
-    needed = InverseTrajectory(found.x, found.z, found.u, found.u[0], True)
+    needed = inverse.needed(found, motion, scenario.closed)
     if (error := unreachable(scenario, inverse, motion, needed)) is not None:
         raise error
     reached = simulate(model, u, inverse.sample_time, found.x[0], found.z[0])
@@ -129,7 +136,9 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
             f"drives held for {show(inverse.sample_time, 's')} follow the path only to {off.max():.1g} of its typical size, worst at "
             f"sample {int(off.argmax())}; raise sample_rate, or make the path slower or smoother"
         )
-    margins = tuple(_margins(model, samples.x, samples.z, u))
+    margins = tuple(
+        _margins(model, samples.x, samples.z, u, Before(needed.before(scenario.closed), inverse.sample_time))
+    )
     between = error_between_samples(scenario, model, samples, u)
     return Solution(scenario, model, motion.position, samples, u, margins, found.iterations, (), between)
 
@@ -162,6 +171,13 @@ def _solve_balanced(scenario: Scenario, model: Model, progress: Callable[[str], 
         progress(f"IPOPT, {len(command)} samples" + (f", with {', '.join(r.label for r in rows)}" if rows else ""))
 
     programme = TrajectoryProgramme(model, scenario.file.follow, command, scenario.sample_time, scenario.closed)
+    if model.redundant:  # IPOPT has chosen the drives already, where there was something to choose
+        if not needed.exact:
+            raise SolverError(
+                f"the memories of {model.name} do not settle within a period, and it has more drives than axes; make the path open, or "
+                "leave out effects with memories"
+            )
+        return _from_result(scenario, model, command, programme.exact(needed), ())
     try:
         result, rows = programme.optimum(needed, step)
     except SolverError:
@@ -176,18 +192,25 @@ def _solve_balanced(scenario: Scenario, model: Model, progress: Callable[[str], 
                 "finds no drives there that satisfy the device's equations; command smaller or slower motions"
             )
         result, rows = programme.exact(needed), []
-    added = tuple(limit.name for limit in rows)
-    margins = tuple(_margins(model, result.x, result.z, result.u))
+    return _from_result(scenario, model, command, result, tuple(limit.name for limit in rows))
+
+
+def _from_result(
+    scenario: Scenario, model: Model, command: np.ndarray, result: OptimisationResult, added: tuple[str, ...]
+) -> Solution:
+    """The solution with its margins. Raises SolverError where it breaks a limit."""
+    before = None if scenario.sample_time is None else Before(result.before, scenario.sample_time)
+    if broken := violations(model, result.x, result.z, result.u, before=before):
+        names = ", ".join(dict.fromkeys(v.limit.label for v in broken))
+        raise SolverError(f"what the solver calls a solution breaks limits ({names}); command a smaller or slower path")
+    margins = tuple(_margins(model, result.x, result.z, result.u, before))
     return Solution(scenario, model, command, result.trace, result.u, margins, result.iterations, added)
 
 
-def _margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> list[Margin]:
-    """One Margin per limit: the smallest distance to its nearer side."""
-    n = len(u)
-    values = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
+def _margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: Before | None) -> list[Margin]:
+    """One Margin per limit, with the drives `before` also of their rates: the smallest distance to its nearer side."""
     margins = []
-    for limit, value in zip(model.limits, values, strict=True):
-        table = value.full().T
+    for limit, table in limited_values(model, x, z, u, before):
         sides = []
         for bound, sign in ((limit.lower, 1.0), (limit.upper, -1.0)):
             if bound is None:

@@ -36,21 +36,44 @@ class Violation:
         return np.flatnonzero(self.beyond)
 
 
-def violations(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, margin: float = 0.0) -> list[Violation]:
+@dataclass(frozen=True)
+class Before:
+    """The `drive` (n, n_u) [SI] that is held before each sample, and the `sample_time` [s] for which it is."""
+
+    drive: np.ndarray
+    sample_time: float
+
+
+def limited_values(
+    model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: Before | None = None
+) -> list[tuple[Limit, np.ndarray]]:
+    """Every limit with the limited quantity (n, channels) [SI] under the states x (n, n_x), displacements z (n, n_axes) and drives u
+    (n, n_u); those on the rates of drives where the drives `before` are given."""
+    n = len(x)
+    tables = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
+    found = [(limit, values.full().T) for limit, values in zip(model.limits, tables, strict=True)]
+    if before is not None and model.rate_limits:
+        rates = model.limited_rates(u, before.drive, before.sample_time)
+        found += [(limit, rate[:, None]) for limit, rate in zip(model.rate_limits, rates, strict=True)]
+    return found
+
+
+def violations(
+    model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, margin: float = 0.0, before: Before | None = None
+) -> list[Violation]:
     """Every limit that the states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u) [SI] break, channel by channel,
     those that miss most first; with a `margin`, a share of the limit's range (of the limit, where there is one) by which it is to be kept.
+    The rates of drives are looked at where the drives `before` are given.
 
     A value that is not finite breaks no limit: where the equations end, a displacement is out of range.
     """
-    n = len(x)
     found = []
-    tables = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
-    for limit, values in zip(model.limits, tables, strict=True):
+    for limit, values in limited_values(model, x, z, u, before):
         given = [bound for bound in (limit.lower, limit.upper) if bound is not None]
         unit = (max(given) - min(given) if len(given) == 2 else abs(given[0])) or model.force_scale
         low = -np.inf if limit.lower is None else limit.lower + margin * unit
         high = np.inf if limit.upper is None else limit.upper - margin * unit
-        for i, value in enumerate(values.full()):
+        for i, value in enumerate(values.T):
             beyond = np.nan_to_num(np.maximum(low - value, value - high), nan=0.0, posinf=np.finfo(float).max)
             beyond[beyond < NEGLIGIBLE * unit] = 0.0
             if beyond.any():

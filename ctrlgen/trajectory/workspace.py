@@ -40,9 +40,15 @@ class Ball:
 
 @dataclass(frozen=True)
 class Workspace:
-    """The poses in which one model can be held in equilibrium; poses are rows (n, channels) in SI."""
+    """The poses in which one model can be held in equilibrium; poses are rows (n, channels) in SI. Raises InputError for more drives
+    than axes: the limits of the drives then bound what they push together, and not one drive each."""
 
     model: Model
+
+    def __post_init__(self) -> None:
+        if self.model.redundant:
+            what = "has more drives than axes, for which no workspace is mapped yet; check a path instead"
+            raise InputError(self.model.name, [Fault("device", what)])
 
     @cached_property
     def drawn(self) -> tuple[int, ...]:

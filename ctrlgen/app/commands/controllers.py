@@ -44,13 +44,27 @@ def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = N
 
 
 @app.command()
-def generate(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
+def generate(
+    scenario: ScenarioPath,
+    out_folder: OutFolder,
+    device: OtherDevice = None,
+    player: Annotated[
+        bool, typer.Option("--player", help="Write only the player of the solved trajectory, which any device has.")
+    ] = False,
+) -> None:
     """Write the C of a scenario: online controller and player, double and float; needs no compiler.
 
-    Leaves in --out a folder that drops into a firmware project as it is; its README.md says how.
+    Leaves in --out a folder that drops into a firmware project as it is; its README.md says how. A device whose drives have limits on
+    their rates, or are more than its axes, has no online controller yet: --player writes the player alone.
 
     Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
     """
+    if player:
+        with progress(2) as advance:
+            written = pipeline.player_into(load_scenario(scenario, device), out_folder, advance)
+        for path in written:
+            out.print(str(path), soft_wrap=True, markup=False)
+        return
     with progress(2) as advance:
         c = pipeline.generate_into(load_scenario(scenario, device), out_folder, advance)
     for name in [*c.online.values(), *c.player.values()]:

@@ -23,7 +23,7 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.schema import FILE as RECORDING
 from ctrlgen.trajectory.frame import Frame
-from ctrlgen.trajectory.scenario import load_scenario
+from ctrlgen.trajectory.scenario import load_scenario, model_of
 from ctrlgen.trajectory.solution import check_feasibility, check_motion
 
 
@@ -63,7 +63,7 @@ def check(
         return
     if file.is_dir() or (file.suffix != ".py" and "kind" not in read_toml(file)):
         scenario = load_scenario(file)
-        model = build_model(scenario.device)
+        model = model_of(scenario)
         command = scenario.command(model)
         out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
         try:
@@ -99,9 +99,15 @@ def check(
         f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators",
         markup=False,
     )
+    if model.redundant:
+        weights = ", ".join(f"{w:g}" for w in model.drive_weights)
+        out.print(
+            f"  {model.u.numel()} drives for {len(model.axes)} axes: those of least effort, weights {weights}",
+            markup=False,
+        )
     for line in summary(device) if isinstance(device, Mechanism) else ():
         out.print(f"  {line}", markup=False, soft_wrap=True)
-    for limit in model.limits:
+    for limit in (*model.limits, *model.rate_limits):
         low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
         out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
     units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))

@@ -1,0 +1,62 @@
+"""The player alone, of a device whose drives the online C cannot compute: nothing but the solved drives is needed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import write_text
+from ctrlgen.firmware.compression import compress
+from ctrlgen.firmware.package import LICENCE, MANIFEST, input_files
+from ctrlgen.firmware.player import player_context
+from ctrlgen.firmware.templates import comment, write
+from ctrlgen.model.model import Model
+from ctrlgen.trajectory.solution import Solution
+from ctrlgen.version import __version__, commit, program
+
+
+def check_online(model: Model) -> None:
+    """Raises InputError for a device whose drives the online C cannot compute yet."""
+    faults = []
+    if model.rate_limits:
+        faults.append(
+            Fault("device", f"has limits on rates of drives ({', '.join(r.label for r in model.rate_limits)})")
+        )
+    if model.redundant:
+        faults.append(Fault("device", f"has more drives ({model.u.numel()}) than axes ({len(model.axes)})"))
+    if faults:
+        what = "the online C cannot keep to that yet: use the player (`ctrlgen solve`, `ctrlgen generate --player`)"
+        raise InputError(model.name, [Fault(f.where, f"{f.what}; {what}") for f in faults])
+
+
+def generate_player(solution: Solution, out: Path) -> list[Path]:
+    """Writes the player in double and float, the inputs and a manifest to `out`; the paths of its C. Raises InputError where the
+    scenario has no sample rate."""
+    scenario, model = solution.scenario, solution.model
+    if scenario.sample_time is None:
+        what = "is missing: a player replays drives in time; write sample_rate and duration"
+        raise InputError(scenario.path, [Fault("sample_rate", what)])
+    drive, written = model.signals["drive"], []
+    for real, compression in compress(solution).items():
+        name = f"{scenario.name}_player_{real.suffix}"
+        context = player_context(solution, compression, name) | {
+            "real": real, "drive": drive, "drive_unit": drive.units[0], "n": len(drive.channels), "motion": model.inertial,
+            "program": program(), "version": __version__, "digest": scenario.digest, "u_safe": np.clip(0.0, *model.u_bounds),
+            "source": comment(model.device.source),
+        }  # fmt: skip
+        written += [write(f"player.{kind}", context, out / f"{name}.{kind}") for kind in ("h", "c")]
+    texts = {f"device/{path}": text for path, text in input_files(scenario).items()}
+    for name, text in texts.items():
+        write_text(out / name, text)
+    names = [*(path.name for path in written), *texts]
+    manifest = {
+        "name": scenario.name, "title": scenario.file.title, "ctrlgen": __version__, "commit": commit(), "licence": LICENCE,
+        "inputs": scenario.digest,
+        "files": {name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in sorted(names)},
+    }  # fmt: skip
+    write_text(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+    return [path for path in written if path.suffix == ".c"]

@@ -1,0 +1,279 @@
+"""Drives of least effort within their limits, for a device with more drives than axes.
+
+The inverse of the device with one force for each axis (`ctrlgen.model.allocation`) gives the forces f_k that a path takes; the drives are
+
+    minimise    sum_k sum_i w_i (u_k,i / r_i)^2  +  PENALTY sum of what is beyond a limit, in shares of its range
+    subject to  B_k u_k = f_k,    low <= u_k <= high,    low rate <= (u_k - u_k-1) / T <= high rate.
+
+Where the closed form keeps the limits it is the answer. Else this convex quadratic programme is solved by IPOPT: the penalty is exact
+(R. Fletcher, Practical Methods of Optimization, 2nd ed. (1987), section 12.3), so a limit is broken only where no drives keep all of them,
+and then by the least amount, which is what an explanation names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from itertools import combinations
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.errors import SolverError
+from ctrlgen.model.allocation import INDEPENDENT, Allocation, allocate, effort_weights
+from ctrlgen.model.model import Model
+from ctrlgen.trajectory.inertial_inverse import InertialInverse
+from ctrlgen.trajectory.motion import Command, Motion, samples_of
+from ctrlgen.trajectory.path_inverse import PERIODS, InverseTrajectory, PathInverse
+from ctrlgen.trajectory.sampled_inverse import SampledTrajectory
+from ctrlgen.trajectory.violations import NEGLIGIBLE, violations
+
+PENALTY = 1e4  # of a limit broken by its whole range; the effort of a drive at full range is 1 times its weight
+TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error
+MOST_ITERATIONS = 200
+NEAR = 1e-6  # ranges from a limit within which a drive is at it
+FREE = 1e3  # ranges: a bound where there is none
+
+
+class LeastEffortInverse:
+    """The inverse of a `model` with more drives than axes along paths of its signal `follow`: `inner` is that of the forces."""
+
+    def __init__(self, model: Model, inner: PathInverse | InertialInverse, allocation: Allocation) -> None:
+        self.model, self.inner, self.allocation = model, inner, allocation
+        self.sample_time = inner.sample_time
+
+    @property
+    def without_memories(self) -> LeastEffortInverse:
+        """The same of the device without the effects that have memories."""
+        plain = self.inner.without_memories
+        return self if plain is self.inner else LeastEffortInverse(self.model, plain, self.allocation)
+
+    def trajectory(self, command: Command, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
+        """What a path takes; the drives break limits only where none keep them."""
+        return self._allocated(self._forces(command, closed, periods), samples_of(command)[0], closed)
+
+    def _forces(self, command: Command, closed: bool, periods: int) -> InverseTrajectory:
+        """What a path takes, with forces instead of drives."""
+        if isinstance(self.inner, InertialInverse):
+            return self.inner.trajectory(command, closed, periods)
+        assert isinstance(command, np.ndarray)  # of devices in balance only samples are followed
+        return self.inner.trajectory(command, closed, periods)
+
+    def sampled(self, command: Motion, closed: bool) -> SampledTrajectory:
+        """The drives that lead a device with inertia along the samples of `command` while each is held. Raises SolverError."""
+        assert isinstance(self.inner, InertialInverse)
+        found = self.inner.sampled(command, closed)
+        return replace(found, u=self.needed(found, command, closed).u)
+
+    def needed(self, found: SampledTrajectory, command: Motion, closed: bool) -> InverseTrajectory:
+        """Sampled forces, or drives, as what the motion takes."""
+        forces = (
+            found.u
+            if found.u.shape[1] == len(self.model.axes)
+            else np.einsum("kij,kj->ki", self._slopes(found.z), found.u)
+        )
+        begin = InverseTrajectory(found.x, found.z, forces, forces[0], True)
+        return self._allocated(begin, command.position[0], closed)
+
+    def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x, z and u of the equilibrium at `target`; not finite where there is none."""
+        x, z, f = self.inner.at_rest(target)
+        return x, z, self.drives(z[None], f[None])[0]
+
+    def slope(self, target: np.ndarray) -> np.ndarray:
+        """(n_axes, channels) d displacement / d target at rest there."""
+        return self.inner.slope(target)
+
+    def keeps_limits(
+        self,
+        command: Command,
+        closed: bool,
+        chosen: np.ndarray | None = None,
+        margin: float = 0.0,
+        periods: int = PERIODS,
+    ) -> bool:
+        """Whether `command` can be followed with a `margin`, a share of each limit; where nothing but the samples matters, judged by
+        those `chosen`."""
+        if self.model.rate_limits or self._facets is None:
+            found = self._forces(command, closed, periods)
+            found = self._allocated(found, samples_of(command)[0], closed, margin)
+            return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
+        if isinstance(command, np.ndarray) and isinstance(self.inner, PathInverse) and not self.inner.remembers:
+            x, z, f = self.inner.equilibria(command if chosen is None else command[chosen])
+        else:
+            found = self._forces(command, closed, periods)
+            x, z, f = found.x, found.z, found.u
+            if not found.solved:
+                return False
+        u = np.clip(self.allocation.drive.map(len(z))(z.T, f.T).full().T, *self._bounds(margin))
+        return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
+
+    def _allocated(
+        self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0
+    ) -> InverseTrajectory:
+        """`found` with drives instead of forces."""
+        if not np.all(np.isfinite(found.u)):
+            u = np.full((len(found.u), self.model.u.numel()), np.nan)
+            return replace(found, u=u, u_start=u[0])
+        if self.sample_time is None:
+            u = self.drives(found.z, found.u, margin=margin)
+            return replace(found, u=u, u_start=u[0])
+        z = np.vstack([found.z[1:], found.z[:1] if closed else found.z[-1:]])  # where each drive leads
+        if closed:
+            u = self.drives(z, found.u, closed, margin)
+            return replace(found, u=u, u_start=u[-1])
+        _, z_start, f_start = self.inner.at_rest(first)
+        u = self.drives(np.vstack([z_start, z]), np.vstack([f_start, found.u]), margin=margin)
+        return replace(found, u=u[1:], u_start=u[0])
+
+    def drives(self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0) -> np.ndarray:
+        """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other."""
+        timed = self.sample_time is not None and bool(self.model.rate_limits)
+        n = len(f)
+        u = self.allocation.drive.map(n)(z.T, f.T).full().T
+        low, high = (np.tile(bound, (n, 1)) for bound in self._bounds(margin))
+        out = np.any((u < low) | (u > high), axis=1)
+        if timed:
+            before = np.vstack([u[-1:] if closed else u[:1], u[:-1]])
+            slowest, fastest = self._rate_bounds(margin)
+            change = u - before
+            out |= np.any((change < slowest) | (change > fastest))
+        chosen = out if np.all(np.isfinite(u)) else np.zeros(n, dtype=bool)
+        if chosen.any():
+            rates = self._rate_bounds(margin) if timed else None
+            u[chosen] = self._solved(self._slopes(z[chosen]), f[chosen], u[chosen], self._bounds(margin), rates, closed)
+        return u
+
+    @cached_property
+    def _facets(self) -> np.ndarray | None:
+        """(m, n_axes) the normals of the set of forces that drives within limits give, {B u}, a zonotope: each is normal to n_axes - 1
+        columns of B. None where B changes with the displacement, or drives have no limits. Source: P. McMullen, Trans. Amer. Math. Soc.
+        159 (1971) 91."""
+        m, (low, high) = self.model, self.model.u_bounds
+        if ca.depends_on(ca.jacobian(m.balance, m.u), m.z) or not np.all(np.isfinite(high - low)):
+            return None
+        B, n = self._slopes(np.zeros((1, len(m.axes))))[0] * (high - low) / m.force_scale, len(m.axes)
+        found = []
+        for columns in combinations(range(B.shape[1]), n - 1):
+            _, sizes, rows = np.linalg.svd(B[:, columns].T, full_matrices=True)
+            if n == 1 or sizes.min() > INDEPENDENT * np.abs(B).max():
+                found.append(rows[-1])
+        return np.array(found) / m.force_scale
+
+    def _attainable(self, f: np.ndarray, margin: float) -> bool:
+        """Whether drives within their limits give each of the forces `f` (n, n_axes)."""
+        assert self._facets is not None
+        low, high = self._bounds(margin)
+        along = self._facets @ self._slopes(np.zeros((1, f.shape[1])))[0]
+        most, least = (np.maximum(along * a, along * b).sum(axis=1) for a, b in ((low, high), (-low, -high)))
+        pushed = f @ self._facets.T
+        slack = NEGLIGIBLE * np.abs(along * (high - low)).max(axis=1)
+        return bool(np.all(pushed <= most + slack) and np.all(-pushed <= least + slack))
+
+    def _slopes(self, z: np.ndarray) -> np.ndarray:
+        """(n, n_axes, n_u) B at each displacement."""
+        n, n_u = len(z), self.model.u.numel()
+        return np.array(np.split(self._B.map(n)(z.T).full(), n, axis=1)).reshape(n, -1, n_u)
+
+    @cached_property
+    def _B(self) -> ca.Function:
+        m = self.model
+        return ca.Function(
+            "B", [m.z], [ca.densify(ca.substitute(ca.jacobian(m.balance, m.u), m.p, ca.DM(m.p_nominal)))]
+        )
+
+    def _bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
+        return _narrowed(self.model.u_bounds, margin)
+
+    def _rate_bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
+        """Of the change from one sample to the next."""
+        low, high = _narrowed(self.model.rate_bounds, margin)
+        return low * (self.sample_time or 0.0), high * (self.sample_time or 0.0)
+
+    def _solved(
+        self, B: np.ndarray, f: np.ndarray, begin: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
+        rates: tuple[np.ndarray, np.ndarray] | None, closed: bool,
+    ) -> np.ndarray:  # fmt: skip
+        """The programme of the module's text, begun at the closed form; drives as shares of their ranges."""
+        m, n, n_u = self.model, len(f), self.model.u.numel()
+        span = 1 / np.sqrt(effort_weights(m) / m.drive_weights)
+        row = np.linalg.norm(B * span, axis=2)  # what full drives push
+        U = ca.MX.sym("u", n_u, n)
+        pushed = ca.Function(
+            "pushed", [S := ca.SX.sym("b", row.shape[1], n_u), v := ca.SX.sym("v", n_u)], [ca.mtimes(S, v)]
+        )
+        shares = np.hstack(list(B * span / row[:, :, None]))
+        limited, low, high = [U], [np.tile(bounds[0] / span, n)], [np.tile(bounds[1] / span, n)]
+        if rates is not None:
+            before = ca.horzcat(U[:, -1] if closed else U[:, 0], U[:, :-1])
+            allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
+            limited.append((U - before) * (span / allowed)[:, None])
+            low.append(np.tile(rates[0] / allowed, n))
+            high.append(np.tile(rates[1] / allowed, n))
+        rows, lowest, highest = ca.vertcat(*map(ca.vec, limited)), np.concatenate(low), np.concatenate(high)
+        bounded = np.flatnonzero(np.isfinite(lowest) | np.isfinite(highest))
+        over, under = ca.MX.sym("over", len(bounded)), ca.MX.sym("under", len(bounded))
+        weights = np.tile(m.drive_weights / m.drive_weights.max(), n)
+        problem = {
+            "x": ca.vertcat(ca.vec(U), over, under),
+            "f": ca.dot(weights, ca.vec(U) ** 2) + PENALTY * (ca.sum1(over) + ca.sum1(under)),
+            "g": ca.vertcat(ca.vec(pushed.map(n)(shares, U)), rows[bounded.tolist()] - over + under),
+        }
+        options = {
+            "print_time": False,
+            "ipopt": {
+                "print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "nlp_scaling_method": "none",
+                "mu_strategy": "adaptive", "bound_relax_factor": 0.0, "jac_c_constant": "yes", "jac_d_constant": "yes", 
+                "hessian_constant": "yes",
+            },
+        }  # fmt: skip
+        solver = ca.nlpsol("least_effort", "ipopt", problem, options)
+        wanted, none = (f / row).ravel(), np.zeros(2 * len(bounded))
+        answer = solver(
+            x0=np.concatenate([(begin / span).ravel(), none]),
+            lbx=np.concatenate([np.full(n * n_u, -FREE), none]), ubx=np.concatenate([np.full(n * n_u, FREE), none + FREE]),
+            lbg=np.concatenate([wanted, lowest[bounded]]), ubg=np.concatenate([wanted, highest[bounded]]),
+        )  # fmt: skip
+        status = solver.stats()["return_status"]
+        if status in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
+            raise KeyboardInterrupt
+        if not solver.stats()["success"]:
+            raise SolverError(f"IPOPT found no drives of least effort ({status}); command a smaller or slower path")
+        u = answer["x"].full().ravel()[: n * n_u].reshape(n, n_u) * span
+        return _polished(u, B * span, f, (bounds[0] / span, bounds[1] / span), span)
+
+
+def _polished(
+    u: np.ndarray, shares: np.ndarray, f: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], span: np.ndarray
+) -> np.ndarray:
+    """`u` with what IPOPT's tolerance leaves of the forces `f` taken up by the drives that are not at a limit."""
+    s = u / span
+    for k, own in enumerate(shares):
+        free = own * ~np.any(np.abs(s[k] - np.array(bounds)) < NEAR, axis=0)
+        s[k] += np.linalg.lstsq(free, f[k] - own @ s[k], rcond=INDEPENDENT)[0]
+    return s * span
+
+
+def _narrowed(bounds: tuple[np.ndarray, np.ndarray], margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds moved inward by a share of the range, or of the bound where there is one."""
+    low, high = bounds
+    both = np.isfinite(high - low)
+    size = np.where(both, high - low, np.where(np.isfinite(low), abs(low), abs(high)))
+    by = margin * np.where(np.isfinite(size), size, 0.0)
+    return low + by, high - by
+
+
+def path_inverse(model: Model, follow: str, sample_time: float | None) -> PathInverse | LeastEffortInverse:
+    """The inverse of a model without inertia along paths. Raises InputError where the drives do not push the axes independently."""
+    if not model.redundant:
+        return PathInverse(model, follow, sample_time)
+    allocation = allocate(model)
+    return LeastEffortInverse(model, PathInverse(allocation.ganged, follow, sample_time), allocation)
+
+
+def motion_inverse(model: Model, follow: str, sample_time: float) -> InertialInverse | LeastEffortInverse:
+    """The same of a model with inertia."""
+    if not model.redundant:
+        return InertialInverse(model, follow, sample_time)
+    allocation = allocate(model)
+    return LeastEffortInverse(model, InertialInverse(allocation.ganged, follow, sample_time), allocation)

@@ -1,0 +1,237 @@
+"""More drives than axes: the drives of least effort within every limit. The references are numpy's pseudo-inverse, scipy's linear
+programmes for what can be followed, and scipy's SLSQP for the drives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog, minimize, nnls
+
+import ctrlgen
+from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
+from ctrlgen.model.feedforward import Controller, ControllerStatus
+
+B = 0.2 * np.array([[1.0, 0.5, 0.0], [0.0, -0.5, 1.0]])  # N/V
+LOW, HIGH = np.array([-100.0, 0.0, -20.0]), np.array([100.0, 150.0, 130.0])  # V
+RANGE = HIGH - LOW
+K, K3 = 1e6, 1e13
+NEAR = 1e-5  # ranges: where IPOPT leaves what is at a limit
+WEIGHTS = {"b": 4.0, "c": 0.25}
+W = np.array([1.0, 4.0, 0.25])
+
+
+def stage(**other):
+    """Three stacks on two axes that harden."""
+    words = dict(
+        parameters={"g": "0.2 N/V", "k": "1 N/um", "k3": "1e13 N/m^3"},
+        drive={"a": "100 V", "b": ("0 V", "150 V"), "c": ("-20 V", "130 V")},
+        axes={"x": "50 um", "y": "50 um"},
+        force=lambda u, p: [p.g * (u.a + 0.5 * u.b), p.g * (u.c - 0.5 * u.b)],
+        restoring_force=lambda d, p: p.k * d.vector + p.k3 * d.vector**3,
+    )
+    return ctrlgen.user_device("stage", **(words | other))
+
+
+def heavy(**other):
+    """The same with mass and damping, without hardening."""
+    return stage(
+        parameters={"g": "0.2 N/V", "k": "1 N/um", "m": "1 kg", "c": "100 N*s/m"},
+        restoring_force=lambda d, p: p.k * d.vector, damping_force=lambda v, p: p.c * v.vector, mass=lambda p: [p.m, p.m], **other,
+    )  # fmt: skip
+
+
+def circle(micrometres, x=0.0, y=0.0):
+    return f'kind = "circle"\ndiameter = "{micrometres} um"\ncentre = {{ x = "{x} um", y = "{y} um" }}\nplane = ["x", "y"]\n'
+
+
+def loaded(folder, device, path, timing='sample_rate = "1 kHz"\nduration = "0.1 s"\n'):
+    (folder / "scenario.toml").write_text(f'title = "t"\ndevice = "{device.name}"\n{timing}[path]\n{path}')
+    return load_scenario(folder, device), build_model(device)
+
+
+def forces(z):
+    return K * z + K3 * z**3
+
+
+def reference(f, weights):
+    """The least effort by SLSQP, from where a linear programme ends; in shares of the ranges."""
+    S = B * RANGE
+    start = linprog(np.zeros(3), A_eq=S, b_eq=f, bounds=list(zip(LOW / RANGE, HIGH / RANGE, strict=True))).x
+
+    def effort(s):
+        return np.sum(weights * s**2)
+
+    found = minimize(
+        effort, start, jac=lambda s: 2 * weights * s, bounds=list(zip(LOW / RANGE, HIGH / RANGE, strict=True)),
+        constraints={"type": "eq", "fun": lambda s: (S @ s - f), "jac": lambda s: S}, method="SLSQP",
+        options={"ftol": 1e-12, "maxiter": 500},
+    )  # fmt: skip
+    assert found.success
+    return found.x * RANGE
+
+
+def can_push(f):
+    return linprog(np.zeros(3), A_eq=B, b_eq=f, bounds=list(zip(LOW, HIGH, strict=True))).status == 0
+
+
+@pytest.mark.parametrize("weights", [None, WEIGHTS])
+def test_within_the_limits_the_drives_are_those_of_the_weighted_pseudo_inverse(tmp_path, weights):
+    solution = solve(*loaded(tmp_path, stage(drive_weight=weights), circle(2, 12, 2)))
+    R = np.diag(RANGE / np.sqrt(W if weights else np.ones(3)))
+    held = np.roll(solution.command, -1, axis=0)
+    assert np.allclose(solution.drive, forces(held) @ (R @ np.linalg.pinv(B @ R)).T, rtol=0, atol=1e-9)  # V: rounding
+    assert np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-15
+
+
+@pytest.mark.parametrize("weights", [None, WEIGHTS])
+def test_at_limits_the_drives_are_the_best_admissible_ones(tmp_path, weights):
+    """The circle takes b below zero, and a above its limit, if they were free."""
+    scenario, model = loaded(tmp_path, stage(drive_weight=weights), circle(33))
+    solution = solve(scenario, model)
+    w = W if weights else np.ones(3)
+    R = np.diag(RANGE / np.sqrt(w))
+    wanted = forces(np.roll(solution.command, -1, axis=0))
+    free = wanted @ (R @ np.linalg.pinv(B @ R)).T
+    assert np.any(free < LOW - 1) or np.any(free > HIGH + 1)  # else nothing is tested
+    assert np.all(solution.drive >= LOW) and np.all(solution.drive <= HIGH)
+    assert np.allclose(solution.drive @ B.T, wanted, rtol=0, atol=1e-8)  # N: of 20 N
+    for k in range(0, len(wanted), 7):
+        best = reference(wanted[k], w)
+        assert np.allclose(solution.drive[k], best, rtol=0, atol=1e-3), k  # V: where SLSQP ends
+        assert np.sum(w * (solution.drive[k] / RANGE) ** 2) <= np.sum(w * (best / RANGE) ** 2) + 1e-9
+
+
+def test_what_can_be_followed_is_what_a_linear_programme_says(tmp_path):
+    sizes = [circle(d, x, y) for d in (20, 50, 60) for x in (0, 10) for y in (-12, 0, 12)]
+    said, wanted = [], []
+    for path in sizes:
+        scenario, model = loaded(tmp_path, stage(), path)
+        samples = scenario.command(model)
+        wanted.append(all(can_push(f) for f in forces(samples)) and np.abs(samples).max() <= 50e-6)
+        try:
+            solve(scenario, model)
+            said.append(True)
+        except Unreachable:
+            said.append(False)
+    assert said == wanted
+    assert set(said) == {True, False}
+
+
+def test_what_cannot_be_followed_is_explained_and_the_alternatives_can(tmp_path):
+    scenario, model = loaded(tmp_path, stage(), circle(60))
+    with pytest.raises(Unreachable, match=r"drive of \w .*would have to be .* V") as caught:
+        solve(scenario, model)
+    alternatives = caught.value.infeasibility.alternatives
+    assert alternatives
+    for path in alternatives.values():
+        assert all(can_push(f) for f in forces(path))
+    shrunk = next(p for what, p in alternatives.items() if "scaled" in what)
+    assert not all(can_push(f) for f in forces(1.02 * shrunk))  # it is near the largest
+
+
+def test_equilibria_too_have_the_least_effort(tmp_path):
+    poses = 'kind = "poses"\npoints = [{ x = "5 um", y = "1 um" }, { x = "-15 um", y = "12 um" }]\n'
+    solution = solve(*loaded(tmp_path, stage(), poses, ""))
+    for u, f in zip(solution.drive, forces(solution.command), strict=True):
+        assert np.allclose(u, reference(f, np.ones(3)), rtol=0, atol=1e-3)
+
+
+def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):
+    """What can be followed against a linear programme over all samples, the drives against the conditions of an optimum."""
+    timing = 'sample_rate = "200 Hz"\nduration = "0.1 s"\n'
+    free = solve(*loaded(tmp_path, stage(), circle(20, 4, 0), timing))
+    h, n = 1 / 200, len(free.drive)
+    change = np.abs(free.drive - np.roll(free.drive, 1, axis=0)).max(axis=0) / h
+    wanted = forces(np.roll(free.command, -1, axis=0))
+    S, step = np.kron(np.eye(n), B * RANGE), np.eye(n) - np.roll(np.eye(n), -1, axis=1)
+    D = np.kron(step, np.eye(3))[::3] * RANGE[0]
+    box = list(zip(np.tile(LOW / RANGE, n), np.tile(HIGH / RANGE, n), strict=True))
+    slowest = linprog(  # the lowest rate with which the path can be followed at all
+        np.append(np.zeros(3 * n), 1.0), A_eq=np.hstack([S, np.zeros((2 * n, 1))]), b_eq=wanted.ravel(),
+        A_ub=np.block([[D, -np.ones((n, 1))], [-D, -np.ones((n, 1))]]), b_ub=np.zeros(2 * n), bounds=[*box, (0, None)],
+    ).fun / h  # fmt: skip
+    assert slowest < 0.95 * change[0]
+    with pytest.raises(Unreachable, match="the path is too fast"):
+        solve(*loaded(tmp_path, stage(drive_rate={"a": f"{0.99 * slowest} V/s"}), circle(20, 4, 0), timing))
+    rate = 1.01 * slowest
+    kept = solve(*loaded(tmp_path, stage(drive_rate={"a": f"{rate} V/s"}), circle(20, 4, 0), timing))
+    assert np.abs(kept.drive[:, 0] - np.roll(kept.drive[:, 0], 1)).max() <= rate * h * (1 + 1e-7)
+    assert np.allclose(kept.drive @ B.T, wanted, rtol=0, atol=1e-8)
+    s = (kept.drive / RANGE).ravel()
+    low, high = np.tile(LOW / RANGE, n), np.tile(HIGH / RANGE, n)
+    rising, falling = rate * h - D @ s, rate * h + D @ s
+    assert np.any(rising < NEAR * RANGE[0]) and np.any(falling < NEAR * RANGE[0])  # else nothing is tested
+    # Karush-Kuhn-Tucker: the slope of the effort is balanced by limits that act, each with its own sign. The programme is convex.
+    eye, acting = np.eye(3 * n), [S, -S]
+    acting += [
+        eye[s - low < NEAR],
+        -eye[high - s < NEAR],
+        -D[rising < NEAR * RANGE[0]] / RANGE[0],
+        D[falling < NEAR * RANGE[0]] / RANGE[0],
+    ]
+    _, left = nnls(np.vstack(acting).T, 2 * s)
+    assert left < 1e-5 * np.linalg.norm(2 * s)
+    assert np.linalg.norm(2 * s) > 0.1
+
+
+def test_with_inertia_the_held_drives_have_the_least_effort_within_the_limits(tmp_path):
+    timing = 'sample_rate = "5 kHz"\nduration = "0.05 s"\n'
+    path = 'kind = "line"\nstart = { x = "-12 um", y = "5 um" }\nend = { x = "14 um", y = "-3 um" }\n'
+    solution = solve(*loaded(tmp_path, heavy(), path, timing))
+    assert np.all(solution.drive >= LOW) and np.all(solution.drive <= HIGH)
+    assert (
+        np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 50e-6
+    )  # the goal for devices with inertia
+    pushed = solution.drive @ B.T
+    square = np.linalg.pinv(B @ np.diag(RANGE))
+    assert np.any(pushed @ square.T * RANGE < LOW - 1)  # b would go below zero
+    for k in range(0, len(pushed), 25):
+        assert np.allclose(solution.drive[k], reference(pushed[k], np.ones(3)), rtol=0, atol=1e-3)
+    weak = heavy(drive={"a": "60 V", "b": ("0 V", "150 V"), "c": ("-20 V", "130 V")})
+    with pytest.raises(Unreachable, match=r"drive of \w"):
+        solve(*loaded(tmp_path, weak, path.replace("-12", "-16"), timing))
+
+
+def test_the_reference_controller_uses_the_weighted_pseudo_inverse_and_keeps_the_drives_limits():
+    model = build_model(stage(drive_weight=WEIGHTS))
+    controller = Controller(model, "pose", 1e-3)
+    R = np.diag(RANGE / np.sqrt(W))
+    state = controller.rest()
+    for target in (np.array([12e-6, -2e-6]), np.array([5e-6, 1e-6])):
+        step = controller.step(state, target)
+        assert step.status == 0
+        assert np.allclose(step.drive, R @ np.linalg.pinv(B @ R) @ forces(target), rtol=0, atol=1e-9)
+        state = step.state
+    step = controller.step(state, np.array([-10e-6, 10e-6]))  # b would go below zero
+    assert step.status & ControllerStatus.DRIVE
+    assert np.all(step.drive >= LOW) and np.all(step.drive <= HIGH)
+    assert np.allclose(B @ step.drive, forces(step.displacement), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("other", "what"),
+    [
+        ({"force": lambda u, p: [p.g * u.a**2, p.g * (u.c - 0.5 * u.b)]}, "not linear in the drives"),
+        ({"force": lambda u, p: [p.g * (u.a + u.b + u.c)] * 2}, "independently"),
+        (
+            {"state": {"s": "1 V"}, "rates": lambda u, x: [u.a - x.s], "force": lambda u, x, p: [p.g * x.s, p.g * (u.c + u.b)]},
+            "states of their own",
+        ),
+    ],
+)  # fmt: skip
+def test_what_has_no_least_effort_is_refused(tmp_path, other, what):
+    with pytest.raises(InputError, match=what):
+        solve(*loaded(tmp_path, stage(**other), circle(2)))
+
+
+@pytest.mark.parametrize(
+    ("weights", "what"), [({"d": 1.0}, "is no drive"), ({"a": 0.0}, "above zero"), ({"a": "2"}, "above zero")]
+)
+def test_wrong_weights_are_faults(weights, what):
+    with pytest.raises(InputError, match=what):
+        stage(drive_weight=weights)
+
+
+def test_weights_of_as_many_drives_as_axes_are_a_fault():
+    with pytest.raises(InputError, match="more drives than axes"):
+        stage(drive={"a": "1 V", "b": "1 V"}, force=lambda u: [u.a, u.b], drive_weight={"a": 2.0})
