@@ -137,13 +137,13 @@ class BalancedPhysics(DevicePhysics):
 
 @dataclass(frozen=True, kw_only=True)
 class InertialPhysics(DevicePhysics):
-    """A stage with a mass per axis: mass d'' = F - restoring_force(d) - damping_force(d').
+    """A stage with inertia: mass d'' = F - restoring_force(d) - damping_force(d'), `mass` one number an axis or a matrix (n_axes, n_axes).
 
     `dynamics` (u, x, d, d') gives F and the rates x' of the actuators' states. With a `feedback` loop u is its
     reference and the states are the loop's; `dynamics` is then given the amplifier's drive and its rates are not read.
     """
 
-    mass: tuple[float | ca.SX, ...]
+    mass: tuple[float | ca.SX, ...] | ca.SX | ca.DM
     dynamics: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]]
     damping_force: Callable[[ca.SX], ca.SX] | None = None
     feedback: FeedbackLoop | None = None

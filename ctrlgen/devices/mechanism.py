@@ -15,7 +15,8 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
-from ctrlgen.devices.base import BalancedPhysics, Device
+from ctrlgen.devices.base import Device, DevicePhysics
+from ctrlgen.devices.mechanism_dynamics import guyan_modes, inertia_remarks
 from ctrlgen.devices.mechanism_elements import (
     TWIST,
     Blade,
@@ -29,8 +30,9 @@ from ctrlgen.devices.mechanism_elements import (
     Wire,
 )
 from ctrlgen.devices.mechanism_model import MOST_STEPS, SPARE_STEPS, Condensed
+from ctrlgen.devices.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism_springs import Spring
-from ctrlgen.devices.mechanism_tables import GROUND_NAME, Actuator, Body, Material, Output, Pattern
+from ctrlgen.devices.mechanism_tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
 from ctrlgen.physics.screw import inverse_adjoint
@@ -58,6 +60,8 @@ class Mechanism(Device):
     """`[[actuator]]` tables: all push, or all prescribe displacements."""
     output: Output
     """`[output]`: what is followed."""
+    dynamics: Dynamics | None = None
+    """`[dynamics]`: where inertia counts."""
 
     @model_validator(mode="after")
     def _refers_to_what_there_is(self) -> Mechanism:
@@ -101,10 +105,24 @@ class Mechanism(Device):
             )
         if not faults:
             faults += self._unmoved()
+        if not faults and self.dynamics is not None:
+            faults += self._without_inertia()
         if faults:
             raise ValueError("; ".join(faults))
         _ = self.channel_scale, self.cubic_steps  # those of the file: a copy with other numbers keeps them
         return self
+
+    def _without_inertia(self) -> list[str]:
+        """What keeps the table `dynamics` from being of use."""
+        if self.actuator[0].kind != "force":
+            return [
+                "dynamics: inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs"
+            ]
+        if not len(guyan_modes(self).frequencies):
+            return [
+                "dynamics: the actuators move no mass in some direction; give mass and inertia to the bodies that they move"
+            ]
+        return []
 
     def _unmoved(self) -> list[str]:
         """Channels that no actuator moves, or that move only together."""
@@ -248,10 +266,10 @@ class Mechanism(Device):
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
 
     def remarks(self) -> list[str]:
-        """Remarks on hinge equations used outside their t/R range."""
+        """Remarks on hinge equations used outside their t/R range, and on inertia that the condensed model does not show."""
         hinges = [e for e in self.element if isinstance(e, CircularHinge)]
-        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()]
+        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()] + inertia_remarks(self)
 
-    def physics(self, p: SimpleNamespace) -> BalancedPhysics:
+    def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""
-        return Condensed(self, p).physics()
+        return mechanism_physics(Condensed(self, p))

@@ -10,9 +10,7 @@ from typing import Any, Protocol
 import casadi as ca
 import numpy as np
 
-from ctrlgen.core.units import written_unit
-from ctrlgen.devices.base import BalancedPhysics, Limit, Signal
-from ctrlgen.devices.mechanism_elements import TWIST, Copied, Direction, Flexible, Placed
+from ctrlgen.devices.mechanism_elements import TWIST, Copied, Direction, Placed
 from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
@@ -32,6 +30,7 @@ class Drawing(Protocol):
     material: tuple[Any, ...]
     element: tuple[Any, ...]
     output: Any
+    dynamics: Any
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -185,6 +184,43 @@ class Condensed:
         T = [ca.SX.zeros(*self.twists[0].shape) if b == GROUND else self.twists[b] for b in (e.second, e.first)]
         return T[0] - T[1]
 
+    @property
+    def held_stiffness(self) -> Matrix:
+        """(n, n) force on the axes per displacement of them at home, with that of the actuators beside their force."""
+        own = [self.p.actuator[a.index].stiffness for a in self.device.placed_actuators]
+        return self.stiffness + ca.diag(ca.vertcat(*(0.0 if k is None else k for k in own)))
+
+    def restoring_force(self, d: Matrix) -> Matrix:
+        """(n,) force that pulls the axes home from `d` (n,), that of cubic springs included."""
+        linear, n = ca.mtimes(self.held_stiffness, d), len(self.directions)
+        return linear + ca.mtimes(self.beside, self.loads(d)[n:, :]) if self.cubics else linear
+
+    def body_mass(self, number: int) -> Matrix | None:
+        """(6, 6) of a body, twist -> (angular momentum; momentum) at the global origin; None of one without a mass."""
+        placed = self.device.placed_bodies[number]
+        own = self.p.body[placed.index]
+        if own.mass is None:
+            return None
+        R, centre = placed.turn, ca.DM.zeros(3) if own.centre is None else ca.vertcat(*own.centre)
+        S = ca.skew(ca.mtimes(R, centre))
+        about = ca.mtimes([R, ca.diag(ca.vertcat(*own.inertia)), R.T]) - own.mass * ca.mtimes(S, S)
+        return ca.vertcat(
+            ca.horzcat(about, own.mass * S), ca.horzcat(-own.mass * S, own.mass * ca.DM.eye(3))
+        )  # fmt: skip
+
+    @property
+    def mass(self) -> Matrix:
+        """(n, n) mass of the axes: that of all bodies moving as they do at rest with the axes displaced, at home.
+
+        Source: R. J. Guyan, AIAA J. 3 (1965) 380.
+        """
+        n = len(self.directions)
+        M = ca.SX.zeros(n, n)
+        for number, T in enumerate(self.twists):
+            if (own := self.body_mass(number)) is not None:
+                M += ca.mtimes([T[:, :n].T, own, T[:, :n]])
+        return M
+
     def point(self, a: Placed) -> Matrix:
         """Where an actuator pushes [m]."""
         return ca.mtimes(a.turn, ca.vertcat(*self.p.actuator[a.index].at))
@@ -264,72 +300,6 @@ class Condensed:
                 names.append(f"{e.name}_{section.name}")
                 stresses.append(e.section.largest_stress(*parts, floor))
         return tuple(names), ca.vertcat(*stresses)
-
-    def physics(self) -> BalancedPhysics:
-        """As a device's physics."""
-        device, actuators, p = self.device, self.device.placed_actuators, self.p
-        n, axes = len(actuators), tuple(a.name for a in actuators)
-        own = [p.actuator[a.index] for a in actuators]
-        sections = [a.section for a in actuators]
-        gain = ca.vertcat(*(q.gain for q in own))
-        stack = ca.vertcat(*(0.0 if q.stiffness is None else q.stiffness for q in own))
-        units = tuple(written_unit(s.low.text) for s in sections)
-        sizes = tuple(max(abs(s.low.si), abs(s.high.si)) for s in sections)
-        drive = Signal("drive", "drive", axes, units, "u_", ca.SX.sym("u", n), sizes)
-        lags = [q.time_constant for q in own]
-        lagging = all(tau is not None for tau in lags)  # all of them, or none
-        state = Signal("state", "amplifier output", axes, units, "x_", ca.SX.sym("x", n), sizes) if lagging else None
-        flexed = {e.material for e in device.element if isinstance(e, Flexible)}
-        stressed = {m.name: m.stress_limit for m in device.material if m.stress_limit and m.name in flexed}
-        force_unit = "N" if self.pushes else "um"
-        travel = max(s.travel.si for s in sections)
-        K, J = self.stiffness, self.jacobian
-
-        def limits(signal: SimpleNamespace) -> list[Limit]:
-            found = []
-            for i, s in enumerate(sections):
-                label = f"drive of {axes[i]}"
-                found.append(
-                    Limit(f"drive_{axes[i]}", label, (axes[i],), units[i], signal.drive[i], s.low.si, s.high.si)
-                )
-                if state is not None:
-                    label = f"amplifier output of {axes[i]}"
-                    found.append(
-                        Limit(f"output_{axes[i]}", label, (axes[i],), units[i], signal.state[i], s.low.si, s.high.si)
-                    )
-                label, reach = f"travel of {axes[i]}", s.travel.si
-                found.append(Limit(f"travel_{axes[i]}", label, (axes[i],), "um", signal.displacement[i], -reach, reach))
-            for k, e in enumerate(device.placed_elements):
-                most = getattr(e.section, "rotation_limit", None)
-                if most is not None:
-                    angle = ca.fabs(ca.mtimes(self.rotation(k), self.loads(signal.mechanism_displacement)))
-                    found.append(
-                        Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si)
-                    )
-            for material, limit in stressed.items():
-                names, stress = self.stress(material, signal.mechanism_displacement, 1e-9 * limit.si)
-                found.append(Limit(f"stress_{material}", f"stress of {material}", names, "MPa", stress, None, limit.si))
-            return found
-
-        def restoring_force(d: ca.SX) -> ca.SX:
-            linear = ca.mtimes(K, d) + stack * d
-            return linear + ca.mtimes(self.beside, self.loads(d)[n:, :]) if self.cubics else linear
-
-        def parts(d: ca.SX) -> dict[str, ca.SX]:
-            linear = ca.mtimes(K, d) + stack * d
-            return {"linear": linear, "cubic": restoring_force(d) - linear} if self.cubics else {}
-
-        channels = device.output.channels
-        turn = [c.startswith("theta") for c in channels]
-        force_scale = float(max(abs(s.gain.si) * size for s, size in zip(sections, sizes, strict=True)))
-        return BalancedPhysics(
-            axes=axes, components=channels, pose_units=tuple("urad" if t else "um" for t in turn), pose_scale=device.channel_scale,
-            drive=drive, state=state, rest=(0.0,) * (n if lagging else 0), displacement_scale=travel, force_scale=force_scale,
-            force_unit=force_unit, bipolar=any(s.low.si < 0 for s in sections),
-            rates=(lambda x, u: (u - x) / ca.vertcat(*lags)) if lagging else (lambda x, u: ca.SX(0, 1)),
-            force=lambda u, x, d: gain * (x if lagging else u),
-            restoring_force=restoring_force, restoring_force_parts=parts, pose=lambda d: ca.mtimes(J, self.loads(d)), limits=limits,
-        )  # fmt: skip
 
 
 def _right_handed(frame: Matrix) -> Matrix:

@@ -71,7 +71,7 @@ class Body(Section):
     pattern: str = ""
     """The pattern by which it is copied."""
     mass: Annotated[Quantity, In("g", positive=True)] | None = None
-    """For the natural frequencies; a body without mass follows the others."""
+    """For the natural frequencies, and with a table `[dynamics]` for the model; a body without mass follows the others."""
     centre: Place | None = None
     """Centre of mass in the global frame. Left out: the origin."""
     inertia: tuple[Inertia, Inertia, Inertia] | None = None
@@ -152,3 +152,10 @@ class Output(Section):
         min_length=1
     )
     """Components of its motion, as many as actuators: rotations, and displacements of the point."""
+
+
+class Dynamics(Section):
+    """`[dynamics]`: the model has the inertia of the bodies, condensed to the actuators. Left out: it is in balance at every moment."""
+
+    damping_ratio: Annotated[Quantity, In("1", low=0.0, high=1.0)]
+    """Of every mode of the condensed mechanism, such as "2 %"."""

@@ -116,7 +116,7 @@ def _assemble(
     state, memories = physics.state, terms.memories()
     own_x = NONE if state is None else state.expr
     first = own_x.numel()  # place in x of the effects' states
-    acceleration = parts.balance / ca.vertcat(*physics.mass) if isinstance(physics, InertialPhysics) else NONE
+    acceleration = _acceleration(physics.mass, parts.balance) if isinstance(physics, InertialPhysics) else NONE
     memory_rates = ca.vertcat(NONE, *(m.rates[s.name] for m, s, _ in memories))
     rates = ca.vertcat(parts.rates, memory_rates, acceleration)
 
@@ -228,6 +228,11 @@ def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) 
     signals |= _mechanical(physics, force, displacement, pose, reading)
     rates = rates if loop is None else loop.rates(x, arriving)
     return Assembly(signals, rates, balance, heat, produced, held, command, force - damping)
+
+
+def _acceleration(mass: tuple[float | ca.SX, ...] | ca.SX | ca.DM, force: ca.SX) -> ca.SX:
+    """(n_axes,) what a `force` (n_axes,) gives masses, or a matrix of them that axes share."""
+    return force / ca.vertcat(*mass) if isinstance(mass, tuple) else ca.mtimes(ca.inv(mass), force)
 
 
 def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
