@@ -85,6 +85,17 @@ class FeedbackLoop:
     measures: Literal["reading", "displacement"] = "reading"
 
 
+@dataclass(frozen=True)
+class SensedPoints:
+    """What sensors see beside the pose: names, units of reports and typical sizes [SI] of the readings, and their values `at` the
+    displacement d."""
+
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    scale: tuple[float, ...]
+    at: Callable[[ca.SX], ca.SX]
+
+
 @dataclass(frozen=True, kw_only=True)
 class DevicePhysics:
     """The physics of one device, as symbolic maps from drive to pose; `ctrlgen.model.assembly` joins them to a model.
@@ -95,7 +106,7 @@ class DevicePhysics:
     `restoring_force` (d) pulls the axes home; `restoring_force_parts` (d) gives its parts by name for plots.
     `limits` is given the namespace drive, command, state, force, displacement, mechanism_displacement of expressions.
     `displacement_scale` and `force_scale` are typical sizes in SI, in the units `travel_unit` and `force_unit`.
-    `bipolar` says whether the drive has both signs.
+    `bipolar` says whether the drive has both signs. The readings are the pose, and behind it those of the `sensed` points.
     """
 
     axes: tuple[str, ...]
@@ -114,6 +125,13 @@ class DevicePhysics:
     travel_unit: str = "um"
     force_unit: str = "N"
     bipolar: bool = True
+    sensed: SensedPoints | None = None
+
+    @property
+    def readings(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
+        """Names, units and typical sizes of all readings."""
+        pose, more = (self.components, self.pose_units, self.pose_scale), self.sensed
+        return pose if more is None else (pose[0] + more.channels, pose[1] + more.units, pose[2] + more.scale)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,7 +32,7 @@ from ctrlgen.devices.mechanism_elements import (
 from ctrlgen.devices.mechanism_model import MOST_STEPS, SPARE_STEPS, Condensed
 from ctrlgen.devices.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism_springs import Spring
-from ctrlgen.devices.mechanism_tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern
+from ctrlgen.devices.mechanism_tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
 from ctrlgen.physics.screw import inverse_adjoint
@@ -60,6 +60,8 @@ class Mechanism(Device):
     """`[[actuator]]` tables: all push, or all prescribe displacements."""
     output: Output
     """`[output]`: what is followed."""
+    reading: tuple[Reading, ...] = ()
+    """`[[reading]]` tables: what is read beside the output."""
     dynamics: Dynamics | None = None
     """`[dynamics]`: where inertia counts."""
 
@@ -72,12 +74,18 @@ class Mechanism(Device):
         for what, names in {
             "material": [m.name for m in self.material], "pattern": [q.name for q in self.pattern], "body": list(self.bodies),
             "element": [e.name for e in self.element], "actuator": [a.name for a in self.actuator],
+            "reading": [*self.output.channels, *(r.name for r in self._copies(self.reading))],
         }.items():  # fmt: skip
             faults += [f"{what}: {name!r} is named twice" for name in dict.fromkeys(names) if names.count(name) > 1]
         if GROUND_NAME in self.bodies:
             faults.append('body: "ground" is the name of what does not move; choose another one')
         known = {q.name for q in self.pattern} | {""}
-        for where, sections in (("body", self.body), ("element", self.element), ("actuator", self.actuator)):
+        for where, sections in (
+            ("body", self.body),
+            ("element", self.element),
+            ("actuator", self.actuator),
+            ("reading", self.reading),
+        ):
             for k, section in enumerate(sections):
                 if section.pattern not in known:
                     faults.append(f"{where}[{k}].pattern: {section.pattern!r} is no pattern")
@@ -109,7 +117,11 @@ class Mechanism(Device):
             faults += self._without_inertia()
         if faults:
             raise ValueError("; ".join(faults))
-        _ = self.channel_scale, self.cubic_steps  # those of the file: a copy with other numbers keeps them
+        _ = (
+            self.channel_scale,
+            self.reading_scale,
+            self.cubic_steps,
+        )  # those of the file: a copy with other numbers keeps them
         return self
 
     def _without_inertia(self) -> list[str]:
@@ -137,7 +149,14 @@ class Mechanism(Device):
             return [
                 f"output.channels: {', '.join(channels)} move only together; follow others, or place the actuators otherwise"
             ]
-        return []
+        least = MOVED * max(a.travel.si for a in self.actuator)
+        unread = [
+            r.name for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
+            if seen * (1.0 if r.section.about is None else self.size) <= least
+        ]  # fmt: skip
+        return (
+            [f"reading: no actuator moves what {', '.join(unread)} reads; read in another direction"] if unread else []
+        )
 
     def _unknown_names(self) -> list[str]:
         faults = []
@@ -162,6 +181,11 @@ class Mechanism(Device):
             faults += [
                 f"actuator[{k}].{key}: {name!r} is no body"
                 for key, name in (("on", a.on), ("against", a.against)) if self._number(name, a.pattern, 1) is None
+            ]  # fmt: skip
+        for k, r in enumerate(self.reading):
+            faults += [
+                f"reading[{k}].{key}: {name!r} is no body" + (f" with the pattern {r.pattern!r}" if r.pattern else "")
+                for key, name in (("body", r.body), ("against", r.against)) if self._number(name, r.pattern, 1) is None
             ]  # fmt: skip
         if self.output.body not in self.bodies:
             faults.append(f"output.body: {self.output.body!r} is no body; there are {', '.join(self.bodies)}")
@@ -253,6 +277,18 @@ class Mechanism(Device):
         _, values, motions = np.linalg.svd(np.vstack([*rows, np.zeros((6 * count, 6 * count))]))
         free = motions[values < MOVED * values.max()]
         return [name for i, name in enumerate(self.bodies) if np.abs(free[:, 6 * i : 6 * i + 6]).max(initial=0) > MOVED]
+
+    @cached_property
+    def placed_readings(self) -> tuple[Placed, ...]:
+        """Every copy of every reading."""
+        return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies(self.reading))
+
+    @cached_property
+    def reading_scale(self) -> tuple[float, ...]:
+        """A typical size [rad, m] of each reading, as `channel_scale`."""
+        travel, n = max(a.travel.si for a in self.actuator), len(self.placed_actuators)
+        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).reading_motion))).full()[:, :n]
+        return tuple(float(x) for x in np.abs(moved).sum(axis=1) * travel)
 
     @property
     def _output_motion(self) -> np.ndarray:

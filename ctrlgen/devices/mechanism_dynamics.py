@@ -162,9 +162,12 @@ def summary(device: Drawing) -> list[str]:
         used = "solved with it" if device.dynamics is not None else "a table [dynamics] solves with it"
         more = "" if left_out is None else f"; first mode left out: {show(left_out, 'Hz')}"
         lines.append(f"inertia condensed to the actuators (Guyan; {used}): {', '.join(map(str, condensed))}{more}")
-    J = ca.DM(ca.evalf(ca.SX(c.jacobian))).full()[:, : len(device.placed_actuators)]
-    for channel, row in zip(device.output.channels, J, strict=True):
-        unit = "urad/um" if channel.startswith("theta") else "um/um"
+    seen = ca.vertcat(c.jacobian, c.reading_motion)[:, : len(device.placed_actuators)]
+    turns = [name.startswith("theta") for name in device.output.channels]
+    turns += [r.section.about is not None for r in device.placed_readings]
+    names = [*device.output.channels, *(r.name for r in device.placed_readings)]
+    for channel, turn, row in zip(names, turns, ca.DM(ca.evalf(ca.SX(seen))).full(), strict=True):
+        unit = "urad/um" if turn else "um/um"
         parts = ", ".join(
             f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )

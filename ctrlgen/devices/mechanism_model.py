@@ -53,6 +53,16 @@ class Drawing(Protocol):
         ...
 
     @property
+    def placed_readings(self) -> tuple[Placed, ...]:
+        """Every copy of every reading."""
+        ...
+
+    @property
+    def reading_scale(self) -> tuple[float, ...]:
+        """A typical size of each reading beside those of the output."""
+        ...
+
+    @property
     def size(self) -> float:
         """The largest distance of an element's end from the origin [m]."""
         ...
@@ -251,6 +261,21 @@ class Condensed:
     def jacobian(self) -> Matrix:
         """(channels, n + m): the components of `output_motion` that are followed."""
         return self.output_motion[[TWIST.index(c) for c in self.device.output.channels], :]
+
+    @property
+    def reading_motion(self) -> Matrix:
+        """(readings, n + m): what the readings beside those of the output see per q [m, rad]."""
+        rows = [ca.SX(0, self.twists[0].shape[1])]
+        for r in self.device.placed_readings:
+            direction, at = ca.mtimes(r.turn, _unit(r.section.direction)), self.p.reading[r.index].at
+            row = ca.horzcat(direction.T, ca.DM.zeros(1, 3))
+            if at is not None:
+                row = mechanism.point_motion(ca.mtimes(r.turn, ca.vertcat(*at)), direction)
+            elif float(ca.det(r.turn)) < 0:
+                row = -row  # the mirror image of a turn is one about the image of its axis, the other way round
+            ends = [ca.mtimes(row, self.twists[b]) if b != GROUND else 0 for b in (r.second, r.first)]
+            rows.append(ends[0] - ends[1])
+        return ca.vertcat(*rows)
 
     @property
     def output_compliance(self) -> Matrix:

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from ctrlgen.core.units import written_unit
-from ctrlgen.devices.base import BalancedPhysics, DevicePhysics, InertialPhysics, Limit, Signal
+from ctrlgen.devices.base import BalancedPhysics, DevicePhysics, InertialPhysics, Limit, SensedPoints, Signal
 from ctrlgen.devices.mechanism_model import Condensed
 from ctrlgen.physics.damping import modal_damping
 
@@ -55,7 +55,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         displacement_scale=max(s.travel.si for s in sections), bipolar=any(s.low.si < 0 for s in sections),
         force_scale=float(max(abs(s.gain.si) * size for s, size in zip(sections, sizes, strict=True))),
         force_unit="N" if c.pushes else "um", restoring_force=c.restoring_force, restoring_force_parts=restoring_force_parts,
-        pose=lambda d: ca.mtimes(J, c.loads(d)), limits=limits,
+        pose=lambda d: ca.mtimes(J, c.loads(d)), limits=limits, sensed=_sensed(c),
     )  # fmt: skip
     if p.dynamics is None:
         return BalancedPhysics(**common, force=lambda u, x, d: force(u, x), rates=rates)
@@ -63,6 +63,16 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     return InertialPhysics(
         **common, mass=c.mass, dynamics=lambda u, x, d, v: (force(u, x), rates(x, u)), damping_force=lambda v: ca.mtimes(D, v)
     )  # fmt: skip
+
+
+def _sensed(c: Condensed) -> SensedPoints | None:
+    """The readings beside those of the output."""
+    readings, rows = c.device.placed_readings, c.reading_motion
+    if not readings:
+        return None
+    units = tuple("um" if r.section.about is None else "urad" for r in readings)
+    names = tuple(r.name for r in readings)
+    return SensedPoints(names, units, c.device.reading_scale, lambda d: ca.mtimes(rows, c.loads(d)))
 
 
 def _flexure_limits(c: Condensed, d: ca.SX) -> list[Limit]:

@@ -154,6 +154,42 @@ class Output(Section):
     """Components of its motion, as many as actuators: rotations, and displacements of the point."""
 
 
+class Reading(Section):
+    """`[[reading]]`: a reading beside those of the output: of the displacement of a point of a body, or of its rotation."""
+
+    name: Name
+    """Of the reading, as in the column "reading.NAME" of a recording, or as a `[[sensor]]` table names it."""
+    body: str
+    """The body that is looked at."""
+    against: str = GROUND_NAME
+    """The body on which the sensor stands."""
+    at: Place | None = None
+    """The point whose displacement is read, in the global frame."""
+    along: Direction | None = None
+    """Direction of the displacement that is read; of any length."""
+    about: Direction | None = None
+    """Axis of the rotation that is read, in place of `at` and `along`."""
+    pattern: str = ""
+    """The pattern by which it is copied."""
+
+    @model_validator(mode="after")
+    def _reads_one_thing(self) -> Reading:
+        if (self.about is None) == (self.along is None):
+            raise ValueError("give either along (and at), for a displacement, or about, for a rotation")
+        if (self.along is None) != (self.at is None):
+            raise ValueError(
+                "at and along belong together: say which point's displacement is read; a rotation has no point"
+            )
+        if np.linalg.norm(self.direction) == 0:
+            raise ValueError(f"{'along' if self.about is None else 'about'}: is zero; give a direction")
+        return self
+
+    @property
+    def direction(self) -> Direction:
+        """`along` or `about`."""
+        return self.along or self.about or (0.0, 0.0, 0.0)
+
+
 class Dynamics(Section):
     """`[dynamics]`: the model has the inertia of the bodies, condensed to the actuators. Left out: it is in balance at every moment."""
 

@@ -103,7 +103,7 @@ def _assemble(
     z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n if inertial else 0), ca.SX.sym("a", n if inertial else 0)
     velocity = physics.drive.expr[n : 2 * n] if isinstance(physics, ImposedPhysics) else v
     terms = EffectTerms(device, physics, values, z, velocity, a, ambient, sample_time, per_record)
-    faults = mounting_faults(device.sensor, physics.components, physics.pose_units) + terms.faults
+    faults = mounting_faults(device.sensor, *physics.readings[:2]) + terms.faults
     if faults:
         raise InputError(device.name, faults)
     join: dict[type, Callable[..., Any]] = {
@@ -261,23 +261,24 @@ def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
 
 
 def _carried(physics: DevicePhysics, terms: EffectTerms, z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """What follows the stages' displacement: that of the mechanism, the platform's pose and the reading, with effects."""
+    """What follows the stages' displacement: that of the mechanism, the platform's pose and the readings, with effects."""
     displacement = terms.added(Place.DISPLACEMENT, z)
     pose = terms.added(Place.POSE, physics.pose(displacement))
-    return displacement, pose, terms.added(Place.SENSOR, pose)
+    seen = pose if physics.sensed is None else ca.vertcat(pose, physics.sensed.at(displacement))
+    return displacement, pose, terms.added(Place.SENSOR, seen)
 
 
 def _mechanical(
     physics: DevicePhysics, force: ca.SX, displacement: ca.SX, pose: ca.SX, reading: ca.SX
 ) -> dict[str, Signal]:
     axes, n = physics.axes, len(physics.axes)
-    at_platform, travel = (physics.components, physics.pose_units), (physics.displacement_scale,) * n
+    (channels, reading_units, reading_scale), travel = physics.readings, (physics.displacement_scale,) * n
     units, sizes, lengths = (physics.force_unit,) * n, (physics.force_scale,) * n, (physics.travel_unit,) * n
     return {
         "force": Signal("force", "actuator force", axes, units, "F_", force, sizes),
         "displacement": Signal("displacement", "stage displacement", axes, lengths, "d_", displacement, travel),
-        "pose": Signal("pose", "platform pose", *at_platform, "", pose, physics.pose_scale),
-        "reading": Signal("reading", "sensor reading", *at_platform, "reading_", reading, physics.pose_scale),
+        "pose": Signal("pose", "platform pose", physics.components, physics.pose_units, "", pose, physics.pose_scale),
+        "reading": Signal("reading", "sensor reading", channels, reading_units, "reading_", reading, reading_scale),
     }
 
 

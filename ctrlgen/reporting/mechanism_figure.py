@@ -66,6 +66,13 @@ def mechanism_figure(device: Mechanism) -> Figure:
         ax.text(*(tip - arrow), pushed.name, fontsize=8, color=COLOURS[2], fontweight="bold")
         if k is None and pushed.second != GROUND:
             joints[pushed.second].append(tip)
+    for r in device.placed_readings:
+        if r.section.at is not None:  # a rotation is read anywhere on its body
+            seen = np.array(ca.DM(ca.mtimes(r.turn, ca.DM([x.si for x in r.section.at])))).ravel() * MM
+            ax.scatter(*seen, marker="o", facecolors="none", edgecolors=COLOURS[3], s=40)
+            ax.text(*seen, f" {r.name}", fontsize=7, color=COLOURS[3])
+            if r.second != GROUND:
+                joints[r.second].append(seen)
     for name, points in zip(device.bodies, joints, strict=True):
         middle = np.mean(points, axis=0)
         for point in points:
