@@ -33,13 +33,16 @@ from ctrlgen.devices.mechanism_model import MOST_STEPS, SPARE_STEPS, Condensed
 from ctrlgen.devices.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism_springs import Spring
 from ctrlgen.devices.mechanism_tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
+from ctrlgen.devices.mechanism_thermal import BentBeam, ThermalActuator
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
 from ctrlgen.physics.screw import inverse_adjoint
 
 AnyElement = Annotated[
-    Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring, Field(discriminator="kind")
+    Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,
+    Field(discriminator="kind"),
 ]
+AnyActuator = Annotated[Actuator | ThermalActuator, Field(discriminator="kind")]
 MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
 
 
@@ -56,8 +59,8 @@ class Mechanism(Device):
     """`[[body]]` tables."""
     element: tuple[AnyElement, ...]
     """`[[element]]` tables."""
-    actuator: tuple[Actuator, ...]
-    """`[[actuator]]` tables: all push, or all prescribe displacements."""
+    actuator: tuple[AnyActuator, ...]
+    """`[[actuator]]` tables: all push, all heat, or all prescribe displacements."""
     output: Output
     """`[output]`: what is followed."""
     reading: tuple[Reading, ...] = ()
@@ -93,10 +96,14 @@ class Mechanism(Device):
             faults += self._unknown_names()
         if len({a.kind for a in self.actuator}) > 1:
             faults.append(
-                "actuator: some push and some prescribe a displacement; give one kind, a stack as force with stiffness"
+                "actuator: some push, some heat or some prescribe a displacement; give one kind, a stack as force with stiffness"
             )
         if len({a.time_constant is None for a in self.actuator}) > 1:
             faults.append("actuator: some have a time_constant and some do not; give one to all or to none")
+        if len({getattr(a, "heater_resistance", None) is None for a in self.actuator}) > 1:
+            faults.append(
+                "actuator: some have a heater_resistance and some do not; the drives are all voltages or all powers"
+            )
         if not faults and len(self.output.channels) != len(self.placed_actuators):
             counts = f"{len(self.output.channels)} channels, {len(self.placed_actuators)} actuators"
             faults.append(f"output.channels: {counts}; follow as many channels as there are actuators")
@@ -126,7 +133,11 @@ class Mechanism(Device):
 
     def _without_inertia(self) -> list[str]:
         """What keeps the table `dynamics` from being of use."""
-        if self.actuator[0].kind != "force":
+        if self.actuator[0].kind == "thermal":
+            return [
+                "dynamics: belongs to actuators that push by force; a heater is far slower than its mechanism rings"
+            ]
+        if self.actuator[0].kind == "displacement":
             return [
                 "dynamics: inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs"
             ]
@@ -170,13 +181,21 @@ class Mechanism(Device):
                 faults.append(f"element[{k}].material: {e.material!r} is no material")
         elements = {e.name: e for e in self.element}
         for k, a in enumerate(self.actuator):
-            if a.kind == "displacement":
+            if a.kind != "force":
                 moved = elements.get(a.on)
                 if moved is None or moved.pattern != a.pattern:
                     faults.append(
                         f"actuator[{k}].on: {a.on!r} is no element"
                         + (f" with the pattern {a.pattern!r}" if a.pattern else "")
                     )
+                elif a.kind == "thermal" and not isinstance(moved, BentBeam):
+                    faults.append(f"actuator[{k}].on: {a.on!r} is no bent_beam, which a heater needs")
+                elif (
+                    isinstance(moved, BentBeam)
+                    and a.kind == "thermal"
+                    and not any(m.name == moved.material and m.expansion for m in self.material)
+                ):
+                    faults.append(f"actuator[{k}].on: give the material of {a.on!r} its expansion and expansion_slope")
                 continue
             faults += [
                 f"actuator[{k}].{key}: {name!r} is no body"
@@ -240,8 +259,14 @@ class Mechanism(Device):
 
     @cached_property
     def placed_actuators(self) -> tuple[Placed, ...]:
-        """Every copy of every actuator; one that prescribes a displacement names an element and no bodies."""
-        return tuple(self._between(c, c.section.against, c.section.on) for c in self._copies(self.actuator))
+        """Every copy of every actuator; one that prescribes a displacement names an element and no bodies, a heater those of its."""
+        found, elements = [], {e.name: e for e in self.element}
+        for c in self._copies(self.actuator):
+            ends = (
+                (c.section, "against", "on") if c.section.kind != "thermal" else (elements[c.section.on], "from_", "to")
+            )
+            found.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
+        return tuple(found)
 
     @cached_property
     def channel_scale(self) -> tuple[float, ...]:

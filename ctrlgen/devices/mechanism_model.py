@@ -103,7 +103,7 @@ class Condensed:
 
     def __init__(self, device: Drawing, p: SimpleNamespace) -> None:
         self.device, self.p = device, p
-        self.pushes = device.actuator[0].kind == "force"
+        self.pushes = device.actuator[0].kind != "displacement"
         materials = {m.name: q for m, q in zip(device.material, p.material, strict=True)}
         self.frames = [_right_handed(ca.mtimes(e.turn, e.section.frame)) for e in device.placed_elements]
         self.ends = [ca.mtimes(e.turn, ca.vertcat(*p.element[e.index].at)) for e in device.placed_elements]
@@ -120,7 +120,12 @@ class Condensed:
             for place, k3 in e.section.cubic_terms(own).items():
                 row, wrench = inverse_adjoint(R, end)[place, :], adjoint(R, end)[:, (place + 3) % 6]
                 self.cubics.append(CubicSpring(k, row, wrench, k3))
-        self.directions = [ca.mtimes(a.turn, _unit(a.section.along)) for a in device.placed_actuators]
+        self.directions = [
+            self.frames[self.element_of(a)][:, 0]
+            if a.section.kind == "thermal"
+            else ca.mtimes(a.turn, _unit(a.section.along))
+            for a in device.placed_actuators
+        ]
         n, columns = len(self.directions), len(self.directions) + len(self.cubics)
         loads: dict[int, Matrix] = {}
 
@@ -138,7 +143,7 @@ class Condensed:
                 push(a.second, i, wrench)
                 push(a.first, i, -wrench)
                 continue
-            k = next(k for k, e in enumerate(device.placed_elements) if e.name == self.moved(a))
+            k = self.element_of(a)
             m = self.prescribed[k]
             m = ca.SX.zeros(6, columns) if m is None else m
             m[3:, i] = direction
@@ -197,7 +202,7 @@ class Condensed:
     @property
     def held_stiffness(self) -> Matrix:
         """(n, n) force on the axes per displacement of them at home, with that of the actuators beside their force."""
-        own = [self.p.actuator[a.index].stiffness for a in self.device.placed_actuators]
+        own = [getattr(self.p.actuator[a.index], "stiffness", None) for a in self.device.placed_actuators]
         return self.stiffness + ca.diag(ca.vertcat(*(0.0 if k is None else k for k in own)))
 
     def restoring_force(self, d: Matrix) -> Matrix:
@@ -232,12 +237,15 @@ class Condensed:
         return M
 
     def point(self, a: Placed) -> Matrix:
-        """Where an actuator pushes [m]."""
+        """Where an actuator pushes [m]: a heater at the end of its bar."""
+        if a.section.kind == "thermal":
+            return self.ends[self.element_of(a)]
         return ca.mtimes(a.turn, ca.vertcat(*self.p.actuator[a.index].at))
 
-    def moved(self, a: Placed) -> str:
-        """The name of the element that a displacement actuator moves."""
-        return f"{a.section.on}_{a.copy}" if a.copy else a.section.on
+    def element_of(self, a: Placed) -> int:
+        """The number of the element that an actuator moves or heats."""
+        name = f"{a.section.on}_{a.copy}" if a.copy else a.section.on
+        return next(k for k, e in enumerate(self.device.placed_elements) if e.name == name)
 
     def _travel(self, i: int, twists: list[Matrix]) -> Matrix:
         """(1, n) travel of actuator i."""
@@ -289,7 +297,7 @@ class Condensed:
         """The elements, as they are with the drives held, and the stiffness of the actuators beside them."""
         added = []
         for i, a in enumerate(self.device.placed_actuators):
-            k = self.p.actuator[a.index].stiffness
+            k = getattr(self.p.actuator[a.index], "stiffness", None)
             if k is not None:
                 point, n = self.point(a), self.directions[i]
                 added.append(

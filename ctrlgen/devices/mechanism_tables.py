@@ -29,6 +29,18 @@ class Material(Section):
     """Poisson's ratio."""
     stress_limit: Annotated[Quantity, In("MPa", positive=True)] | None = None
     """Largest stress in its blades, wires and struts and in the necks of its hinges; a limit where it is given."""
+    expansion: Annotated[Quantity, In("1/K", positive=True)] | None = None
+    """Coefficient of thermal expansion at 0 degC; needed where a thermal actuator heats it."""
+    expansion_slope: Annotated[Quantity, In("1/K^2", low=0.0)] | None = None
+    """Increase of the coefficient per kelvin, given with `expansion`."""
+
+    @model_validator(mode="after")
+    def _expands(self) -> Material:
+        if (self.expansion is None) != (self.expansion_slope is None):
+            raise ValueError(
+                'expansion and expansion_slope belong together; write expansion_slope = "0 1/K^2" where it is constant'
+            )
+        return self
 
 
 class Pattern(Section):
