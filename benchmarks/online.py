@@ -14,8 +14,8 @@ from benchmarks import casadi_c, least_squares
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from benchmarks.timed_c import Program, build, generated
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import generate
+from ctrlgen.firmware.real import Real
 from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.trajectory.solution import solve
 

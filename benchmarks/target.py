@@ -13,8 +13,8 @@ from benchmarks import casadi_c
 from benchmarks.measure import Count, Note
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.folder import CFolder, generate
+from ctrlgen.firmware.real import Real
 from ctrlgen.verification.cores import BASE, CORES, INSTALL, Core, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import MISSING, Machine, available
 

@@ -10,7 +10,8 @@ from conftest import DEVICE
 from scipy.integrate import quad
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
-from ctrlgen.devices.mechanism_model import Condensed, freedoms, natural_frequencies
+from ctrlgen.devices.mechanism_dynamics import freedoms, natural_frequencies
+from ctrlgen.devices.mechanism_model import Condensed
 from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.meso_hexapod import matrices as meso_matrices
 from ctrlgen.devices.rrr_stage import stage

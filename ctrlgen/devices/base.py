@@ -91,6 +91,17 @@ class FeedbackLoop:
     measures: Literal["reading", "displacement"] = "reading"
 
 
+@dataclass(frozen=True)
+class SensedPoints:
+    """What sensors see beside the pose: names, units of reports and typical sizes [SI] of the readings, and their values `at` the
+    displacement d."""
+
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    scale: tuple[float, ...]
+    at: Callable[[ca.SX], ca.SX]
+
+
 @dataclass(frozen=True, kw_only=True)
 class DevicePhysics:
     """The physics of one device, as symbolic maps from drive to pose; `ctrlgen.model.assembly` joins them to a model.
@@ -104,6 +115,7 @@ class DevicePhysics:
     `documented`: for a map, the functions whose docstrings state its equation and source; the generated C repeats them.
     `bipolar` says whether the drive has both signs. `rate_limits` are on the change of drives by time (`rate_limit`).
     `drive_weights` say how much each drive counts where there are more of them than axes, all the same where it is empty.
+    The readings are the pose, and behind it those of the `sensed` points.
     """
 
     axes: tuple[str, ...]
@@ -125,6 +137,13 @@ class DevicePhysics:
     force_unit: str = "N"
     bipolar: bool = True
     documented: Mapping[str, Sequence[Callable[..., Any]]] = field(default_factory=dict)
+    sensed: SensedPoints | None = None
+
+    @property
+    def readings(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
+        """Names, units and typical sizes of all readings."""
+        pose, more = (self.components, self.pose_units, self.pose_scale), self.sensed
+        return pose if more is None else (pose[0] + more.channels, pose[1] + more.units, pose[2] + more.scale)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,13 +167,13 @@ class BalancedPhysics(DevicePhysics):
 
 @dataclass(frozen=True, kw_only=True)
 class InertialPhysics(DevicePhysics):
-    """A stage with a mass per axis: mass d'' = F - restoring_force(d) - damping_force(d').
+    """A stage with inertia: mass d'' = F - restoring_force(d) - damping_force(d'), `mass` one number an axis or a matrix (n_axes, n_axes).
 
     `dynamics` (u, x, d, d') gives F and the rates x' of the actuators' states. With a `feedback` loop u is its
     reference and the states are the loop's; `dynamics` is then given the amplifier's drive and its rates are not read.
     """
 
-    mass: tuple[float | ca.SX, ...]
+    mass: tuple[float | ca.SX, ...] | ca.SX | ca.DM
     dynamics: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]]
     damping_force: Callable[[ca.SX], ca.SX] | None = None
     feedback: FeedbackLoop | None = None

@@ -13,180 +13,37 @@ from typing import Annotated, Any, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Device, Section
+from ctrlgen.devices.base import Device, DevicePhysics
+from ctrlgen.devices.mechanism_dynamics import guyan_modes, inertia_remarks
 from ctrlgen.devices.mechanism_elements import (
     TWIST,
-    AnyElement,
+    Blade,
     CircularHinge,
+    Compliance,
+    ComplianceMatrix,
     Copied,
-    Direction,
     Flexible,
-    Name,
-    Place,
     Placed,
+    Strut,
+    Wire,
 )
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism_model import MOST_STEPS, SPARE_STEPS, Condensed
+from ctrlgen.devices.mechanism_physics import mechanism_physics
+from ctrlgen.devices.mechanism_springs import Spring
+from ctrlgen.devices.mechanism_tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
+from ctrlgen.devices.mechanism_thermal import BentBeam, ThermalActuator
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
-from ctrlgen.physics.screw import Matrix, rotation_z
+from ctrlgen.physics.screw import inverse_adjoint
 
-PerDrive = Annotated[Quantity, In(None)]
-Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
-GROUND_NAME = "ground"
+AnyElement = Annotated[
+    Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,
+    Field(discriminator="kind"),
+]
+AnyActuator = Annotated[Actuator | ThermalActuator, Field(discriminator="kind")]
 MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
-
-
-class Material(Section):
-    """`[[material]]`: what flexures are made of."""
-
-    name: Name
-    """By which elements name it."""
-    young: Annotated[Quantity, In("GPa", positive=True)]
-    """Young's modulus."""
-    poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
-    """Poisson's ratio."""
-    stress_limit: Annotated[Quantity, In("MPa", positive=True)] | None = None
-    """Largest stress in its blades, wires and struts and in the necks of its hinges; a limit where it is given."""
-
-
-class Pattern(Section):
-    """`[[pattern]]`: copies of bodies, elements and actuators that name it, turned about z or mirrored."""
-
-    name: Name
-    """By which they name it; copy k of a body NAME is called NAME_k, from 1."""
-    times: Annotated[int, Field(ge=2, le=100)] | None = None
-    """How many there are, the first as written; left out for a mirror."""
-    angles: tuple[Annotated[Quantity, In("deg")], ...] = ()
-    """Angle of each copy; left out: evenly spaced over a turn."""
-    mirror: Literal["x", "y", "z"] | None = None
-    """The second copy is the image of the first in the plane through the origin that is normal to this axis."""
-
-    @model_validator(mode="after")
-    def _is_one_or_the_other(self) -> Pattern:
-        if self.mirror is not None and (self.times is not None or self.angles):
-            raise ValueError("mirror: makes two copies; leave out times and angles")
-        if self.mirror is None and self.times is None:
-            raise ValueError("times: is missing; say how many copies, or give mirror")
-        if self.angles and len(self.angles) != self.times:
-            raise ValueError(f"angles: has {len(self.angles)} for {self.times} copies; give one for each, or none")
-        return self
-
-    @property
-    def turns(self) -> list[Matrix]:
-        """The rotation or reflection (3, 3) of each copy."""
-        if self.mirror is not None:
-            return [ca.DM.eye(3), ca.diag(ca.DM([-1 if axis == self.mirror else 1 for axis in "xyz"]))]
-        times = self.times or 0
-        angles = [a.si for a in self.angles] or [2 * np.pi * k / times for k in range(times)]
-        return [ca.DM(rotation_z(angle)) for angle in angles]
-
-
-class Body(Section):
-    """`[[body]]`: a rigid part."""
-
-    name: Name
-    """By which elements, actuators and the output name it."""
-    pattern: str = ""
-    """The pattern by which it is copied."""
-    mass: Annotated[Quantity, In("g", positive=True)] | None = None
-    """For the natural frequencies; a body without mass follows the others."""
-    centre: Place | None = None
-    """Centre of mass in the global frame. Left out: the origin."""
-    inertia: tuple[Inertia, Inertia, Inertia] | None = None
-    """Moments of inertia about axes through the centre of mass that are parallel to x, y and z as it is drawn."""
-
-    @model_validator(mode="after")
-    def _turns_as_it_moves(self) -> Body:
-        if (self.mass is None) != (self.inertia is None):
-            raise ValueError("mass and inertia belong together; give both or none")
-        return self
-
-
-class Actuator(Section):
-    """`[[actuator]]`: what moves the mechanism. One gives one axis, named after it."""
-
-    name: Name
-    """Of the axis and its drive."""
-    kind: Literal["force", "displacement"]
-    """Pushes on a body, or prescribes the motion of an element."""
-    on: str
-    """The body that is pushed, or the element whose free end is moved."""
-    against: str = GROUND_NAME
-    """The body that a force pushes against."""
-    at: Place | None = None
-    """Where a force acts; its travel is that of this point."""
-    along: Direction
-    """In which direction; of any length."""
-    gain: PerDrive
-    """Force or displacement per drive, such as "0.2 N/V" or "1 um/V"."""
-    low: PerDrive
-    """Lowest drive; its unit is that of the drive."""
-    high: PerDrive
-    """Highest drive."""
-    rate: tuple[PerDrive, PerDrive] | None = None
-    """Largest change of the drive by time, such as "5 V/ms", or the lowest and the highest, such as ["-2 V/ms", "5 V/ms"]."""
-    time_constant: Annotated[Quantity, In("ms", positive=True)] | None = None
-    """Time constant with which the force or displacement follows the drive; left out: at once."""
-    stiffness: Annotated[Quantity, In("N/um", positive=True)] | None = None
-    """Stiffness of a stack beside its blocked force, along its direction."""
-    travel: Annotated[Quantity, In("um", positive=True)]
-    """Largest travel to both sides; a limit."""
-    pattern: str = ""
-    """The pattern by which it is copied."""
-
-    @field_validator("rate", mode="before")
-    @classmethod
-    def _is_to_both_sides(cls, stated: Any) -> Any:
-        """One rate is the largest to both sides."""
-        return (f"-{stated}", stated) if isinstance(stated, str) else stated
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> Actuator:
-        faults = []
-        drive = written_unit(self.low.text)
-        if self.rate is not None:
-            slowest, fastest = self.rate
-            if any(not same_dimension(written_unit(q.text), f"({drive})/s") for q in self.rate):
-                faults.append(f"rate: {fastest.text!r} is no rate of a drive in {drive}; write for example {drive}/ms")
-            elif not slowest.si < 0 < fastest.si:
-                faults.append("rate: must be above zero, or a rate below zero and one above")
-        if not same_dimension(drive, written_unit(self.high.text)):
-            faults.append(f"high: {self.high.text!r} is not of the dimension of low = {self.low.text!r}")
-        elif not self.low.si < self.high.si:
-            faults.append(f"low = {self.low.text!r} is not below high = {self.high.text!r}")
-        wanted = "N" if self.kind == "force" else "m"
-        if not same_dimension(f"({written_unit(self.gain.text)})*({drive})", wanted):
-            faults.append(
-                f"gain: {self.gain.text!r} is no {self.kind} per drive in {drive}; write for example {wanted}/{drive}"
-            )
-        if np.linalg.norm(self.along) == 0:
-            faults.append("along: is zero; give a direction")
-        if self.kind == "force" and self.at is None:
-            faults.append("at: is missing; say where the force acts")
-        for key in ("at", "stiffness") if self.kind == "displacement" else ():
-            if getattr(self, key) is not None:
-                faults.append(
-                    f"{key}: belongs to a force; the element says where a displacement acts and how stiff it is"
-                )
-        if faults:
-            raise ValueError("; ".join(faults))
-        return self
-
-
-class Output(Section):
-    """`[output]`: the point that is followed and read."""
-
-    body: str
-    """On this body (of a pattern: with the number of the copy)."""
-    at: Place
-    """In the global frame."""
-    channels: tuple[Literal["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"], ...] = Field(
-        min_length=1
-    )
-    """Components of its motion, as many as actuators: rotations, and displacements of the point."""
 
 
 class Mechanism(Device):
@@ -202,10 +59,14 @@ class Mechanism(Device):
     """`[[body]]` tables."""
     element: tuple[AnyElement, ...]
     """`[[element]]` tables."""
-    actuator: tuple[Actuator, ...]
-    """`[[actuator]]` tables: all push, or all prescribe displacements."""
+    actuator: tuple[AnyActuator, ...]
+    """`[[actuator]]` tables: all push, all heat, or all prescribe displacements."""
     output: Output
     """`[output]`: what is followed."""
+    reading: tuple[Reading, ...] = ()
+    """`[[reading]]` tables: what is read beside the output."""
+    dynamics: Dynamics | None = None
+    """`[dynamics]`: where inertia counts."""
 
     @model_validator(mode="after")
     def _refers_to_what_there_is(self) -> Mechanism:
@@ -216,12 +77,18 @@ class Mechanism(Device):
         for what, names in {
             "material": [m.name for m in self.material], "pattern": [q.name for q in self.pattern], "body": list(self.bodies),
             "element": [e.name for e in self.element], "actuator": [a.name for a in self.actuator],
+            "reading": [*self.output.channels, *(r.name for r in self._copies(self.reading))],
         }.items():  # fmt: skip
             faults += [f"{what}: {name!r} is named twice" for name in dict.fromkeys(names) if names.count(name) > 1]
         if GROUND_NAME in self.bodies:
             faults.append('body: "ground" is the name of what does not move; choose another one')
         known = {q.name for q in self.pattern} | {""}
-        for where, sections in (("body", self.body), ("element", self.element), ("actuator", self.actuator)):
+        for where, sections in (
+            ("body", self.body),
+            ("element", self.element),
+            ("actuator", self.actuator),
+            ("reading", self.reading),
+        ):
             for k, section in enumerate(sections):
                 if section.pattern not in known:
                     faults.append(f"{where}[{k}].pattern: {section.pattern!r} is no pattern")
@@ -229,21 +96,56 @@ class Mechanism(Device):
             faults += self._unknown_names()
         if len({a.kind for a in self.actuator}) > 1:
             faults.append(
-                "actuator: some push and some prescribe a displacement; give one kind, a stack as force with stiffness"
+                "actuator: some push, some heat or some prescribe a displacement; give one kind, a stack as force with stiffness"
             )
         if len({a.time_constant is None for a in self.actuator}) > 1:
             faults.append("actuator: some have a time_constant and some do not; give one to all or to none")
+        if len({getattr(a, "heater_resistance", None) is None for a in self.actuator}) > 1:
+            faults.append(
+                "actuator: some have a heater_resistance and some do not; the drives are all voltages or all powers"
+            )
         if not faults and len(self.output.channels) != len(self.placed_actuators):
             counts = f"{len(self.output.channels)} channels, {len(self.placed_actuators)} actuators"
             faults.append(f"output.channels: {counts}; follow as many channels as there are actuators")
         if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):
             faults.append(f"body: nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground")
+        if not faults and (free := self._held_by_springs_alone()):
+            faults.append(
+                f"body: springs leave {', '.join(free)} free in some direction; add a spring or a flexure there"
+            )
+        if not faults and self.cubic_steps > MOST_STEPS:
+            faults.append(
+                "element: at the largest travel the cubic springs push harder than the flexures beside them can hold (or soften "
+                "until nothing holds them); lower their k_3, or the travel"
+            )
         if not faults:
             faults += self._unmoved()
+        if not faults and self.dynamics is not None:
+            faults += self._without_inertia()
         if faults:
             raise ValueError("; ".join(faults))
-        _ = self.channel_scale  # that of the file: a copy with other numbers keeps it
+        _ = (
+            self.channel_scale,
+            self.reading_scale,
+            self.cubic_steps,
+        )  # those of the file: a copy with other numbers keeps them
         return self
+
+    def _without_inertia(self) -> list[str]:
+        """What keeps the table `dynamics` from being of use."""
+        if self.actuator[0].kind == "thermal":
+            return [
+                "dynamics: belongs to actuators that push by force; a heater is far slower than its mechanism rings"
+            ]
+        if self.actuator[0].kind == "displacement":
+            return [
+                "dynamics: inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs"
+            ]
+        if not len(guyan_modes(self).frequencies):
+            return [
+                "dynamics: the actuators move no mass in some direction; give mass and inertia to the bodies that they move"
+            ]
+        return []
 
     def _unmoved(self) -> list[str]:
         """Channels that no actuator moves, or that move only together."""
@@ -258,7 +160,14 @@ class Mechanism(Device):
             return [
                 f"output.channels: {', '.join(channels)} move only together; follow others, or place the actuators otherwise"
             ]
-        return []
+        least = MOVED * max(a.travel.si for a in self.actuator)
+        unread = [
+            r.name for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
+            if seen * (1.0 if r.section.about is None else self.size) <= least
+        ]  # fmt: skip
+        return (
+            [f"reading: no actuator moves what {', '.join(unread)} reads; read in another direction"] if unread else []
+        )
 
     def _unknown_names(self) -> list[str]:
         faults = []
@@ -272,17 +181,30 @@ class Mechanism(Device):
                 faults.append(f"element[{k}].material: {e.material!r} is no material")
         elements = {e.name: e for e in self.element}
         for k, a in enumerate(self.actuator):
-            if a.kind == "displacement":
+            if a.kind != "force":
                 moved = elements.get(a.on)
                 if moved is None or moved.pattern != a.pattern:
                     faults.append(
                         f"actuator[{k}].on: {a.on!r} is no element"
                         + (f" with the pattern {a.pattern!r}" if a.pattern else "")
                     )
+                elif a.kind == "thermal" and not isinstance(moved, BentBeam):
+                    faults.append(f"actuator[{k}].on: {a.on!r} is no bent_beam, which a heater needs")
+                elif (
+                    isinstance(moved, BentBeam)
+                    and a.kind == "thermal"
+                    and not any(m.name == moved.material and m.expansion for m in self.material)
+                ):
+                    faults.append(f"actuator[{k}].on: give the material of {a.on!r} its expansion and expansion_slope")
                 continue
             faults += [
                 f"actuator[{k}].{key}: {name!r} is no body"
                 for key, name in (("on", a.on), ("against", a.against)) if self._number(name, a.pattern, 1) is None
+            ]  # fmt: skip
+        for k, r in enumerate(self.reading):
+            faults += [
+                f"reading[{k}].{key}: {name!r} is no body" + (f" with the pattern {r.pattern!r}" if r.pattern else "")
+                for key, name in (("body", r.body), ("against", r.against)) if self._number(name, r.pattern, 1) is None
             ]  # fmt: skip
         if self.output.body not in self.bodies:
             faults.append(f"output.body: {self.output.body!r} is no body; there are {', '.join(self.bodies)}")
@@ -337,8 +259,14 @@ class Mechanism(Device):
 
     @cached_property
     def placed_actuators(self) -> tuple[Placed, ...]:
-        """Every copy of every actuator; one that prescribes a displacement names an element and no bodies."""
-        return tuple(self._between(c, c.section.against, c.section.on) for c in self._copies(self.actuator))
+        """Every copy of every actuator; one that prescribes a displacement names an element and no bodies, a heater those of its."""
+        found, elements = [], {e.name: e for e in self.element}
+        for c in self._copies(self.actuator):
+            ends = (
+                (c.section, "against", "on") if c.section.kind != "thermal" else (elements[c.section.on], "from_", "to")
+            )
+            found.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
+        return tuple(found)
 
     @cached_property
     def channel_scale(self) -> tuple[float, ...]:
@@ -347,9 +275,51 @@ class Mechanism(Device):
         reach = np.abs(self._output_motion).sum(axis=1) * max(a.travel.si for a in self.actuator)
         return tuple(float(reach[TWIST.index(c)]) for c in self.output.channels)
 
+    @cached_property
+    def cubic_steps(self) -> int:
+        """Steps of Newton's method that find the stretch of the cubic springs, as the file describes them; above `MOST_STEPS` where
+        so many do not."""
+        if not any(isinstance(e, Spring) and e.cubic for e in self.element):
+            return 0
+        steps = Condensed(self, self.values()).cubic_steps()
+        return MOST_STEPS + 1 if steps is None else steps + SPARE_STEPS if steps else 0
+
+    def _held_by_springs_alone(self) -> list[str]:
+        """Bodies that can move without a force, because what joins them are springs."""
+        if not any(isinstance(e, Spring) for e in self.element):
+            return []
+        count, c = len(self.bodies), Condensed(self, self.values())
+        size = np.array([1 / self.size] * 3 + [1.0] * 3)  # turns as displacements
+        rows = []
+        for e, R, end in zip(self.placed_elements, c.frames, c.ends, strict=True):
+            held = e.section.directions if isinstance(e.section, Spring) else range(6)
+            local = ca.DM(inverse_adjoint(R, end)).full()[list(held)] * size / size[list(held), None]
+            row = np.zeros((len(local), 6 * count))
+            for body, sign in ((e.second, 1), (e.first, -1)):
+                if body != GROUND:
+                    row[:, 6 * body : 6 * body + 6] = sign * local
+            rows.append(row)
+        _, values, motions = np.linalg.svd(np.vstack([*rows, np.zeros((6 * count, 6 * count))]))
+        free = motions[values < MOVED * values.max()]
+        return [name for i, name in enumerate(self.bodies) if np.abs(free[:, 6 * i : 6 * i + 6]).max(initial=0) > MOVED]
+
+    @cached_property
+    def placed_readings(self) -> tuple[Placed, ...]:
+        """Every copy of every reading."""
+        return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies(self.reading))
+
+    @cached_property
+    def reading_scale(self) -> tuple[float, ...]:
+        """A typical size [rad, m] of each reading, as `channel_scale`."""
+        travel, n = max(a.travel.si for a in self.actuator), len(self.placed_actuators)
+        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).reading_motion))).full()[:, :n]
+        return tuple(float(x) for x in np.abs(moved).sum(axis=1) * travel)
+
     @property
     def _output_motion(self) -> np.ndarray:
-        return ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
+        """(6, n) at home."""
+        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
+        return moved[:, : len(self.placed_actuators)]
 
     @property
     def _joints(self) -> list[Element]:
@@ -357,10 +327,10 @@ class Mechanism(Device):
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
 
     def remarks(self) -> list[str]:
-        """Remarks on hinge equations used outside their t/R range."""
+        """Remarks on hinge equations used outside their t/R range, and on inertia that the condensed model does not show."""
         hinges = [e for e in self.element if isinstance(e, CircularHinge)]
-        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()]
+        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()] + inertia_remarks(self)
 
-    def physics(self, p: SimpleNamespace) -> BalancedPhysics:
+    def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""
-        return Condensed(self, p).physics()
+        return mechanism_physics(Condensed(self, p))

@@ -15,7 +15,7 @@ from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import circular_hinge, flexure, mechanism
-from ctrlgen.physics.screw import Matrix, move, series
+from ctrlgen.physics.screw import Matrix, inverse, move, series
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 Length = Annotated[Quantity, In("mm", positive=True)]
@@ -70,6 +70,18 @@ class Joining(Section):
         ):
             raise ValueError("across: is parallel to along, or one of them is zero; give two directions")
         return self
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix | None:
+        """[C] about its free end (6, 6), twist per wrench, with its numbers `p` and its material's `m`; None where it has none."""
+        raise NotImplementedError
+
+    def stiffness(self, C: Matrix | None, p: SimpleNamespace) -> Matrix:
+        """[K] about its free end (6, 6), wrench per twist, from its compliance `C`."""
+        return inverse(C)
+
+    def cubic_terms(self, p: SimpleNamespace) -> dict[int, Any]:
+        """Its forces that grow with the cube: place in the twist -> k_3 of the wrench k_3 e^3 [N/m^3, N m/rad^3]."""
+        return {}
 
     def reach(self, p: SimpleNamespace) -> Any:
         """Distance between its ends [m]; None where it says none."""
@@ -356,11 +368,6 @@ class ComplianceMatrix(Joining):
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6)."""
         return ca.DM(np.array(self.compliance_si))
-
-
-AnyElement = Annotated[
-    Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix, Field(discriminator="kind")
-]
 
 
 @dataclass(frozen=True, eq=False)  # a matrix has no truth value that a comparison could use

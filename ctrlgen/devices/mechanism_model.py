@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import eigh
 
-from ctrlgen.core.units import show, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Limit, Signal, rate_limit
-from ctrlgen.devices.mechanism_elements import TWIST, Copied, Direction, Flexible, Placed
+from ctrlgen.devices.mechanism_elements import TWIST, Copied, Direction, Placed
+from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element
-from ctrlgen.physics.screw import Matrix, adjoint, inverse, inverse_adjoint, move
+from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint, move
 
-INDEPENDENT = 1e-3  # singular value of unit rows below which a constraint adds nothing: no drawing is more exact
-STILL = 1e-9  # m/m or rad/m: of the motion per actuator, below which it is rounding
+MOST_STEPS = (
+    12  # of Newton's method from the motion without cubic springs: more, and they hold more than the flexures do
+)
+ROUNDING = 1e-14  # of the stretch: what an iteration leaves
+SPARE_STEPS = 2  # for numbers that differ from the file's, as in a diagnosis
 
 
 class Drawing(Protocol):
@@ -27,6 +30,7 @@ class Drawing(Protocol):
     material: tuple[Any, ...]
     element: tuple[Any, ...]
     output: Any
+    dynamics: Any
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -49,6 +53,16 @@ class Drawing(Protocol):
         ...
 
     @property
+    def placed_readings(self) -> tuple[Placed, ...]:
+        """Every copy of every reading."""
+        ...
+
+    @property
+    def reading_scale(self) -> tuple[float, ...]:
+        """A typical size of each reading beside those of the output."""
+        ...
+
+    @property
     def size(self) -> float:
         """The largest distance of an element's end from the origin [m]."""
         ...
@@ -58,67 +72,180 @@ class Drawing(Protocol):
         """A typical size of each channel that is followed."""
         ...
 
+    @property
+    def cubic_steps(self) -> int:
+        """Steps of Newton's method that find the stretch of the cubic springs."""
+        ...
+
     def values(self) -> SimpleNamespace:
         """Its numbers in SI."""
         ...
 
 
+@dataclass(frozen=True)
+class CubicSpring:
+    """A force k_3 e^3 in element number `element`, e = `row` (1, 6) on its relative twist; `wrench` (6, 1) of a unit of it on the
+    second body, both at the global origin."""
+
+    element: int
+    row: Matrix
+    wrench: Matrix
+    k3: Any
+
+
 class Condensed:
-    """The equations of a mechanism with the values `p`: motion of all bodies per displacement of the actuated axes."""
+    """The equations of a mechanism with the values `p`: motion of all bodies per load q = (d, g) of the actuated axes.
+
+    d (n,) are the displacements of the axes, g (m,) the forces k_3 e^3 of the cubic springs (`loads`). By superposition, with the
+    axes held at d, the springs are stretched by e = A d + B g, B the negative of the compliance that they then see. `twists` (6, n + m)
+    are the motions of the bodies per q.
+    """
 
     def __init__(self, device: Drawing, p: SimpleNamespace) -> None:
         self.device, self.p = device, p
-        self.pushes = device.actuator[0].kind == "force"
+        self.pushes = device.actuator[0].kind != "displacement"
         materials = {m.name: q for m, q in zip(device.material, p.material, strict=True)}
         self.frames = [_right_handed(ca.mtimes(e.turn, e.section.frame)) for e in device.placed_elements]
         self.ends = [ca.mtimes(e.turn, ca.vertcat(*p.element[e.index].at)) for e in device.placed_elements]
-        stiffness, self.compliances = [], []
-        for e, R, end in zip(device.placed_elements, self.frames, self.ends, strict=True):
+        self.compliances: list[Matrix | None] = []  # about their free ends, in their frames; None of springs
+        self.elements: list[Element] = []
+        self.cubics: list[CubicSpring] = []
+        for k, (e, R, end) in enumerate(zip(device.placed_elements, self.frames, self.ends, strict=True)):
             own = p.element[e.index]
             C = e.section.compliance(own, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
-            if float(ca.det(e.turn)) < 0:
+            if C is not None and float(ca.det(e.turn)) < 0:
                 C = ca.mtimes([REFLECTED, C, -REFLECTED])
             self.compliances.append(C)
-            stiffness.append(move(inverse(C), R, end))
-        self.elements = [Element(e.first, e.second, K) for e, K in zip(device.placed_elements, stiffness, strict=True)]
-        self.directions = [ca.mtimes(a.turn, _unit(a.section.along)) for a in device.placed_actuators]
-        n = len(self.directions)
+            self.elements.append(Element(e.first, e.second, move(e.section.stiffness(C, own), R, end)))
+            for place, k3 in e.section.cubic_terms(own).items():
+                row, wrench = inverse_adjoint(R, end)[place, :], adjoint(R, end)[:, (place + 3) % 6]
+                self.cubics.append(CubicSpring(k, row, wrench, k3))
+        self.directions = [
+            self.frames[self.element_of(a)][:, 0]
+            if a.section.kind == "thermal"
+            else ca.mtimes(a.turn, _unit(a.section.along))
+            for a in device.placed_actuators
+        ]
+        n, columns = len(self.directions), len(self.directions) + len(self.cubics)
         loads: dict[int, Matrix] = {}
 
         def push(body: int, column: int, wrench: Matrix) -> None:
             if body != GROUND:
-                loads.setdefault(body, ca.SX.zeros(6, n))[:, column] += wrench
+                loads.setdefault(body, ca.SX.zeros(6, columns))[:, column] += wrench
 
-        self.prescribed: list[Matrix | None] = [None] * len(self.elements)  # m (6, n) of each element
+        self.prescribed: list[Matrix | None] = [None] * len(self.elements)  # m (6, n + m) of each element
+        for j, spring in enumerate(self.cubics):
+            push(self.elements[spring.element].second, n + j, -spring.wrench)
+            push(self.elements[spring.element].first, n + j, spring.wrench)
         for i, (a, direction) in enumerate(zip(device.placed_actuators, self.directions, strict=True)):
             if self.pushes:
                 wrench = mechanism.point_force(self.point(a), direction)
                 push(a.second, i, wrench)
                 push(a.first, i, -wrench)
                 continue
-            k = next(k for k, e in enumerate(device.placed_elements) if e.name == self.moved(a))
+            k = self.element_of(a)
             m = self.prescribed[k]
-            m = ca.SX.zeros(6, n) if m is None else m
+            m = ca.SX.zeros(6, columns) if m is None else m
             m[3:, i] = direction
             self.prescribed[k] = m
             wrench = ca.mtimes(self.elements[k].stiffness, ca.vertcat(ca.DM.zeros(3, 1), direction))
             push(self.elements[k].second, i, wrench)
             push(self.elements[k].first, i, -wrench)
         per_input = mechanism.twists(len(device.bodies), self.elements, loads, device.size)
+        self.stiffness, self.beside = ca.DM.eye(n), ca.DM.zeros(n, columns - n)
+        self.twists = per_input
         if self.pushes:
             travel = ca.vertcat(*(self._travel(i, per_input) for i in range(n)))
-            self.stiffness = ca.solve(travel, ca.DM.eye(n))  # [N/m] force per displacement of the axes
-            self.twists = [ca.mtimes(T, self.stiffness) for T in per_input]
-        else:
-            self.stiffness, self.twists = ca.DM.eye(n), per_input
+            self.stiffness = ca.solve(travel[:, :n], ca.DM.eye(n))  # [N/m] force per displacement of the axes
+            self.beside = -ca.mtimes(self.stiffness, travel[:, n:])  # (n, m) force on the axes per g, the axes held
+            self.twists = [
+                ca.horzcat(ca.mtimes(T[:, :n], self.stiffness), T[:, n:] + ca.mtimes(T[:, :n], self.beside))
+                for T in per_input
+            ]
+        stretch = [ca.mtimes(spring.row, self.relative_twist(spring.element)) for spring in self.cubics]
+        self.stretch = ca.vertcat(ca.SX(0, columns), *stretch)  # (m, n + m): [A, B]
+
+    def loads(self, d: Matrix) -> Matrix:
+        """q = (d, g) (n + m,): g = k_3 e^3 where e = A d + B g, by the steps of Newton's method that the drawing needs."""
+        n, m = len(self.directions), len(self.cubics)
+        if not m:
+            return d
+        k3 = ca.vertcat(*(spring.k3 for spring in self.cubics))
+        e, alone = ca.SX.sym("e", m), ca.mtimes(self.stretch[:, :n], d)
+        residual = e - alone - ca.mtimes(self.stretch[:, n:], k3 * e**3)
+        return ca.vertcat(d, k3 * newton_root(residual, e, alone, self.device.cubic_steps) ** 3)
+
+    def cubic_steps(self) -> int | None:
+        """How many steps of Newton's method find the stretch of the cubic springs to rounding wherever the axes are within their
+        travels (looked at in every corner and halfway); None where `MOST_STEPS` do not."""
+        n = len(self.directions)
+        AB = ca.DM(ca.evalf(ca.SX(self.stretch))).full()
+        k3 = np.array([float(spring.k3) for spring in self.cubics])
+        travel = np.array([a.section.travel.si for a in self.device.placed_actuators])
+        needed = 0
+        for corner in itertools.product((-1.0, -0.5, 0.5, 1.0), repeat=n):
+            alone = AB[:, :n] @ (travel * corner)
+            e, steps = alone.copy(), 0
+            while np.abs(r := e - alone - AB[:, n:] @ (k3 * e**3)).max() > ROUNDING * np.abs(alone).max():
+                if steps == MOST_STEPS or not np.all(np.isfinite(e)):
+                    return None
+                e, steps = e - np.linalg.solve(np.eye(len(e)) - AB[:, n:] * (3 * k3 * e**2), r), steps + 1
+            needed = max(needed, steps)
+        return needed
+
+    def relative_twist(self, k: int) -> Matrix:
+        """(6, n + m) twist of the free end of element k against its fixed one, per q, at the global origin."""
+        e = self.elements[k]
+        T = [ca.SX.zeros(*self.twists[0].shape) if b == GROUND else self.twists[b] for b in (e.second, e.first)]
+        return T[0] - T[1]
+
+    @property
+    def held_stiffness(self) -> Matrix:
+        """(n, n) force on the axes per displacement of them at home, with that of the actuators beside their force."""
+        own = [getattr(self.p.actuator[a.index], "stiffness", None) for a in self.device.placed_actuators]
+        return self.stiffness + ca.diag(ca.vertcat(*(0.0 if k is None else k for k in own)))
+
+    def restoring_force(self, d: Matrix) -> Matrix:
+        """(n,) force that pulls the axes home from `d` (n,), that of cubic springs included."""
+        linear, n = ca.mtimes(self.held_stiffness, d), len(self.directions)
+        return linear + ca.mtimes(self.beside, self.loads(d)[n:, :]) if self.cubics else linear
+
+    def body_mass(self, number: int) -> Matrix | None:
+        """(6, 6) of a body, twist -> (angular momentum; momentum) at the global origin; None of one without a mass."""
+        placed = self.device.placed_bodies[number]
+        own = self.p.body[placed.index]
+        if own.mass is None:
+            return None
+        R, centre = placed.turn, ca.DM.zeros(3) if own.centre is None else ca.vertcat(*own.centre)
+        S = ca.skew(ca.mtimes(R, centre))
+        about = ca.mtimes([R, ca.diag(ca.vertcat(*own.inertia)), R.T]) - own.mass * ca.mtimes(S, S)
+        return ca.vertcat(
+            ca.horzcat(about, own.mass * S), ca.horzcat(-own.mass * S, own.mass * ca.DM.eye(3))
+        )  # fmt: skip
+
+    @property
+    def mass(self) -> Matrix:
+        """(n, n) mass of the axes: that of all bodies moving as they do at rest with the axes displaced, at home.
+
+        Source: R. J. Guyan, AIAA J. 3 (1965) 380.
+        """
+        n = len(self.directions)
+        M = ca.SX.zeros(n, n)
+        for number, T in enumerate(self.twists):
+            if (own := self.body_mass(number)) is not None:
+                M += ca.mtimes([T[:, :n].T, own, T[:, :n]])
+        return M
 
     def point(self, a: Placed) -> Matrix:
-        """Where an actuator pushes [m]."""
+        """Where an actuator pushes [m]: a heater at the end of its bar."""
+        if a.section.kind == "thermal":
+            return self.ends[self.element_of(a)]
         return ca.mtimes(a.turn, ca.vertcat(*self.p.actuator[a.index].at))
 
-    def moved(self, a: Placed) -> str:
-        """The name of the element that a displacement actuator moves."""
-        return f"{a.section.on}_{a.copy}" if a.copy else a.section.on
+    def element_of(self, a: Placed) -> int:
+        """The number of the element that an actuator moves or heats."""
+        name = f"{a.section.on}_{a.copy}" if a.copy else a.section.on
+        return next(k for k, e in enumerate(self.device.placed_elements) if e.name == name)
 
     def _travel(self, i: int, twists: list[Matrix]) -> Matrix:
         """(1, n) travel of actuator i."""
@@ -134,14 +261,29 @@ class Condensed:
 
     @property
     def output_motion(self) -> Matrix:
-        """(6, n): rotation and displacement of the output point per displacement of the actuated axes."""
+        """(6, n + m): rotation and displacement of the output point per q."""
         T = self.twists[self.device.bodies.index(self.device.output.body)]
         return ca.mtimes(inverse_adjoint(None, self.output_point), T)
 
     @property
     def jacobian(self) -> Matrix:
-        """(channels, n): the components of `output_motion` that are followed."""
+        """(channels, n + m): the components of `output_motion` that are followed."""
         return self.output_motion[[TWIST.index(c) for c in self.device.output.channels], :]
+
+    @property
+    def reading_motion(self) -> Matrix:
+        """(readings, n + m): what the readings beside those of the output see per q [m, rad]."""
+        rows = [ca.SX(0, self.twists[0].shape[1])]
+        for r in self.device.placed_readings:
+            direction, at = ca.mtimes(r.turn, _unit(r.section.direction)), self.p.reading[r.index].at
+            row = ca.horzcat(direction.T, ca.DM.zeros(1, 3))
+            if at is not None:
+                row = mechanism.point_motion(ca.mtimes(r.turn, ca.vertcat(*at)), direction)
+            elif float(ca.det(r.turn)) < 0:
+                row = -row  # the mirror image of a turn is one about the image of its axis, the other way round
+            ends = [ca.mtimes(row, self.twists[b]) if b != GROUND else 0 for b in (r.second, r.first)]
+            rows.append(ends[0] - ends[1])
+        return ca.vertcat(*rows)
 
     @property
     def output_compliance(self) -> Matrix:
@@ -155,7 +297,7 @@ class Condensed:
         """The elements, as they are with the drives held, and the stiffness of the actuators beside them."""
         added = []
         for i, a in enumerate(self.device.placed_actuators):
-            k = self.p.actuator[a.index].stiffness
+            k = getattr(self.p.actuator[a.index], "stiffness", None)
             if k is not None:
                 point, n = self.point(a), self.directions[i]
                 added.append(
@@ -168,22 +310,18 @@ class Condensed:
         return self.elements + added
 
     def wrench(self, k: int) -> Matrix:
-        """(6, n) load of element k per displacement of the axes, on its free end, in the global frame."""
-        e = self.elements[k]
-        T = [ca.SX.zeros(6, len(self.directions)) if b == GROUND else self.twists[b] for b in (e.second, e.first)]
+        """(6, n + m) load of element k per q, on its free end, in the global frame."""
         m = self.prescribed[k]
-        return ca.mtimes(e.stiffness, T[0] - T[1] - (0 if m is None else m))
+        return ca.mtimes(self.elements[k].stiffness, self.relative_twist(k) - (0 if m is None else m))
 
     def rotation(self, k: int) -> Matrix:
-        """(1, n) rotation of element k about its z axis per displacement of the axes [rad/m]."""
-        e = self.elements[k]
-        turns = [0 if b == GROUND else self.twists[b][:3, :] for b in (e.second, e.first)]
-        return ca.mtimes(self.frames[k][:, 2].T, turns[0] - turns[1])
+        """(1, n + m) rotation of element k about its z axis per q [rad/m, rad/N]."""
+        return ca.mtimes(self.frames[k][:, 2].T, self.relative_twist(k)[:3, :])
 
     def stress(self, material: str, d: Matrix, floor: float) -> tuple[tuple[str, ...], Matrix]:
         """Of the flexures of a material: the names of the sections that are stressed most, and the largest stress there (m,) [Pa] with
         the axes displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`."""
-        names, stresses = [], []
+        names, stresses, q = [], [], self.loads(d)
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
                 continue
@@ -191,73 +329,10 @@ class Condensed:
             for section in e.section.sections(own):
                 place = self.ends[k] - section.back * self.frames[k][:, 0]
                 load = ca.mtimes(inverse_adjoint(self.frames[k], place), self.wrench(k))
-                parts = (ca.mtimes(part, d) for part in section.stresses(load))
+                parts = (ca.mtimes(part, q) for part in section.stresses(load))
                 names.append(f"{e.name}_{section.name}")
                 stresses.append(e.section.largest_stress(*parts, floor))
         return tuple(names), ca.vertcat(*stresses)
-
-    def physics(self) -> BalancedPhysics:
-        """As a device's physics."""
-        device, actuators, p = self.device, self.device.placed_actuators, self.p
-        n, axes = len(actuators), tuple(a.name for a in actuators)
-        own = [p.actuator[a.index] for a in actuators]
-        sections = [a.section for a in actuators]
-        gain = ca.vertcat(*(q.gain for q in own))
-        stack = ca.vertcat(*(0.0 if q.stiffness is None else q.stiffness for q in own))
-        units = tuple(written_unit(s.low.text) for s in sections)
-        sizes = tuple(max(abs(s.low.si), abs(s.high.si)) for s in sections)
-        drive = Signal("drive", "drive", axes, units, "u_", ca.SX.sym("u", n), sizes)
-        lags = [q.time_constant for q in own]
-        lagging = all(tau is not None for tau in lags)  # all of them, or none
-        state = Signal("state", "amplifier output", axes, units, "x_", ca.SX.sym("x", n), sizes) if lagging else None
-        flexed = {e.material for e in device.element if isinstance(e, Flexible)}
-        stressed = {m.name: m.stress_limit for m in device.material if m.stress_limit and m.name in flexed}
-        force_unit = "N" if self.pushes else "um"
-        travel = max(s.travel.si for s in sections)
-        K, J = self.stiffness, self.jacobian
-
-        def limits(signal: SimpleNamespace) -> list[Limit]:
-            found = []
-            for i, s in enumerate(sections):
-                label = f"drive of {axes[i]}"
-                found.append(
-                    Limit(f"drive_{axes[i]}", label, (axes[i],), units[i], signal.drive[i], s.low.si, s.high.si)
-                )
-                if state is not None:
-                    label = f"amplifier output of {axes[i]}"
-                    found.append(
-                        Limit(f"output_{axes[i]}", label, (axes[i],), units[i], signal.state[i], s.low.si, s.high.si)
-                    )
-                label, reach = f"travel of {axes[i]}", s.travel.si
-                found.append(Limit(f"travel_{axes[i]}", label, (axes[i],), "um", signal.displacement[i], -reach, reach))
-            for k, e in enumerate(device.placed_elements):
-                most = getattr(e.section, "rotation_limit", None)
-                if most is not None:
-                    angle = ca.fabs(ca.mtimes(self.rotation(k), signal.mechanism_displacement))
-                    found.append(
-                        Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si)
-                    )
-            for material, limit in stressed.items():
-                names, stress = self.stress(material, signal.mechanism_displacement, 1e-9 * limit.si)
-                found.append(Limit(f"stress_{material}", f"stress of {material}", names, "MPa", stress, None, limit.si))
-            return found
-
-        channels = device.output.channels
-        turn = [c.startswith("theta") for c in channels]
-        force_scale = float(max(abs(s.gain.si) * size for s, size in zip(sections, sizes, strict=True)))
-        return BalancedPhysics(
-            axes=axes, components=channels, pose_units=tuple("urad" if t else "um" for t in turn), pose_scale=device.channel_scale,
-            drive=drive, state=state, rest=(0.0,) * (n if lagging else 0), displacement_scale=travel, force_scale=force_scale,
-            force_unit=force_unit, bipolar=any(s.low.si < 0 for s in sections),
-            rates=(lambda x, u: (u - x) / ca.vertcat(*lags)) if lagging else (lambda x, u: ca.SX(0, 1)),
-            force=lambda u, x, d: gain * (x if lagging else u),
-            restoring_force=lambda d: ca.mtimes(K, d) + stack * d,
-            pose=lambda d: ca.mtimes(J, d), limits=limits,
-            rate_limits=tuple(
-                rate_limit(drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
-                for i, s in enumerate(sections) if s.rate is not None
-            ),
-        )  # fmt: skip
 
 
 def _right_handed(frame: Matrix) -> Matrix:
@@ -270,99 +345,3 @@ REFLECTED = ca.diag(ca.DM([-1, -1, 1, 1, 1, -1]))  # of a twist seen in the x-y 
 
 def _unit(direction: Direction) -> Matrix:
     return ca.DM(np.array(direction) / np.linalg.norm(direction))
-
-
-def freedoms(device: Drawing) -> tuple[int, int]:
-    """(degrees of freedom, times over-constrained) of the mechanism without its actuators.
-
-    Each flexure holds its stiff directions ideally, a blade three and a wire one: c rows A of relative twists of all bodies,
-    6 n - rank(A) and c - rank(A). Source: J. B. Hopkins, M. L. Culpepper, Precis. Eng. 34 (2010) 259 (ideal constraints).
-    """
-    c = Condensed(device, device.values())
-    count, rows = len(device.bodies), []
-    turn = np.array([device.size] * 3 + [1.0] * 3)  # twists (theta; delta) as displacements, wrenches (M; F) as forces
-    swap = [3, 4, 5, 0, 1, 2]
-    yields = [turn[:, None] * ca.DM(ca.evalf(ca.SX(C))).full()[:, swap] * turn for C in c.compliances]
-    largest = max(float(np.linalg.eigvalsh((C + C.T) / 2).max()) for C in yields)
-    for k, e in enumerate(device.placed_elements):
-        pivot = c.ends[k] - e.section.pivot(c.p.element[e.index]) * c.frames[k][:, 0]
-        local = inverse_adjoint(c.frames[k], pivot)  # twist in the element's frame
-        own = e.section.constrained(yields[k], largest) * turn
-        A = np.zeros((len(own), 6 * count))
-        held = own @ ca.DM(ca.evalf(ca.SX(local))).full()
-        for body, sign in ((e.second, 1), (e.first, -1)):
-            if body != GROUND:
-                A[:, 6 * body : 6 * body + 6] = sign * held
-        rows.append(A)
-    A = np.vstack(rows) * np.tile([1 / device.size] * 3 + [1.0] * 3, count)
-    A /= np.linalg.norm(A, axis=1, keepdims=True)
-    rank = int(np.linalg.matrix_rank(A, tol=INDEPENDENT))
-    return 6 * count - rank, len(A) - rank
-
-
-def natural_frequencies(device: Drawing) -> np.ndarray:
-    """The natural frequencies [Hz] with the drives held, ascending; empty where no body has a mass.
-
-    K v = w^2 M v of all bodies, those without mass condensed first (which is exact): a stack counts with its stiffness, a force
-    without one leaves its axis free, a prescribed displacement holds it.
-    """
-    c, p = Condensed(device, device.values()), device.values()
-    count = len(device.bodies)
-    K, M = np.zeros((6 * count, 6 * count)), np.zeros((6 * count, 6 * count))
-    swap = np.r_[3:6, 0:3]  # a wrench as (moment; force) beside a twist: the stiffness is then symmetric
-    for e in c.held_elements():
-        k = ca.DM(ca.evalf(ca.SX(e.stiffness))).full()[swap]
-        for i, j, sign in (
-            (e.first, e.first, 1),
-            (e.second, e.second, 1),
-            (e.first, e.second, -1),
-            (e.second, e.first, -1),
-        ):
-            if GROUND not in (i, j):
-                K[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += sign * k
-    heavy: list[int] = []
-    for number, placed in enumerate(device.placed_bodies):
-        own = p.body[placed.index]
-        if own.mass is None:
-            continue
-        R = np.array(placed.turn)
-        r = R @ np.array((0.0, 0.0, 0.0) if own.centre is None else own.centre)
-        S = np.array(ca.DM(ca.skew(ca.DM(r))))
-        about = R @ np.diag(own.inertia) @ R.T - own.mass * S @ S
-        at = slice(6 * number, 6 * number + 6)
-        M[at, at] = np.block([[about, own.mass * S], [-own.mass * S, own.mass * np.eye(3)]])
-        heavy += range(at.start, at.stop)
-    if not heavy:
-        return np.zeros(0)
-    scale = np.tile([1 / device.size] * 3 + [1.0] * 3, count)  # turns in displacements at the mechanism's size
-    K, M = K * np.outer(scale, scale), M * np.outer(scale, scale)
-    light = [i for i in range(6 * count) if i not in heavy]
-    K_h = K[np.ix_(heavy, heavy)] - K[np.ix_(heavy, light)] @ np.linalg.solve(
-        K[np.ix_(light, light)], K[np.ix_(light, heavy)]
-    )
-    squares = eigh((K_h + K_h.T) / 2, M[np.ix_(heavy, heavy)], eigvals_only=True)
-    return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
-
-
-def summary(device: Drawing) -> list[str]:
-    """What `ctrlgen check` prints of a mechanism: its parts, and how stiff it is at the output point."""
-    c = Condensed(device, device.values())
-    C = ca.DM(ca.evalf(ca.SX(c.output_compliance))).full()
-    lines = [
-        f"{len(device.bodies)} bodies, {len(device.placed_elements)} flexures, {len(device.placed_actuators)} actuators"
-    ]
-    free, over = freedoms(device)
-    lines.append(f"degrees of freedom without actuators: {free}; redundant constraints: {over}")
-    forces = ", ".join(f"{name} {show(1 / C[3 + i, i], 'N/um')}" for i, name in enumerate("xyz"))
-    moments = ", ".join(f"{name} {show(1 / C[i, 3 + i], 'N*m/rad')}" for i, name in enumerate("xyz"))
-    lines.append(f"stiffness at the output point: {forces}; about {moments}")
-    if len(modes := natural_frequencies(device)):
-        lines.append(f"natural frequencies with the drives held: {', '.join(show(f, 'Hz') for f in modes[:6])}")
-    J = ca.DM(ca.evalf(ca.SX(c.jacobian))).full()
-    for channel, row in zip(device.output.channels, J, strict=True):
-        unit = "urad/um" if channel.startswith("theta") else "um/um"
-        parts = ", ".join(
-            f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
-        )
-        lines.append(f"{channel}: {parts or 'not moved'}")
-    return lines

@@ -24,7 +24,8 @@ PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
 TWICE_PRINTED = (ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX)  # their operands appear twice in C
 _FORMULA = {
     ca.OP_ADD: "{0} + {1}", ca.OP_SUB: "{0} - {1}", ca.OP_MUL: "{0} * {1}", ca.OP_DIV: "{0} / {1}", ca.OP_NEG: "-{0}", ca.OP_SQ: "{0}^2",
-    ca.OP_TWICE: "2 * {0}", ca.OP_INV: "1 / {0}", ca.OP_ASSIGN: "{0}", ca.OP_SQRT: "sqrt({0})", ca.OP_EXP: "exp({0})", ca.OP_LOG: "log({0})",
+    ca.OP_TWICE: "2 * {0}", ca.OP_INV: "1 / {0}", ca.OP_ASSIGN: "{0}", ca.OP_SQRT: "sqrt({0})",
+    ca.OP_EXP: "exp({0})", ca.OP_LOG: "log({0})",
     ca.OP_SIN: "sin({0})", ca.OP_COS: "cos({0})", ca.OP_TAN: "tan({0})", ca.OP_ASIN: "asin({0})", ca.OP_ATAN: "atan({0})",
     ca.OP_POW: "{0}^{1}", ca.OP_CONSTPOW: "{0}^{1}", ca.OP_TANH: "tanh({0})",
 }  # fmt: skip

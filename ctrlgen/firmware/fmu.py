@@ -25,8 +25,8 @@ from ctrlgen.core.units import base_unit, exponents, from_si
 from ctrlgen.firmware.fmi_calls import FOREIGN_TYPES, REFUSED_2, REFUSED_3
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.plant import Plant, plant_of, write_plant
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.player_only import check_online
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.firmware.toolchains import compile_c, find_compilers
 from ctrlgen.model.motion_feedforward import controller_of

@@ -21,8 +21,8 @@ from ctrlgen.firmware.misra import CPPCHECK
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.package import PIECES, owners, write_package
 from ctrlgen.firmware.player import player_context
-from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.player_only import check_online
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.vectors import played_vectors, vectors
 from ctrlgen.model.model import Model

@@ -103,7 +103,7 @@ def _assemble(
     z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n if inertial else 0), ca.SX.sym("a", n if inertial else 0)
     velocity = physics.drive.expr[n : 2 * n] if isinstance(physics, ImposedPhysics) else v
     terms = EffectTerms(device, physics, values, z, velocity, a, ambient, sample_time, per_record)
-    faults = mounting_faults(device.sensor, physics.components, physics.pose_units) + terms.faults
+    faults = mounting_faults(device.sensor, *physics.readings[:2]) + terms.faults
     if faults:
         raise InputError(device.name, faults)
     join: dict[type, Callable[..., Any]] = {
@@ -116,7 +116,7 @@ def _assemble(
     state, memories = physics.state, terms.memories()
     own_x = NONE if state is None else state.expr
     first = own_x.numel()  # place in x of the effects' states
-    acceleration = parts.balance / ca.vertcat(*physics.mass) if isinstance(physics, InertialPhysics) else NONE
+    acceleration = _acceleration(physics.mass, parts.balance) if isinstance(physics, InertialPhysics) else NONE
     memory_rates = ca.vertcat(NONE, *(m.rates[s.name] for m, s, _ in memories))
     rates = ca.vertcat(parts.rates, memory_rates, acceleration)
 
@@ -247,6 +247,11 @@ def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) 
     return Assembly(signals, rates, balance, heat, produced, held, command, force - damping)
 
 
+def _acceleration(mass: tuple[float | ca.SX, ...] | ca.SX | ca.DM, force: ca.SX) -> ca.SX:
+    """(n_axes,) what a `force` (n_axes,) gives masses, or a matrix of them that axes share."""
+    return force / ca.vertcat(*mass) if isinstance(mass, tuple) else ca.mtimes(ca.inv(mass), force)
+
+
 def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
     """Motion imposed, force read: the displacements are the first components of the drive.
 
@@ -273,23 +278,24 @@ def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Assembly:
 
 
 def _carried(physics: DevicePhysics, terms: EffectTerms, z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """What follows the stages' displacement: that of the mechanism, the platform's pose and the reading, with effects."""
+    """What follows the stages' displacement: that of the mechanism, the platform's pose and the readings, with effects."""
     displacement = terms.added(Place.DISPLACEMENT, z)
     pose = terms.added(Place.POSE, physics.pose(displacement))
-    return displacement, pose, terms.added(Place.SENSOR, pose)
+    seen = pose if physics.sensed is None else ca.vertcat(pose, physics.sensed.at(displacement))
+    return displacement, pose, terms.added(Place.SENSOR, seen)
 
 
 def _mechanical(
     physics: DevicePhysics, force: ca.SX, displacement: ca.SX, pose: ca.SX, reading: ca.SX
 ) -> dict[str, Signal]:
     axes, n = physics.axes, len(physics.axes)
-    at_platform, travel = (physics.components, physics.pose_units), (physics.displacement_scale,) * n
+    (channels, reading_units, reading_scale), travel = physics.readings, (physics.displacement_scale,) * n
     units, sizes, lengths = (physics.force_unit,) * n, (physics.force_scale,) * n, (physics.travel_unit,) * n
     return {
         "force": Signal("force", "actuator force", axes, units, "F_", force, sizes),
         "displacement": Signal("displacement", "stage displacement", axes, lengths, "d_", displacement, travel),
-        "pose": Signal("pose", "platform pose", *at_platform, "", pose, physics.pose_scale),
-        "reading": Signal("reading", "sensor reading", *at_platform, "reading_", reading, physics.pose_scale),
+        "pose": Signal("pose", "platform pose", physics.components, physics.pose_units, "", pose, physics.pose_scale),
+        "reading": Signal("reading", "sensor reading", channels, reading_units, "reading_", reading, reading_scale),
     }
 
 

@@ -197,7 +197,9 @@ def channels(physics: DevicePhysics, place: Place) -> list[Channel]:
     """The channels on which an effect of `place` can act."""
     feedback = physics.feedback if isinstance(physics, InertialPhysics) else None
     rows: Iterable[tuple[str, str, float]]
-    if place in (Place.POSE, Place.SENSOR):
+    if place is Place.SENSOR:
+        rows = zip(*physics.readings, strict=True)
+    elif place is Place.POSE:
         rows = zip(physics.components, physics.pose_units, physics.pose_scale, strict=True)
     elif place is Place.DRIVE and feedback is not None:  # u is the loop's reference, the amplifier's drive its command
         rows = ((axis, feedback.command.unit, feedback.command.scale) for axis in physics.axes)

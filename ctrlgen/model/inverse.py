@@ -97,7 +97,7 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
     # The later kernels take the earlier results as arguments, because the controller limits them in between.
     later = solve_by_blocks(known, ca.vertcat(balance, motion, heating), ca.vertcat(x_1, u_1, heat))
     wanted_state, memory = later[:n_s], later[n_s : x.numel()]
-    drive_of_state = ca.substitute(ca.vertcat(motion[:n_s], heating), x_1[n_s:], memory)
+    drive_of_state = ca.substitute(ca.vertcat(motion[:n_s], heating), x_1[n_s:, :], memory)
     wanted_u = (
         solve_by_blocks(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
     )

@@ -55,17 +55,19 @@ def mechanism_figure(device: Mechanism) -> Figure:
                 joints[number].append(point)
     joints[device.bodies.index(device.output.body)].append(output)
     for pushed, direction in zip(device.placed_actuators, c.directions, strict=True):
-        k = (
-            next((k for k, e in enumerate(device.placed_elements) if e.name == c.moved(pushed)), None)
-            if not c.pushes
-            else None
-        )
-        tip = free[k] if k is not None else np.array(ca.DM(ca.evalf(ca.SX(c.point(pushed))))).ravel() * MM
-        arrow = 3 * SHORT * extent * np.array(ca.DM(direction)).ravel()
+        tip = np.array(ca.DM(ca.evalf(ca.SX(c.point(pushed))))).ravel() * MM if c.pushes else free[c.element_of(pushed)]
+        arrow = 3 * SHORT * extent * np.array(ca.DM(ca.evalf(ca.SX(direction)))).ravel()
         ax.quiver(*(tip - arrow), *arrow, color=COLOURS[2], lw=2, arrow_length_ratio=0.35)
         ax.text(*(tip - arrow), pushed.name, fontsize=8, color=COLOURS[2], fontweight="bold")
-        if k is None and pushed.second != GROUND:
+        if c.pushes and pushed.second != GROUND:
             joints[pushed.second].append(tip)
+    for r in device.placed_readings:
+        if r.section.at is not None:  # a rotation is read anywhere on its body
+            seen = np.array(ca.DM(ca.mtimes(r.turn, ca.DM([x.si for x in r.section.at])))).ravel() * MM
+            ax.scatter(*seen, marker="o", facecolors="none", edgecolors=COLOURS[3], s=40)
+            ax.text(*seen, f" {r.name}", fontsize=7, color=COLOURS[3])
+            if r.second != GROUND:
+                joints[r.second].append(seen)
     for name, points in zip(device.bodies, joints, strict=True):
         middle = np.mean(points, axis=0)
         for point in points:

@@ -16,7 +16,7 @@ from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mechanism import Mechanism
-from ctrlgen.devices.mechanism_model import summary
+from ctrlgen.devices.mechanism_dynamics import summary
 from ctrlgen.devices.sensor import describe
 from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model

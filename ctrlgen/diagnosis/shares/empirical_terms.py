@@ -61,7 +61,7 @@ def empirical_terms(fitter: Fitter, fit: Fit, shares: ResidualShares | None) -> 
         return ()
     terms: list[EmpiricalTerm] = []
     signals = [gather(fitter, fit, record)[1] for record in fitter.fit_records]
-    for channel in _worst(fitter, shares.after):
+    for channel in _worst(fitter, fit, shares.after):
         tried: set[tuple[str, str | None]] = set()
         for smoother in _smoothers(fit, shares.after, channel, signals):
             if (smoother.cause.effect, smoother.cause.of) in tried:
@@ -74,10 +74,11 @@ def empirical_terms(fitter: Fitter, fit: Fit, shares: ResidualShares | None) -> 
     return tuple(terms)
 
 
-def _worst(fitter: Fitter, table: SharesTable) -> list[ChannelShares]:
-    """The channels whose residual is more than noise, the largest in noise units first."""
+def _worst(fitter: Fitter, fit: Fit, table: SharesTable) -> list[ChannelShares]:
+    """The channels of the pose, on which the terms act, whose residual is more than noise, the largest in noise units first."""
     floor = dict(zip(fitter.recording.channels, fitter.noise.floor.tolist(), strict=True))
-    size = {c.channel: c.rms / floor[c.channel] for c in table.channels if c.channel.startswith(READING)}
+    pose = {f"{READING}{name}" for name in nominal_physics(fit.structure.device).components}
+    size = {c.channel: c.rms / floor[c.channel] for c in table.channels if c.channel in pose}
     far = [c for c in table.channels if size.get(c.channel, 0.0) > SHARES.more_than_noise]
     return sorted(far, key=lambda c: -size[c.channel])[: SHARES.empirical_channels]
 

@@ -1,0 +1,125 @@
+"""Readings of a mechanism beside those of its output: where a sensor stands on a body, in recordings and their diagnosis."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from command_line import ctrlgen as run_command
+from conftest import DEVICE
+from test_mechanism import PARALLELOGRAM, dm, loaded, with_values
+from test_mechanism_springs import chain
+
+import ctrlgen
+from ctrlgen import InputError, build_model, run
+from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.model.simulation import simulate
+
+TILT = '[[reading]]\nname = "tilt"\nbody = "stage"\nabout = [0, 0, 1]\n'
+EDGE = '[[reading]]\nname = "edge"\nbody = "stage"\nat = ["0 mm", "15 mm", "0 mm"]\nalong = [2, 0, 0]\n'
+
+TURNING = PARALLELOGRAM.replace(
+    'at = ["0 mm", "-10 mm", "0 mm"]', 'at = ["0 mm", "0 mm", "0 mm"]'
+)  # pushed 10 mm too high
+
+
+def read(model, drive: float) -> dict[str, float]:
+    """Readings at rest."""
+    trace = simulate(model, np.array([[drive]]), 1.0)
+    names = model.signals["reading"].channels
+    return dict(zip(names, trace.signals["reading"][-1], strict=True))
+
+
+def test_a_point_above_the_output_moves_by_the_turn_of_the_body_more(tmp_path):
+    """Pushed 10 mm too high the stage turns; the edge 15 mm above the output moves by 15 mm of that turn less (x = -theta y)."""
+    text = TURNING + TILT + EDGE
+    seen = read(build_model(loaded(tmp_path, text)), 0.1)
+    assert abs(seen["tilt"]) > 1e-8
+    assert seen["edge"] == pytest.approx(seen["delta_x"] - 15e-3 * seen["tilt"], rel=1e-9)
+
+
+def test_a_sensor_between_two_bodies_reads_their_difference(tmp_path):
+    """The stretch of k_b, F/k_b, with the cubic spring beside body a."""
+    gap = '[[reading]]\nname = "gap"\nbody = "b"\nagainst = "a"\nat = ["5 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]\n'
+    device = loaded(tmp_path, chain('F_x_per_delta_x3 = "1e-3 N/um^3"') + gap)
+    assert read(build_model(device), 40.0)["gap"] == pytest.approx(40.0 * 0.2e-6, rel=1e-9)
+
+
+def test_copies_of_a_reading_go_round_and_to_the_mirror_with_their_pattern(tmp_path):
+    text = (DEVICE.parent / "tip_tilt_mirror.toml").read_text()
+    probe = '[[reading]]\nname = "probe"\npattern = "leg"\nbody = "mirror"\nat = ["12 mm", "0 mm", "0 mm"]\nalong = [0, 0, 1]\n'
+    device = loaded(tmp_path, text + probe)
+    c = Condensed(*with_values(device))
+    motion = dm(c.output_motion)
+    angles = np.radians([0, 120, 240])
+    wanted = motion[5] + 12e-3 * (np.sin(angles)[:, None] * motion[0] - np.cos(angles)[:, None] * motion[1])
+    assert dm(c.reading_motion) == pytest.approx(wanted, abs=1e-12)
+    assert build_model(device).signals["reading"].channels[-3:] == ("probe_1", "probe_2", "probe_3")
+    mirrored = '[[pattern]]\nname = "both"\nmirror = "y"\n'
+    mirrored += '[[reading]]\nname = "tilt"\npattern = "both"\nbody = "mirror"\nabout = [1, 0, 0]\n'
+    rows = dm(Condensed(*with_values(loaded(tmp_path, text + mirrored))).reading_motion)
+    assert rows[1] == pytest.approx(-rows[0], abs=1e-12) and np.abs(rows).max() > 1e-3
+
+
+def test_a_recording_of_a_reading_on_a_body_names_what_the_description_leaves_out(tmp_path):
+    """The edge's sensor alone has a wrong gain: 8 % is planted, in the output nothing."""
+    text = TURNING + EDGE
+    model, rng = build_model(loaded(tmp_path, text)), np.random.default_rng(4)
+    files = []
+    for name in ("fit", "hold_out"):
+        u = 0.4 * np.cumsum(rng.normal(size=600)) / 12
+        u = np.clip(u - u.mean(), -0.6, 0.6)
+        y = simulate(model, u[:, None], 1e-3).signals["reading"][1:]
+        y = y * [1.0, 1.08] + 2e-8 * rng.normal(size=y.shape)
+        table = np.column_stack([np.arange(600) * 1e-3, u, y * 1e6])
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header="t,u,x,edge", comments="")
+        files.append(f'[[record]]\nfile = "{name}.csv"\nrole = "{name}"\ntime = {{ column = "t", unit = "s" }}\n')
+    (tmp_path / "recording.toml").write_text(
+        'title = "t"\ndevice = "m"\nsource = "a test"\nkind = "series"\n' + "".join(files) + "[columns]\n"
+        '"drive.coil" = { column = "u", unit = "A" }\n"reading.delta_x" = { column = "x", unit = "um", noise = "20 nm" }\n'
+        '"reading.edge" = { column = "edge", unit = "um", noise = "20 nm" }\n'
+    )
+    found = ctrlgen.diagnose(
+        tmp_path / "device.toml",
+        tmp_path / "recording.toml",
+        laws=("sensor_gain", "drive_gain", "home_offset", "cubic_sensor"),
+        jobs=0,
+    )
+    assert found.verdict == "explained"
+    assert [(f.effect, f.location) for f in found.findings] == [("sensor_gain", "sensor:edge")]
+    (gain,) = (e.value for e in found.findings[0].parameters.values())
+    assert gain == pytest.approx(0.08, abs=0.002)
+
+
+def test_check_prints_and_draws_the_readings(tmp_path):
+    (tmp_path / "device.toml").write_text(TURNING + EDGE + TILT)
+    said = run_command("check", tmp_path / "device.toml", "--figure", tmp_path / "m.svg")
+    assert said.returncode == 0 and "  tilt: -" in said.stdout and "urad/um per coil" in said.stdout
+    assert "edge" in (tmp_path / "m.svg").read_text()
+
+
+def test_a_sensor_may_stand_on_a_reading_and_c_is_generated_beside_it(tmp_path):
+    sensor = '[[sensor]]\nkind = "displacement"\nat = "edge"\nmodel = "3316"\n'
+    (tmp_path / "device.toml").write_text(PARALLELOGRAM + EDGE + sensor)
+    (tmp_path / "scenario.toml").write_text(
+        'title = "t"\ndevice = "device.toml"\nsample_rate = "1 kHz"\nduration = "20 ms"\n'
+        '[path]\nkind = "line"\nend = { delta_x = "40 um" }\n'
+    )
+    assert run(tmp_path, tmp_path / "out").passed
+
+
+@pytest.mark.parametrize(
+    ("reading", "says"),
+    [
+        (EDGE.replace('"edge"', '"delta_x"'), "reading: 'delta_x' is named twice"),
+        (EDGE.replace('"stage"', '"table"'), "reading[0].body: 'table' is no body"),
+        (EDGE.replace("along = [2, 0, 0]", "along = [0, 0, 0]"), "along: is zero"),
+        (EDGE.replace("along = [2, 0, 0]", "along = [0, 0, 1]"), "no actuator moves what edge reads"),
+        (EDGE.replace("along = [2, 0, 0]", "about = [0, 0, 1]"), "a rotation has no point"),
+        (EDGE + "about = [0, 0, 1]\n", "give either along"),
+        (EDGE + 'pattern = "leg"\n', "reading[0].pattern: 'leg' is no pattern"),
+    ],
+)  # fmt: skip
+def test_a_reading_that_cannot_be_is_refused(tmp_path, reading, says):
+    with pytest.raises(InputError) as caught:
+        loaded(tmp_path, PARALLELOGRAM + reading)
+    assert says in str(caught.value)

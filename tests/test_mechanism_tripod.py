@@ -1,0 +1,45 @@
+"""The shipped tripod: what its stiffness, its inertia and its readings are by hand, and that copies of a leg are alike."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import DEVICE
+from test_mechanism import dm, with_values
+
+from ctrlgen import build_model, load_device
+from ctrlgen.devices.mechanism_dynamics import condensed_modes, freedoms
+from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.model.simulation import simulate
+
+TRIPOD = load_device(DEVICE.parent / "tripod.toml")
+E, NU, L, D, R, R_SPRING, K_SPRING, MASS, INERTIA = 205e9, 0.3, 20e-3, 0.6e-3, 30e-3, 20e-3, 400.0, 0.12, 27e-6
+I = np.pi * D**4 / 64
+ACROSS = 12 * E * I / L**3
+PISTON = 3 * (ACROSS + K_SPRING)
+TILT = 1.5 * (ACROSS * R**2 + 4 * E * I / L + E / (2 * (1 + NU)) * 2 * I / L + K_SPRING * R_SPRING**2)
+
+
+def test_the_tripod_has_the_stiffness_and_the_modes_of_its_wires_and_springs():
+    assert freedoms(TRIPOD) == (3, 0)
+    C = dm(Condensed(*with_values(TRIPOD)).output_compliance)  # twist per (F; M)
+    assert 1 / C[5, 2] == pytest.approx(PISTON, rel=1e-9)
+    assert 1 / C[0, 3] == pytest.approx(TILT, rel=1e-9) and 1 / C[1, 4] == pytest.approx(TILT, rel=1e-9)
+    modes, left_out = condensed_modes(TRIPOD)
+    wanted = np.sqrt([PISTON / MASS, TILT / INERTIA, TILT / INERTIA]) / (2 * np.pi)
+    assert [m.frequency for m in modes] == pytest.approx(wanted, rel=1e-9)
+    assert [m.whole for m in modes] == pytest.approx(wanted, rel=1e-9)  # the platform is rigid: nothing is lost
+    assert left_out is not None and left_out > 10 * wanted[1]
+
+
+def test_the_cubic_springs_carry_as_their_law_says_and_the_gauges_read_the_platform():
+    """Three coils with the same current lift the platform by z: 3 x 6 N/A i = K z + 3 k_3 z^3, after the ringing."""
+    z = 300e-6
+    current = (PISTON * z + 3 * 5e8 * z**3) / 18
+    assert 3 * 5e8 * z**3 > 0.01 * PISTON * z
+    ring = np.full((8000, 3), current)
+    trace = simulate(build_model(TRIPOD), ring, 1e-3)
+    assert trace.signals["pose"][-1, 2] == pytest.approx(z, rel=1e-6)  # e^(-0.01 w 8 s) of the step is left
+    names = build_model(TRIPOD).signals["reading"].channels
+    assert names == ("theta_x", "theta_y", "delta_z", "gauge_1", "gauge_2", "gauge_3")
+    assert trace.signals["reading"][-1, 3:] == pytest.approx(z, rel=1e-6)
