@@ -6,7 +6,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ctrlgen.firmware.cprint import Real, heron_plan, print_function
 from ctrlgen.numerics.interval_arithmetic import bounds
 
 a, b = ca.SX.sym("a"), ca.SX.sym("b")
@@ -30,23 +29,3 @@ def test_every_value_is_between_its_bounds(name, rng):
         assert np.all(values >= low[0] - 1e-12) and np.all(values <= high[0] + 1e-12)
         if name not in ("unknown", "pole"):
             assert np.isfinite([low[0], high[0]]).all()
-
-
-@pytest.mark.parametrize("real", list(Real))
-@pytest.mark.parametrize("ratio", [1.0001, 1.2, 3.0, 10.0])
-def test_a_line_and_a_few_steps_of_heron_give_the_root_in_a_known_range(real, ratio):
-    (start, slope), steps = heron_plan((2.0, 2.0 * ratio), real)
-    number = np.float32 if real is Real.FLOAT else np.float64
-    x = np.linspace(2.0, 2.0 * ratio, 10001).astype(number)
-    y = number(start) + number(slope) * x
-    for _ in range(steps):
-        y = number(0.5) * (y + x / y)
-    assert np.max(np.abs(y.astype(float) / np.sqrt(x.astype(float)) - 1)) < 2 * real.epsilon
-    assert steps <= 4
-
-
-def test_a_range_that_is_wide_or_reaches_zero_needs_the_general_root():
-    assert heron_plan((0.0, 1.0), Real.FLOAT) is None and heron_plan((1e-9, 1e9), Real.DOUBLE) is None
-    f = ca.Function("f", [a], [ca.sqrt(a)], ["a"], ["r"])
-    assert print_function(f, "f", Real.FLOAT, {"a": (np.array([1.0]), np.array([2.0]))}).calls == frozenset()
-    assert print_function(f, "f", Real.FLOAT).calls == {"root"}

@@ -40,7 +40,7 @@ DEVIATIONS = (
     ),
     Deviation(
         "19.2", ("*_online_f??.c", "*_plant_f??.c"),
-        "the unions in root(), exponential() and logarithm(), by which the exponent of a number is halved, set or read",
+        "the unions in square_root(), exponential() and logarithm(), by which the exponent of a number is halved, set or read",
         "C99 defines the result of reading the other member, both members have the same size, and it avoids a library call.",
         "union",
     ),

@@ -431,12 +431,14 @@ static void nearest_displacement(const float beyond[6], float value[6])
     float slope[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
     int sweep;
     int i;
-    int j;
     for (i = 0; i < 6; i++) {
         const float change = value[i] - beyond[i];
-        for (j = 0; j < 6; j++) {
-            slope[j] = slope[j] + (P[i][j] * change);
-        }
+        slope[0] = slope[0] + (P[i][0] * change);
+        slope[1] = slope[1] + (P[i][1] * change);
+        slope[2] = slope[2] + (P[i][2] * change);
+        slope[3] = slope[3] + (P[i][3] * change);
+        slope[4] = slope[4] + (P[i][4] * change);
+        slope[5] = slope[5] + (P[i][5] * change);
     }
     for (sweep = 0; sweep < 3; sweep++) {
         for (i = 0; i < 6; i++) {
@@ -445,25 +447,31 @@ static void nearest_displacement(const float beyond[6], float value[6])
             const float moved = (raised < HIGH[i]) ? raised : HIGH[i];
             const float change = moved - value[i];
             if ((change < 0.0f) || (change > 0.0f)) {
-                for (j = 0; j < 6; j++) {
-                    slope[j] = slope[j] + (P[i][j] * change);
-                }
+                slope[0] = slope[0] + (P[i][0] * change);
+                slope[1] = slope[1] + (P[i][1] * change);
+                slope[2] = slope[2] + (P[i][2] * change);
+                slope[3] = slope[3] + (P[i][3] * change);
+                slope[4] = slope[4] + (P[i][4] * change);
+                slope[5] = slope[5] + (P[i][5] * change);
                 value[i] = moved;
             }
         }
     }
 }
-/* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void settle_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+/* Actuator state (limited) and drives (not limited) that out->displacement needs: at rest with settling, else at the next sample. */
+static void wanted_drives(const mems_hexapod_online_f32_state *state, int settling, mems_hexapod_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
-    wanted_drive(out->state, out->drive);
-    (void)state;
+    if (settling != 0) {
+        wanted_drive(out->state, out->drive);
+    } else {
+        step_drive(state->x, out->state, out->drive);
+    }
 }
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int settle_line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
+static int line_search(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
@@ -473,7 +481,7 @@ static int settle_line_search(const mems_hexapod_online_f32_state *state, const 
         at_target[i] = out->drive[i];
         out->displacement[i] = origin[i];
     }
-    settle_drives(state, out);
+    wanted_drives(state, settling, out);
     if (drives_admissible(out->drive) != 0) {
         float at_start[6];
         float state_at_start[6];
@@ -482,8 +490,6 @@ static int settle_line_search(const mems_hexapod_online_f32_state *state, const 
         int trial;
         for (i = 0; i < 6; i++) {
             at_start[i] = out->drive[i];
-        }
-        for (i = 0; i < 6; i++) {
             state_at_start[i] = out->state[i];
         }
         for (trial = 0; trial < 3; trial++) {
@@ -501,15 +507,13 @@ static int settle_line_search(const mems_hexapod_online_f32_state *state, const 
             for (i = 0; i < 6; i++) {
                 out->displacement[i] = origin[i] + (fraction * direction[i]);
             }
-            settle_drives(state, out);
+            wanted_drives(state, settling, out);
             if (drives_admissible(out->drive) != 0) {
                 accepted = fraction;
                 for (i = 0; i < 6; i++) {
                     at_start[i] = out->drive[i];
-                }
-                for (i = 0; i < 6; i++) {
                     state_at_start[i] = out->state[i];
-                }
+            }
             } else {
                 rejected = fraction;
                 for (i = 0; i < 6; i++) {
@@ -520,83 +524,8 @@ static int settle_line_search(const mems_hexapod_online_f32_state *state, const 
         for (i = 0; i < 6; i++) {
             out->displacement[i] = origin[i] + (accepted * direction[i]);
             out->drive[i] = at_start[i];
-        }
-        for (i = 0; i < 6; i++) {
             out->state[i] = state_at_start[i];
-        }
-    }
-    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
-}
-/* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void step_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
-{
-    wanted_state(out->displacement, out->state);
-    step_drive(state->x, out->state, out->drive);
-}
-
-/* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
- * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int step_line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
-{
-    float direction[6];
-    float at_target[6];
-    int i;
-    for (i = 0; i < 6; i++) {
-        direction[i] = out->displacement[i] - origin[i];
-        at_target[i] = out->drive[i];
-        out->displacement[i] = origin[i];
-    }
-    step_drives(state, out);
-    if (drives_admissible(out->drive) != 0) {
-        float at_start[6];
-        float state_at_start[6];
-        float accepted = 0.0f;
-        float rejected = 1.0f;
-        int trial;
-        for (i = 0; i < 6; i++) {
-            at_start[i] = out->drive[i];
-        }
-        for (i = 0; i < 6; i++) {
-            state_at_start[i] = out->state[i];
-        }
-        for (trial = 0; trial < 3; trial++) {
-            float share = 1.0f;
-            float fraction;
-            for (i = 0; i < 6; i++) {
-                if ((at_target[i] > U_MOST[i]) || (at_target[i] < U_LEAST[i])) {
-                    const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
-                    const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
-                    share = (reached < share) ? reached : share;
                 }
-            }
-            share = (share > 0.0f) ? share : 0.0f;
-            fraction = accepted + ((0.99609375f * share) * (rejected - accepted));
-            for (i = 0; i < 6; i++) {
-                out->displacement[i] = origin[i] + (fraction * direction[i]);
-            }
-            step_drives(state, out);
-            if (drives_admissible(out->drive) != 0) {
-                accepted = fraction;
-                for (i = 0; i < 6; i++) {
-                    at_start[i] = out->drive[i];
-                }
-                for (i = 0; i < 6; i++) {
-                    state_at_start[i] = out->state[i];
-                }
-            } else {
-                rejected = fraction;
-                for (i = 0; i < 6; i++) {
-                    at_target[i] = out->drive[i];
-                }
-            }
-        }
-        for (i = 0; i < 6; i++) {
-            out->displacement[i] = origin[i] + (accepted * direction[i]);
-            out->drive[i] = at_start[i];
-        }
-        for (i = 0; i < 6; i++) {
-            out->state[i] = state_at_start[i];
-        }
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
@@ -632,8 +561,6 @@ static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_onli
     for (i = 0; i < 6; i++) {
         out->drive[i] = U_SAFE[i];
         out->displacement[i] = 0.0f;
-    }
-    for (i = 0; i < 6; i++) {
         out->state[i] = X_REST[i];
     }
     return MEMS_HEXAPOD_ONLINE_F32_LOST;
@@ -676,7 +603,7 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
             static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
-            limited = settle_line_search(state, home, out);
+            limited = line_search(state, 1, home, out);
             status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
@@ -773,7 +700,7 @@ static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_o
         } else if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
-            limited = step_line_search(state, state->z, out);
+            limited = line_search(state, 0, state->z, out);
             status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }
