@@ -95,12 +95,15 @@ class Printer:
         """The laws that the kernels so far call."""
         return "\n".join(self._law_texts.values())
 
-    def _calls(self, arguments: Sequence[str], rows: Sequence[Node]) -> dict[int, Call]:
+    def _calls(self, arguments: Mapping[str, int], rows: Sequence[Node]) -> dict[int, Call]:
         """The laws that rows need, by the number of their node, for every array that may stand for a law's argument."""
         needed, found = {node.number for node in reached(rows)}, dict[int, Call]()
         for law in self.laws:
             names = [name for name in law.function.name_in() if name not in self.numbers]
-            standing = [[a for a in (name, *STANDS_FOR.get(name, ())) if a in arguments] or [name] for name in names]
+            standing = [
+                [a for a in (name, *STANDS_FOR.get(name, ())) if arguments.get(a) == law.function.size1_in(name)] or [name]
+                for name in names
+            ]
             for chosen in product(*standing):
                 renamed = dict(zip(names, chosen, strict=True))
                 nodes = self._graph.rows(law.function, self.ranges, self.numbers, renamed)
@@ -161,7 +164,7 @@ class Printer:
         operation C has no counterpart of.
         """
         rows = self._graph.rows(function, self.ranges, self.numbers)
-        laws = self._calls(function.name_in(), rows)
+        laws = self._calls({a: function.size1_in(a) for a in function.name_in()}, rows)
         body = _Body(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result, laws).run()
         sizes = {a: function.size1_in(a) for a in function.name_in()}
         parts = [(name, about, body.lines)]

@@ -68,6 +68,12 @@ def movable(device: Device) -> tuple[str, ...]:
     return tuple(path for path in paths if path in model.moved_by)
 
 
+def symbolic_model(device: Device) -> Model:
+    """The model of `device` with every number free that is not zero and no count: its numbers as formulas."""
+    paths = [path for path, number in device.quantities() if not number.whole and number.si != 0]
+    return _assemble(device, paths, NO_RISE, sample_time=None, per_record=False)
+
+
 @dataclass(frozen=True)
 class Assembly:
     """The equations of a device with its effects.

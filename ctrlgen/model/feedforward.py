@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.model.allocation import inverse_of
-from ctrlgen.model.assembly import build_model, movable
+from ctrlgen.model.assembly import build_model, symbolic_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Limit, Model, Signal
 from ctrlgen.numerics.interval_arithmetic import bounds
@@ -68,11 +68,9 @@ class Controller:
     def named(self) -> tuple[Inverse, Inverse | None, Model, list[tuple[float, str]]]:
         """The kernels for equilibria and for the next sample with an argument "p" more, their model, and the values of p with their
         paths in the device: the same numbers as those of `static` and `moving`, as formulas of the device's parameters."""
-        device = self.model.device
-        values = dict(device.quantities())
-        paths = [path for path in movable(device) if values[path].si != 0]
-        model = build_model(device, paths)
-        numbers = [(values[path].si, path) for path in paths]
+        model = symbolic_model(self.model.device)
+        paths = [symbol.name() for symbol in ca.vertsplit(model.p)]
+        numbers = list(zip(model.p_nominal.tolist(), paths, strict=True))
         named = {
             own: replace(invert(model, self.follow, time, symbolic=True), displacement=own.displacement)  # of matrices inverted as here
             for own, time in ((self.static, None), (self.moving, self.sample_time)) if own is not None
