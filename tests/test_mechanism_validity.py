@@ -58,9 +58,10 @@ def test_the_force_of_a_blade_is_linear_to_one_percent_up_to_a_tenth_of_its_leng
     assert 0.04 < off[0.214] < 0.06
 
 
-@pytest.mark.parametrize(("ratio", "within"), [(0.05, 0.03), (0.15, 0.06), (0.3, 0.1)])
-def test_a_notch_turns_stretches_and_bends_as_in_finite_elements(tmp_path, ratio, within):
-    """The equations that S2's table chooses at this t/R, against plane stress with R, b and E of one; the bounds are S2's own errors."""
+@pytest.mark.parametrize("ratio", [0.05, 0.15, 0.3, 0.5])
+def test_a_notch_turns_stretches_and_bends_as_in_finite_elements(tmp_path, ratio):
+    """The equations that S2's table chooses at this t/R, against plane stress with R, b and E of one: within 3 % where it bends,
+    which are S2's own errors, and 6 % where it stretches."""
     pytest.importorskip("skfem", reason="the finite-element hinge needs scikit-fem")
     from ctrlgen.physics.reference_models import hinge_fem as fem
 
@@ -71,9 +72,10 @@ def test_a_notch_turns_stretches_and_bends_as_in_finite_elements(tmp_path, ratio
     R, b = 2e-3, 8e-3
     plane = fem.compliance(fem.Notch(ratio, 0.28))
     turn, across = C[2, 5] * E * b * R**2, C[4, 1] * E * b
-    assert turn == pytest.approx(plane[2, 2], rel=within)
-    assert C[4, 5] * E * b * R == pytest.approx(plane[1, 2], rel=within)
-    assert across == pytest.approx(plane[1, 1], rel=within)
+    assert turn == pytest.approx(plane[2, 2], rel=0.03)
+    assert C[4, 5] * E * b * R == pytest.approx(plane[1, 2], rel=0.03)
+    assert across == pytest.approx(plane[1, 1], rel=0.03)
+    assert C[3, 0] * E * b == pytest.approx(plane[0, 0], rel=0.06)
 
 
 def many(count: int) -> str:
