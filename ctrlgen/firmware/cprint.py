@@ -101,7 +101,7 @@ class Printer:
         for law in self.laws:
             names = [name for name in law.function.name_in() if name not in self.numbers]
             standing = [
-                [a for a in (name, *STANDS_FOR.get(name, ())) if arguments.get(a) == law.function.size1_in(name)] or [name]
+                [a for a in (name, *STANDS_FOR.get(name, ())) if arguments.get(a) == law.function.numel_in(name)] or [name]
                 for name in names
             ]
             for chosen in product(*standing):
@@ -164,7 +164,7 @@ class Printer:
         operation C has no counterpart of.
         """
         rows = self._graph.rows(function, self.ranges, self.numbers)
-        laws = self._calls({a: function.size1_in(a) for a in function.name_in()}, rows)
+        laws = self._calls({a: function.numel_in(a) for a in function.name_in()}, rows)
         body = _Body(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result, laws).run()
         sizes = {a: function.size1_in(a) for a in function.name_in()}
         parts = [(name, about, body.lines)]
