@@ -143,6 +143,7 @@ def controller_of(device: Device) -> Scripted:
         SimpleNamespace(laws=()),
         [],
     )
+    controller.__dict__["newton_steps"] = NEWTON_STEPS
     guarded = device.composite != "none"
     controller.__dict__.update(
         nominal=nominal, rounds=device.rounds, state_can_be_limited=device.states and device.limited,

@@ -15,7 +15,6 @@ from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment
 from ctrlgen.model.feedforward import FAR, SECANT_FRACTION, SECANT_STEPS, SWEEPS, Controller
-from ctrlgen.model.inverse import NEWTON_STEPS
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.trajectory.scenario import Scenario
@@ -61,7 +60,8 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             part: printed.kernel(kernel, ("motion", part), (f"motion_{part}",))
             for part, kernel in controller.motion.items()
         }
-    balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=("z", NEWTON_STEPS))
+    iterated = ("z", controller.newton_steps) if controller.newton_steps > 1 else None
+    balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=iterated)
     shares = bound = None
     if controller.guarded_limits:
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
@@ -122,7 +122,7 @@ class _Kernels:
         returned: bool = False,
     ) -> Kernel:
         """`function` as C, named by the first of `names` that no other body has."""
-        may_be_result = ["x"] if what[-1] == "advance" else []
+        may_be_result = {"advance": ["x"], "balance": ["z"]}.get(what if what == "balance" else what[-1], [])
         taken = {kernel.name for kernel in self._by_body.values()}
         kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps, returned)
         if kernel.body not in self._by_body and kernel.name in taken:
@@ -162,8 +162,9 @@ def kernel_comments(controller: Controller) -> dict[Any, str]:
     state, within = m.signals.get("state"), f"one sample of {controller.sample_time} s"
     holds = f"the {state.label}s `state`" if state and m.n_states else "the displacement `wanted`"
     states = ", ".join(f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True))
+    steps = "the step" if controller.newton_steps == 1 else f"{controller.newton_steps} Newton steps"
     found: dict[Any, str] = {
-        "balance": f"Displacement at which the forces balance, g(x, z, drive) = 0: {NEWTON_STEPS} Newton steps z - g/(dg/dz) from z.",
+        "balance": f"Displacement at which the forces balance, g(x, z, drive) = 0: {steps} z - g/(dg/dz) from z.",
         "shares": f"The square of each {', '.join(limit.label for limit in controller.guarded_limits)} over its limit at displacement "
         "`wanted`.",
         "bound": "A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept.",

@@ -16,7 +16,7 @@ import numpy as np
 
 from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model, symbolic_model
-from ctrlgen.model.inverse import Inverse, invert
+from ctrlgen.model.inverse import NEWTON_STEPS, Inverse, invert
 from ctrlgen.model.model import Limit, Model, Signal
 from ctrlgen.numerics.interval_arithmetic import bounds
 
@@ -76,6 +76,12 @@ class Controller:
             for own, time in ((self.static, None), (self.moving, self.sample_time)) if own is not None
         }  # fmt: skip
         return named[self.static], None if self.moving is None else named[self.moving], model, numbers
+
+    @cached_property
+    def newton_steps(self) -> int:
+        """Steps to the displacement that balances the forces: one where the balance is linear in it."""
+        m = self.nominal
+        return NEWTON_STEPS if ca.depends_on(ca.jacobian(m.balance, m.z), m.z) else 1
 
     @cached_property
     def nominal(self) -> Model:
