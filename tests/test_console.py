@@ -39,3 +39,11 @@ def test_a_table_in_a_log_wraps_at_its_width(capsys):
     printed = capsys.readouterr().out
     assert len(re.findall("words", printed)) == 20
     assert max(map(len, printed.splitlines())) <= 110
+
+
+def test_a_warning_is_shown_once_by_each_command(capsys):
+    for _ in range(2):
+        show = console.shows_warnings()
+        for text in ("a", "b", "a"):
+            show(UserWarning(text), UserWarning, "file.py", 3)
+        assert capsys.readouterr().err.split() == ["warning:", "a", "warning:", "b"]

@@ -174,6 +174,25 @@ def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):
     assert np.linalg.norm(2 * s) > 0.1
 
 
+def test_a_rate_is_kept_where_the_closed_form_breaks_only_another_limit(tmp_path):
+    """Free drives would change slowly enough, but b would go below zero, and without it a changes faster."""
+    timing = 'sample_rate = "1 kHz"\nduration = "0.1 s"\n'
+    path = circle(10)
+    R = np.diag(RANGE)
+    scenario, model = loaded(tmp_path, stage(), path, timing)
+    wanted = forces(np.roll(scenario.command(model), -1, axis=0))
+    steps = [
+        np.abs(u - np.roll(u, 1, axis=0))[:, 0].max()
+        for u in (wanted @ (R @ np.linalg.pinv(B @ R)).T, solve(scenario, model).drive)
+    ]
+    assert steps[0] < 0.95 * steps[1]
+    rate = (steps[0] + steps[1]) / 2 / 1e-3
+    kept = solve(*loaded(tmp_path, stage(drive_rate={"a": f"{rate} V/s"}), path, timing)).drive
+    assert np.abs(kept - np.roll(kept, 1, axis=0))[:, 0].max() <= rate * 1e-3 * (1 + 1e-7)
+    assert np.all(kept >= LOW) and np.all(kept <= HIGH)
+    assert np.allclose(kept @ B.T, wanted, rtol=0, atol=1e-8)
+
+
 def test_with_inertia_the_held_drives_have_the_least_effort_within_the_limits(tmp_path):
     timing = 'sample_rate = "5 kHz"\nduration = "0.05 s"\n'
     path = 'kind = "line"\nstart = { x = "-12 um", y = "5 um" }\nend = { x = "14 um", y = "-3 um" }\n'

@@ -17,7 +17,7 @@ import numpy as np
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.model import Model, Signal
 from ctrlgen.trajectory.motion import Command, samples_of, scaled
-from ctrlgen.trajectory.path_inverse import PERIODS, InverseTrajectory
+from ctrlgen.trajectory.path_inverse import PERIODS
 
 SHARES = 2.0 ** -np.arange(7, -1, -1)  # of the way to the end of an admissible range, where a shift is tried
 HALVINGS = 9  # of an interval: a shift or a scale to a five-hundredth
@@ -52,8 +52,8 @@ class Inverse(Protocol):
     def without_memories(self) -> Inverse:
         """The same of the device without the effects that have memories."""
 
-    def trajectory(self, command: Any, closed: bool) -> InverseTrajectory:
-        """What a path takes."""
+    def displacements(self, command: Any, closed: bool) -> np.ndarray:
+        """z (n, n_axes) along a path."""
 
     def keeps_limits(
         self, command: Any, closed: bool, chosen: np.ndarray | None = None, margin: float = 0.0, periods: int = PERIODS
@@ -81,7 +81,7 @@ class Alternatives:
         self.confirming, self.inverse = inverse, inverse.without_memories
         self.signal, self.command, self.closed, self.slowed = signal, command, closed, slowed
         self.scale = np.array(signal.scale)
-        z = self.inverse.trajectory(command, closed).z
+        z = self.inverse.displacements(command, closed)
         extreme = np.concatenate([z.argmin(axis=0), z.argmax(axis=0), np.array(worst)]) / len(command)
         self.places = np.concatenate(
             [np.linspace(0, 1, LOOKED_AT), extreme]
@@ -215,7 +215,7 @@ class Alternatives:
 
     def _room(self, command: Command) -> tuple[np.ndarray, np.ndarray]:
         """By how much each displacement must at least and may at most be moved to be in range at every sample."""
-        z = self.inverse.trajectory(command, self.closed).z
+        z = self.inverse.displacements(command, self.closed)
         low, high = self.inverse.model.z_bounds
         inside = (INSIDE + self.margin) * np.where(np.isfinite(high - low), high - low, 0.0)
         return low + inside - z.min(axis=0), high - inside - z.max(axis=0)

@@ -93,6 +93,10 @@ class InertialInverse:
         m = self.model
         return tuple(i for i in self.dynamics.internal if m.n_states <= i < m.x.numel() - m.v.numel())
 
+    def displacements(self, command: Command, closed: bool) -> np.ndarray:
+        """z (n, n_axes) along a motion."""
+        return self.trajectory(command, closed).z
+
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x (n_x,), z (n_axes,) and u (n_u,) of the equilibrium at `target` (channels,); not finite where there is none."""
         still = Motion(target[None], np.zeros((self.dynamics.order, 1, len(target))))

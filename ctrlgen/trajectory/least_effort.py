@@ -2,22 +2,24 @@
 
 The inverse of the device with one force for each axis (`ctrlgen.model.allocation`) gives the forces f_k that a path takes; the drives are
 
-    minimise    sum_k sum_i w_i (u_k,i / r_i)^2  +  PENALTY sum of what is beyond a limit, in shares of its range
+    minimise    sum_k sum_i w_i (u_k,i / r_i)^2
     subject to  B_k u_k = f_k,    low <= u_k <= high,    low rate <= (u_k - u_k-1) / T <= high rate.
 
-Where the closed form keeps the limits it is the answer. Else this convex quadratic programme is solved by IPOPT: the penalty is exact
-(R. Fletcher, Practical Methods of Optimization, 2nd ed. (1987), section 12.3), so a limit is broken only where no drives keep all of them,
-and then by the least amount, which is what an explanation names.
+Where the closed form keeps the limits it is the answer. Else a linear programme says whether any drives keep them: if so IPOPT finds
+those of least effort, a convex quadratic programme; if not, its drives break the limits by the least sum, in shares of their ranges,
+which is what an explanation names.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
 import casadi as ca
 import numpy as np
+import scipy.sparse as sp
+from scipy.optimize import linprog
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.model.allocation import INDEPENDENT, Allocation, allocate, effort_weights
@@ -28,11 +30,9 @@ from ctrlgen.trajectory.path_inverse import PERIODS, InverseTrajectory, PathInve
 from ctrlgen.trajectory.sampled_inverse import SampledTrajectory
 from ctrlgen.trajectory.violations import NEGLIGIBLE, violations
 
-PENALTY = 1e4  # of a limit broken by its whole range; the effort of a drive at full range is 1 times its weight
-TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error
+TOLERANCE = 1e-10  # of a share: IPOPT's of the optimality error, the linear programme's of each row
 MOST_ITERATIONS = 200
 NEAR = 1e-6  # ranges from a limit within which a drive is at it
-FREE = 1e3  # ranges: a bound where there is none
 
 
 class LeastEffortInverse:
@@ -75,6 +75,10 @@ class LeastEffortInverse:
         begin = InverseTrajectory(found.x, found.z, forces, forces[0], True)
         return self._allocated(begin, command.position[0], closed)
 
+    def displacements(self, command: Command, closed: bool) -> np.ndarray:
+        """z (n, n_axes) along a path, whatever the drives."""
+        return self._forces(command, closed, PERIODS).z
+
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x, z and u of the equilibrium at `target`; not finite where there is none."""
         x, z, f = self.inner.at_rest(target)
@@ -96,7 +100,7 @@ class LeastEffortInverse:
         those `chosen`."""
         if self.model.rate_limits or self._facets is None:
             found = self._forces(command, closed, periods)
-            found = self._allocated(found, samples_of(command)[0], closed, margin)
+            found = self._allocated(found, samples_of(command)[0], closed, margin, best=False)
             return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
         if isinstance(command, np.ndarray) and isinstance(self.inner, PathInverse) and not self.inner.remembers:
             x, z, f = self.inner.equilibria(command if chosen is None else command[chosen])
@@ -109,25 +113,28 @@ class LeastEffortInverse:
         return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
 
     def _allocated(
-        self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0
+        self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0, best: bool = True
     ) -> InverseTrajectory:
         """`found` with drives instead of forces."""
         if not np.all(np.isfinite(found.u)):
             u = np.full((len(found.u), self.model.u.numel()), np.nan)
             return replace(found, u=u, u_start=u[0])
         if self.sample_time is None:
-            u = self.drives(found.z, found.u, margin=margin)
+            u = self.drives(found.z, found.u, margin=margin, best=best)
             return replace(found, u=u, u_start=u[0])
         z = np.vstack([found.z[1:], found.z[:1] if closed else found.z[-1:]])  # where each drive leads
         if closed:
-            u = self.drives(z, found.u, closed, margin)
+            u = self.drives(z, found.u, closed, margin, best)
             return replace(found, u=u, u_start=u[-1])
         _, z_start, f_start = self.inner.at_rest(first)
-        u = self.drives(np.vstack([z_start, z]), np.vstack([f_start, found.u]), margin=margin)
+        u = self.drives(np.vstack([z_start, z]), np.vstack([f_start, found.u]), margin=margin, best=best)
         return replace(found, u=u[1:], u_start=u[0])
 
-    def drives(self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0) -> np.ndarray:
-        """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other."""
+    def drives(
+        self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0, best: bool = True
+    ) -> np.ndarray:
+        """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other; where not
+        the `best` are asked for, any that keep the limits do."""
         timed = self.sample_time is not None and bool(self.model.rate_limits)
         n = len(f)
         u = self.allocation.drive.map(n)(z.T, f.T).full().T
@@ -137,11 +144,13 @@ class LeastEffortInverse:
             before = np.vstack([u[-1:] if closed else u[:1], u[:-1]])
             slowest, fastest = self._rate_bounds(margin)
             change = u - before
-            out |= np.any((change < slowest) | (change > fastest))
+            out[:] = np.any(out) or np.any((change < slowest) | (change > fastest))  # one sample acts on the others
         chosen = out if np.all(np.isfinite(u)) else np.zeros(n, dtype=bool)
         if chosen.any():
             rates = self._rate_bounds(margin) if timed else None
-            u[chosen] = self._solved(self._slopes(z[chosen]), f[chosen], u[chosen], self._bounds(margin), rates, closed)
+            u[chosen] = self._solved(
+                self._slopes(z[chosen]), f[chosen], u[chosen], self._bounds(margin), rates, closed, best
+            )
         return u
 
     @cached_property
@@ -192,55 +201,92 @@ class LeastEffortInverse:
 
     def _solved(
         self, B: np.ndarray, f: np.ndarray, begin: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
-        rates: tuple[np.ndarray, np.ndarray] | None, closed: bool,
+        rates: tuple[np.ndarray, np.ndarray] | None, closed: bool, best: bool,
     ) -> np.ndarray:  # fmt: skip
-        """The programme of the module's text, begun at the closed form; drives as shares of their ranges."""
+        """The programme of the module's text, begun at the closed form; where no drives keep the limits, or not the `best` are asked
+        for, those that break them least."""
         m, n, n_u = self.model, len(f), self.model.u.numel()
         span = 1 / np.sqrt(effort_weights(m) / m.drive_weights)
-        row = np.linalg.norm(B * span, axis=2)  # what full drives push
-        U = ca.MX.sym("u", n_u, n)
-        pushed = ca.Function(
-            "pushed", [S := ca.SX.sym("b", row.shape[1], n_u), v := ca.SX.sym("v", n_u)], [ca.mtimes(S, v)]
-        )
-        shares = np.hstack(list(B * span / row[:, :, None]))
-        limited, low, high = [U], [np.tile(bounds[0] / span, n)], [np.tile(bounds[1] / span, n)]
+        shares = B * span
+        size = np.linalg.norm(shares, axis=2)  # what full drives push
+        pushed = sp.block_diag(shares / size[:, :, None], format="csr")
+        limited = _Rows(sp.eye(n * n_u, format="csr"), *(np.tile(bound / span, n) for bound in bounds))
         if rates is not None:
-            before = ca.horzcat(U[:, -1] if closed else U[:, 0], U[:, :-1])
             allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
-            limited.append((U - before) * (span / allowed)[:, None])
-            low.append(np.tile(rates[0] / allowed, n))
-            high.append(np.tile(rates[1] / allowed, n))
-        rows, lowest, highest = ca.vertcat(*map(ca.vec, limited)), np.concatenate(low), np.concatenate(high)
-        bounded = np.flatnonzero(np.isfinite(lowest) | np.isfinite(highest))
-        over, under = ca.MX.sym("over", len(bounded)), ca.MX.sym("under", len(bounded))
+            step = sp.eye(n) - sp.eye(n, k=-1)
+            step = (step - sp.eye(n, k=n - 1)).tocsr() if closed else step.tocsr()[1:]  # nothing comes before the first
+            count = step.shape[0]
+            change = sp.kron(step, sp.diags_array(span / allowed), format="csr")
+            limited = limited.joined(_Rows(change, *(np.tile(bound / allowed, count) for bound in rates)))
+        wanted = (f / size).ravel()
+        least, excess = _least_excess(pushed, wanted, limited)
+        if excess > NEGLIGIBLE or not best:
+            return least.reshape(n, n_u) * span
         weights = np.tile(m.drive_weights / m.drive_weights.max(), n)
-        problem = {
-            "x": ca.vertcat(ca.vec(U), over, under),
-            "f": ca.dot(weights, ca.vec(U) ** 2) + PENALTY * (ca.sum1(over) + ca.sum1(under)),
-            "g": ca.vertcat(ca.vec(pushed.map(n)(shares, U)), rows[bounded.tolist()] - over + under),
-        }
-        options = {
-            "print_time": False,
-            "ipopt": {
-                "print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "nlp_scaling_method": "none",
-                "mu_strategy": "adaptive", "bound_relax_factor": 0.0, "jac_c_constant": "yes", "jac_d_constant": "yes", 
-                "hessian_constant": "yes",
-            },
-        }  # fmt: skip
-        solver = ca.nlpsol("least_effort", "ipopt", problem, options)
-        wanted, none = (f / row).ravel(), np.zeros(2 * len(bounded))
-        answer = solver(
-            x0=np.concatenate([(begin / span).ravel(), none]),
-            lbx=np.concatenate([np.full(n * n_u, -FREE), none]), ubx=np.concatenate([np.full(n * n_u, FREE), none + FREE]),
-            lbg=np.concatenate([wanted, lowest[bounded]]), ubg=np.concatenate([wanted, highest[bounded]]),
-        )  # fmt: skip
-        status = solver.stats()["return_status"]
-        if status in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
-            raise KeyboardInterrupt
-        if not solver.stats()["success"]:
-            raise SolverError(f"IPOPT found no drives of least effort ({status}); command a smaller or slower path")
-        u = answer["x"].full().ravel()[: n * n_u].reshape(n, n_u) * span
-        return _polished(u, B * span, f, (bounds[0] / span, bounds[1] / span), span)
+        u = _least_squares(weights, pushed, wanted, limited, (begin / span).ravel()).reshape(n, n_u) * span
+        return _polished(u, shares, f, (bounds[0] / span, bounds[1] / span), span)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """low <= A s <= high, rows without a bound left out, in shares of ranges."""
+
+    A: sp.csr_array
+    low: np.ndarray
+    high: np.ndarray
+
+    def __post_init__(self) -> None:
+        kept = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
+        for name in ("A", "low", "high"):
+            object.__setattr__(self, name, getattr(self, name)[kept])
+
+    def joined(self, other: _Rows) -> _Rows:
+        """Both."""
+        A = sp.vstack([self.A, other.A], format="csr")
+        return _Rows(A, np.append(self.low, other.low), np.append(self.high, other.high))
+
+
+def _least_excess(pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows) -> tuple[np.ndarray, float]:
+    """Drives that push as `wanted` and break limits by the least sum, and that sum; by a linear programme. Raises SolverError."""
+    m, n = limited.A.shape
+    one, cost = sp.eye(m), np.concatenate([np.zeros(n), np.ones(m)])
+    above, below = np.isfinite(limited.high), np.isfinite(limited.low)
+    A = sp.vstack(
+        [sp.hstack([limited.A, -one], format="csr")[above], sp.hstack([-limited.A, -one], format="csr")[below]]
+    )
+    answer = linprog(
+        cost, A_ub=A, b_ub=np.concatenate([limited.high[above], -limited.low[below]]), b_eq=wanted,
+        A_eq=sp.hstack([pushed, sp.csr_array((len(wanted), m))]), method="highs", options={"primal_feasibility_tolerance": TOLERANCE},
+        bounds=np.column_stack([np.append(np.full(n, -np.inf), np.zeros(m)), np.full(n + m, np.inf)]),
+    )  # fmt: skip
+    if answer.x is None:
+        raise SolverError(f"no drives push as the path needs ({answer.message}); command a smaller or slower path")
+    return answer.x[:n], float(answer.x[n:].max(initial=0.0))
+
+
+def _least_squares(
+    weights: np.ndarray, pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows, begin: np.ndarray
+) -> np.ndarray:
+    """The drives of least effort among those that push as `wanted` within limits, by IPOPT. Raises SolverError where it finds none."""
+    A = sp.vstack([pushed, limited.A], format="csc")
+    s = ca.MX.sym("s", A.shape[1])
+    problem = {"x": s, "f": ca.dot(weights, s**2), "g": ca.mtimes(ca.DM(A), s)}
+    options = {
+        "print_time": False,
+        "ipopt": {
+            "print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "nlp_scaling_method": "none",
+            "mu_strategy": "adaptive", "bound_relax_factor": 0.0, "jac_c_constant": "yes", "jac_d_constant": "yes",
+            "hessian_constant": "yes",
+        },
+    }  # fmt: skip
+    solver = ca.nlpsol("least_effort", "ipopt", problem, options)
+    answer = solver(x0=begin, lbg=np.append(wanted, limited.low), ubg=np.append(wanted, limited.high))
+    status = solver.stats()["return_status"]
+    if status in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
+        raise KeyboardInterrupt
+    if not solver.stats()["success"]:
+        raise SolverError(f"IPOPT found no drives of least effort ({status}); command a smaller or slower path")
+    return answer["x"].full().ravel()
 
 
 def _polished(

@@ -85,10 +85,11 @@ class TrajectoryProgramme:
         equal = [at(self.signal.expr, v) / self.signal.scale - commanded - s, at(m.balance, v) / m.force_scale, motion]
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
         for i, limit in zip(m.rate_places, m.rate_limits, strict=True):
-            if h is not None:
-                rows.append(u[i] - v[i])
-                low.append(np.array([(-np.inf if limit.lower is None else limit.lower) * h / m.u_scale[i]]))
-                high.append(np.array([(np.inf if limit.upper is None else limit.upper) * h / m.u_scale[i]]))
+            if h is not None and limit.lower is not None and limit.upper is not None:
+                span = limit.upper - limit.lower
+                rows.append((u[i] - v[i]) * m.u_scale[i] / (h * span))
+                low.append(np.array([limit.lower / span]))
+                high.append(np.array([limit.upper / span]))
         for limit in limits:
             unit = limit.upper or m.force_scale
             rows.append(at(limit.expr, v) / unit)

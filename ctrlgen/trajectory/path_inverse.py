@@ -140,6 +140,10 @@ class PathInverse:
             command, InverseTrajectory(x, z, self._drive(x, z, x[following], z[following]), u_held[0], True), closed
         )
 
+    def displacements(self, command: np.ndarray, closed: bool) -> np.ndarray:
+        """z (n, n_axes) along a path."""
+        return self.trajectory(command, closed).z
+
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x (n_x,), z (n_axes,) and u (n_u,) of the equilibrium at `target` (channels,)."""
         x, z, u = self.equilibria(target[None])
