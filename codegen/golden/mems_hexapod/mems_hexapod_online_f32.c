@@ -70,7 +70,8 @@ static float square_root(float a)
 
 static const float LEVER_LONG_1 = 1e-06f; /* stage.lever_long^2 */
 static const float LEVER_LONG = 0.001f; /* stage.lever_long */
-static const float STAGE_1 = 1895.5361f; /* f(stage.lever_long, stage.lever_short, stage.notch.theta_z_per_M_z) */
+/* f(actuator, stage, stage.lever_long, stage.lever_short, stage.notch.theta_z_per_M_z) */
+static const float ACTUATOR_STAGE_1 = 1895.5361f;
 /* (((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long) / stage.lever_long */
 static const float LEVER_LONG_LEVER_SHORT_1 = 1.03154e+12f;
 static const float BEAM_ANGLE_ACTUATOR_1 = 0.0005435469f; /* sin(actuator.beam_angle) * f(actuator) */
@@ -101,7 +102,7 @@ static inline float restoring_force(float z)
     const float t1 = z * z;
     const float t2 = square_root(LEVER_LONG_1 - t1);
     const float t3 = (z * t2) * (t1 / (LEVER_LONG + t2));
-    return (STAGE_1 * z) + (LEVER_LONG_LEVER_SHORT_1 * t3);
+    return (ACTUATOR_STAGE_1 * z) + (LEVER_LONG_LEVER_SHORT_1 * t3);
 }
 
 /* Actuator force [N] of an axis: F = 2 n alpha(T) (T - T_amb) E w_1 h sin(theta) [N] on the actuator bar, `T` [K].
@@ -206,7 +207,7 @@ static void balance_displacement(const float x[6], const float z[6], float resul
             const float t6 = (LEVER_LONG_LEVER_SHORT_1 * t2) - (LEVER_LONG_LEVER_SHORT_1 * (value * t5));
             const float t7 = (2.0f * (value / t3)) + ((t4 / t3) * t5);
             const float t8 = (t4 * t6) + (LEVER_LONG_LEVER_SHORT_1 * ((value * t2) * t7));
-            const float t9 = (actuator_force(x[i]) - restoring_force(value)) / (STAGE_1 + t8);
+            const float t9 = (actuator_force(x[i]) - restoring_force(value)) / (ACTUATOR_STAGE_1 + t8);
             value = value + t9;
         }
         result[i] = value;
