@@ -58,7 +58,8 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             )
             modes.append({
                 "name": name, "z": z, "uses_state": uses_state,
-                "displacement_uses_state": controller.displacement_uses_state[name == "step"], **named,
+                "displacement_uses_state": controller.displacement_uses_state[name == "step"],
+                "drive_can_be_limited": controller.drive_can_be_limited[name == "step"], **named,
             })  # fmt: skip
     motion = {}
     if isinstance(controller, MotionController):
@@ -83,7 +84,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         + (2 if controller.state_can_be_limited else 1) * balance.operations
         + (controller.composite_rounds * ratio.operations if ratio else 0)
         + (last["advance"].operations if "advance" in last and not advance else 0)
-        + once_more * (SECANT_STEPS + 3)
+        + once_more * ((SECANT_STEPS + 3) if last["drive_can_be_limited"] else 1)
     )
     if motion:  # what breaks a limit is answered by settling
         step_cost = sum(kernel.operations for kernel in motion.values())
