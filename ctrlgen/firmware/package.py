@@ -156,7 +156,9 @@ def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[
     vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
     played = len(c["played"])
     if played:
-        vectors = vectors.replace(", constants", f", {played} x {n} + {timed} x {n + 1} numbers and {played} indices of 4 B, constants")
+        vectors = vectors.replace(
+            ", constants", f", {played} x {n} + {timed} x {n + 1} numbers and {played} indices of 4 B, constants"
+        )
     rows = [
         _counted("state", x + n + 1, 0, state),  # a word is aligned as a number
         _counted("output", 2 * n + n_s, 0, output),

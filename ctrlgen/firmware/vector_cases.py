@@ -72,7 +72,7 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
 
     def target(z: np.ndarray, moving: float = 0.0) -> np.ndarray:
         at = signal(m.rest, z, np.zeros(m.u.numel())).full().ravel()
-        return np.concatenate([at, moving * rng.normal(size=len(scale)) [len(at) :] * scale[len(at) :]])
+        return np.concatenate([at, moving * rng.normal(size=len(scale))[len(at) :] * scale[len(at) :]])
 
     middle, slack = (low + high) / 2, controller.slacks[0]
     inside = [np.zeros(n), middle, *(low + (high - low) * rng.uniform(0.05, 0.95, (AROUND, n)))]
@@ -126,7 +126,10 @@ def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
     limits = {
         name: (*bound, slack)
         for name, bound, slack in zip(
-            ("displacement", "state", "drive"), (m.z_bounds, (x_low, x_high), m.u_bounds), controller.slacks, strict=True
+            ("displacement", "state", "drive"),
+            (m.z_bounds, (x_low, x_high), m.u_bounds),
+            controller.slacks,
+            strict=True,
         )
     }
 

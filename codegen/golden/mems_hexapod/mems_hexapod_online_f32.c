@@ -1855,80 +1855,6 @@ static int limit_composite(const mems_hexapod_online_f32_state *state, float wan
     return hit;
 }
 /* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void settle_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
-{
-    wanted_state(out->displacement, out->state);
-    wanted_drive(out->state, out->drive);
-    (void)state;
-}
-
-/* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
- * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int settle_line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
-{
-    float direction[6];
-    float at_target[6];
-    int i;
-    for (i = 0; i < 6; i++) {
-        direction[i] = out->displacement[i] - origin[i];
-        at_target[i] = out->drive[i];
-        out->displacement[i] = origin[i];
-    }
-    settle_drives(state, out);
-    if (drives_admissible(out->drive) != 0) {
-        float at_start[6];
-        float state_at_start[6];
-        float accepted = 0.0f;
-        float rejected = 1.0f;
-        int trial;
-        for (i = 0; i < 6; i++) {
-            at_start[i] = out->drive[i];
-        }
-        for (i = 0; i < 6; i++) {
-            state_at_start[i] = out->state[i];
-        }
-        for (trial = 0; trial < 3; trial++) {
-            float share = 1.0f;
-            float fraction;
-            for (i = 0; i < 6; i++) {
-                if ((at_target[i] > (U_HIGH[i] + U_SLACK[i])) || (at_target[i] < (U_LOW[i] - U_SLACK[i]))) {
-                    const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
-                    const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
-                    share = (reached < share) ? reached : share;
-                }
-            }
-            share = (share > 0.0f) ? share : 0.0f;
-            fraction = accepted + ((0.99609375f * share) * (rejected - accepted));
-            for (i = 0; i < 6; i++) {
-                out->displacement[i] = origin[i] + (fraction * direction[i]);
-            }
-            settle_drives(state, out);
-            if (drives_admissible(out->drive) != 0) {
-                accepted = fraction;
-                for (i = 0; i < 6; i++) {
-                    at_start[i] = out->drive[i];
-                }
-                for (i = 0; i < 6; i++) {
-                    state_at_start[i] = out->state[i];
-                }
-            } else {
-                rejected = fraction;
-                for (i = 0; i < 6; i++) {
-                    at_target[i] = out->drive[i];
-                }
-            }
-        }
-        for (i = 0; i < 6; i++) {
-            out->displacement[i] = origin[i] + (accepted * direction[i]);
-            out->drive[i] = at_start[i];
-        }
-        for (i = 0; i < 6; i++) {
-            out->state[i] = state_at_start[i];
-        }
-    }
-    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
-}
-/* Actuator state (limited) and drives (not limited) that out->displacement needs. */
 static void step_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
@@ -2056,7 +1982,6 @@ static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_onlin
 static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
-    int limited = 0;
     int lost = 0;
     wanted_state(out->displacement, out->state);
     {
@@ -2073,26 +1998,17 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
         if (is_lost(state) != 0) {
             status = set_lost(state, out);
             lost = 1;
-        } else if (drives_admissible(out->drive) != 0) {
-            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
-            static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
-            limited = settle_line_search(state, home, out);
-            status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
+            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK); /* no displacement in range needs more than rounding beyond */
         }
     }
     if (lost == 0) {
-        if (limited != 0) {
-            wanted_advance(out->drive, state->x);
-            balance_displacement(state->x, out->displacement, out->displacement);
-        } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
-            state->x[0] = out->state[0];
-            state->x[1] = out->state[1];
-            state->x[2] = out->state[2];
-            state->x[3] = out->state[3];
-            state->x[4] = out->state[4];
-            state->x[5] = out->state[5];
-        }
+        state->x[0] = out->state[0];
+        state->x[1] = out->state[1];
+        state->x[2] = out->state[2];
+        state->x[3] = out->state[3];
+        state->x[4] = out->state[4];
+        state->x[5] = out->state[5];
         state->z[0] = out->displacement[0];
         state->z[1] = out->displacement[1];
         state->z[2] = out->displacement[2];
