@@ -103,7 +103,7 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
 
 
 class _Watch:
-    """A kernel whose answers are judged; `judge` (value, how many answers there were in this call) -> decisions."""
+    """A kernel that tells its answers to `note`."""
 
     def __init__(self, kernel: ca.Function, note: Callable[[np.ndarray], None]) -> None:
         self._kernel, self._note = kernel, note
@@ -116,7 +116,8 @@ class _Watch:
 
 def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
     """A twin of `controller`, and the list of the decisions that its kernels' answers ask for."""
-    m, n, seen = controller.nominal, controller.nominal.n_states, []
+    m, n = controller.nominal, controller.nominal.n_states
+    seen: list[tuple] = []
     # worked out from the kernels themselves, before they are watched
     _ = (
         controller.displacement_uses_state, controller.drive_can_be_limited, controller.state_can_be_limited, controller.slacks,
@@ -157,7 +158,7 @@ def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
         k = getattr(controller, mode)
         if k is not None:
             kernels = {f.name: getattr(k, f.name) for f in fields(Inverse)}
-            twin.__dict__[mode] = Inverse(**kernels | {name: _Watch(kernels[name], against(name)) for name in limits})  # type: ignore[arg-type]
+            twin.__dict__[mode] = Inverse(**kernels | {name: _Watch(kernels[name], against(name)) for name in limits})
     twin.__dict__["composite_ratio"] = _Watch(controller.composite_ratio, ratio)
     if controller.composite_bound is not None:
         twin.__dict__["composite_bound"] = _Watch(

@@ -75,16 +75,14 @@ def played_vectors(compression: Compression | None, samples: int, rate: float) -
 
 def _timed(compression: Compression, indices: np.ndarray, samples: int, rate: float) -> list[dict[str, Any]]:
     """Times of the player with their drives, rounded as in the C: the place of a time on the curve is then exactly the C's."""
-    number = np.float32 if compression.real is Real.FLOAT else np.float64
+    number: Any = np.float32 if compression.real is Real.FLOAT else np.float64
     places = {(int(k) + share) / rate for k in indices for share in BETWEEN}
-    times = np.array(sorted(t for t in places if t < samples / rate), dtype=number)
+    times: np.ndarray = np.array(sorted(places), dtype=number)
     times = times[times < number(samples / rate)]
-    if compression.closed:
-        place = times * number(rate) + number(samples - 0.5)
-    else:
-        place = np.maximum(times * number(rate) - number(0.5), number(0))
+    place: np.ndarray = times * number(rate) + number(samples - 0.5 if compression.closed else -0.5)
+    place = np.maximum(place, number(0))
     whole = np.floor(place).astype(int)
     fraction = (place - whole.astype(number)).astype(float)
-    k = whole % samples if compression.closed else np.minimum(whole, samples - 1)
-    drives = compression.drives(k, np.where(whole < samples - 1, fraction, 0.0) if not compression.closed else fraction)
+    fraction = np.where(compression.closed | (whole < samples - 1), fraction, 0.0)
+    drives = compression.drives(whole % samples, fraction)
     return [{"time": float(t), "drive": drive} for t, drive in zip(times, drives, strict=True)]
