@@ -109,7 +109,7 @@ def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compi
     others.append(folder.runner(real))
     build(compiler, [online, *others], tmp_path / "good", f"-I{folder.path}")
     good = subprocess.run([tmp_path / "good"], capture_output=True, text=True)
-    assert good.returncode == 0 and "103 of 103 vectors agree" in good.stdout
+    assert good.returncode == 0 and re.match(r"(\d{3}) of \1 vectors agree", good.stdout)
     broken = tmp_path / f"{folder.online[real]}.c"
     text = online.read_text()
     factor = real.literal(1.00001 if real is Real.DOUBLE else 1.0003)  # float: above four roundings of the temperature

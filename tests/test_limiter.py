@@ -146,7 +146,7 @@ def controller_of(device: Device) -> Scripted:
     controller.__dict__["newton_steps"] = NEWTON_STEPS
     guarded = device.composite != "none"
     controller.__dict__.update(
-        nominal=nominal, rounds=device.rounds, state_can_be_limited=device.states and device.limited,
+        nominal=nominal, rounds=device.rounds, drive_can_be_limited=(True, True), state_can_be_limited=device.states and device.limited,
         static=inverse(0.0), moving=inverse(0.25) if device.moving else None, input_limits=TARGET_LIMIT, safe_drive=np.zeros(N),
         slacks=(np.full(N, SLACK), np.full(device.n_s, SLACK), np.full(N, SLACK)),
         guarded_limits=(SimpleNamespace(label="share"),) if guarded else (),

@@ -188,8 +188,9 @@ int main(int count, char **words)
     int k;
     for (k = 2; k < count; k++) {{
         int i;
-        const int status = (words[1][0] == 's') ? {p}_sample(strtoul(words[k], NULL, 10), u) : {p}_at(({real})strtod(words[k], NULL), u);
-        (void)printf("%d", status);
+        const uint32_t index = (uint32_t)strtoul(words[k], NULL, 10);
+        const unsigned status = (words[1][0] == 's') ? {p}_sample(index, u) : {p}_at(({real})strtod(words[k], NULL), u);
+        (void)printf("%u", status);
         for (i = 0; i < {n}; i++) {{ (void)printf(" %.17g", (double)u[i]); }}
         (void)printf("\\n");
     }}

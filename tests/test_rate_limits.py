@@ -13,7 +13,7 @@ import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
 from ctrlgen.devices import load_device
 from ctrlgen.firmware.compression import compress
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import find_compilers
 from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.motion import Motion

@@ -223,8 +223,8 @@ def test_planted_faults_are_found_by_hostile_calls(folder, stage, tmp_path):
     n = len(stage[1].axes)
     faults = {
         Real.FLOAT: (
-            f"    for (i = 0; i < {n}; i++) {{\n        state->z[i]",
-            f"    for (i = 0; i < {9 * n}; i++) {{\n        state->z[i]",
+            f"    for (i = 0; i < {n}; i++) {{\n        out->drive[i] = U_SAFE[i];",
+            f"    for (i = 0; i < {9 * n}; i++) {{\n        out->drive[i] = U_SAFE[i % {n}];",
         ),
         Real.DOUBLE: ("        value[i] = limited;", "        value[i] = (limited > 0.0) ? wanted : limited;"),
     }

@@ -101,7 +101,8 @@ class Printer:
         for law in self.laws:
             names = [name for name in law.function.name_in() if name not in self.numbers]
             standing = [
-                [a for a in (name, *STANDS_FOR.get(name, ())) if arguments.get(a) == law.function.numel_in(name)] or [name]
+                [a for a in (name, *STANDS_FOR.get(name, ())) if arguments.get(a) == law.function.numel_in(name)]
+                or [name]
                 for name in names
             ]
             for chosen in product(*standing):

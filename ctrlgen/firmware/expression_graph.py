@@ -223,7 +223,9 @@ class Graph:
                 and a[1].formula.startswith("1 / ")
             ):
                 formula = f"{_term(a[0])} / {a[1].formula[4:]}"
-        return self.constant(value, _short(formula) if len(formula) > LONGEST_FORMULA or formula.count("f(") > 1 else formula)
+        return self.constant(
+            value, _short(formula) if len(formula) > LONGEST_FORMULA or formula.count("f(") > 1 else formula
+        )
 
     def _operation(self, op: int, *operands: Node) -> Node:
         key = (op, *(node.number for node in operands))
@@ -275,7 +277,11 @@ def _short(formula: str) -> str:
     """What a long formula depends on: the parameters, or the sections of the device that they stand in."""
     paths = list(dict.fromkeys(re.findall(r"[a-z_][\w\[\]]*(?:\.[\w\[\]]+)*(?![\w.(])", formula)))
     text = f"f({', '.join(paths)})"
-    return text if len(text) <= LONGEST_FORMULA else f"f({', '.join(dict.fromkeys(path.partition('.')[0] for path in paths))})"
+    return (
+        text
+        if len(text) <= LONGEST_FORMULA
+        else f"f({', '.join(dict.fromkeys(path.partition('.')[0] for path in paths))})"
+    )
 
 
 def _by_products(exponent: float) -> bool:

@@ -80,7 +80,9 @@ def generate(
         of: dict[str, Any] = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
         online = online_context(scenario, controller, real, of["online"])
         samples = {} if played is None else player_context(played, compression[real], of["player"])
-        reference = vectors(controller, targets, real) | played_vectors(compression.get(real), len(command))
+        reference = vectors(controller, targets, real) | played_vectors(
+            compression.get(real), len(command), 1 / (scenario.sample_time or 1.0)
+        )
         contexts[real] = samples | online | of | reference | {"solved": solution is not None}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:

@@ -52,7 +52,8 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             uses_state = any({"x", "z"} & set(named[part].arguments) for part in ("state", "drive") if part in named)
             modes.append({
                 "name": name, "z": z, "uses_state": uses_state,
-                "displacement_uses_state": controller.displacement_uses_state[name == "step"], **named,
+                "displacement_uses_state": controller.displacement_uses_state[name == "step"],
+                "drive_can_be_limited": controller.drive_can_be_limited[name == "step"], **named,
             })  # fmt: skip
     motion = {}
     if isinstance(controller, MotionController):
@@ -196,7 +197,8 @@ def _cost(
     if motion:  # what breaks a limit is answered by settling
         step = sum(kernel.operations for kernel in motion.values())
     again = sum(mode[part].operations for part in ("state", "drive") if part in mode)
-    worst = step + (2 if controller.state_can_be_limited else 1) * balance.operations + again * (SECANT_STEPS + 3)
+    worst = step + (2 if controller.state_can_be_limited else 1) * balance.operations
+    worst += again * (SECANT_STEPS + 3 if mode["drive_can_be_limited"] else 1)
     worst += controller.composite_rounds * (shares.operations + 1) if shares else 0
     worst += mode["advance"].operations if "advance" in mode and not advance else 0
     worst += 2 * n * n * (1 + SWEEPS) if controller.nearest_slopes is not None else 0

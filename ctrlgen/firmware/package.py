@@ -134,26 +134,35 @@ def _context(
         "target": c["rows"][0]["target"],
         "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
         "memory": _memory(c, [contexts[real].get("chosen") for real in Real]),
-        "vectors": len(c["rows"]) + c["unusable"] + len(c["played"]) + c["played_unusable"],
+        "vectors": _test_calls(c),
         "tolerance": {real.suffix: contexts[real]["tolerance"] for real in Real},
         "figures": list(figures),
         "inputs": list(zip(inputs, scenario.digest.values(), strict=True)),
     }
 
 
+def _test_calls(c: dict[str, Any]) -> int:
+    """What the test on the target counts: of the controller, and of the player its wrap or end and three refusals too."""
+    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"]
+    return online + (len(c["played"]) + len(c["timed"]) + 4 + c["played_unusable"] if c["player"] else 0)
+
+
 def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
     """Rows of the README's table of memory, bytes in double and float; `chosen`: the player's form in each arithmetic."""
     x, n, n_s, m, count = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
+    timed = len(c["timed"])
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}) numbers and a word, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
     vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
     played = len(c["played"])
     if played:
-        vectors = vectors.replace(", constants", f", {played} x {n} numbers and {played} indices of 4 B, constants")
+        vectors = vectors.replace(
+            ", constants", f", {played} x {n} + {timed} x {n + 1} numbers and {played} indices of 4 B, constants"
+        )
     rows = [
         _counted("state", x + n + 1, 0, state),  # a word is aligned as a number
         _counted("output", 2 * n + n_s, 0, output),
-        _counted("vectors", count * (m + n) + played * n, 12 * count + 4 * played, vectors),
+        _counted("vectors", count * (m + n) + played * n + timed * (n + 1), 12 * count + 4 * played, vectors),
     ]
     if played:
         forms = "; ".join(

@@ -9,7 +9,7 @@ import jinja2
 
 from ctrlgen.core.files import write_text
 from ctrlgen.core.shipped_files import shipped
-from ctrlgen.firmware.cprint import Real
+from ctrlgen.firmware.real import Real
 
 # Of the interface of the generated C, in every header: raised when code that was written for an older header must be changed because a
 # function, a structure or the meaning of an argument or a status changed. Additions do not raise it.

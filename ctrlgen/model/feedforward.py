@@ -218,6 +218,22 @@ class Controller:
                 return True
         return False
 
+    @cached_property
+    def drive_can_be_limited(self) -> tuple[bool, bool]:
+        """Whether a displacement in range can need a drive beyond its limits to settle there, or to step there, by interval arithmetic
+        over every state. An actuator that never does for an equilibrium needs no line search to settle."""
+        m, n = self.nominal, self.nominal.n_states
+        low, high = m.u_bounds
+        found = []
+        for k in (self.static, self.moving or self.static):
+            ranges = {"wanted": m.z_bounds, "z": m.z_bounds, "x": m.x_bounds}
+            if n:
+                state = bounds(k.state, ranges)
+                ranges["state"] = (np.maximum(state[0], m.x_bounds[0][:n]), np.minimum(state[1], m.x_bounds[1][:n]))
+            least, most = bounds(k.drive, ranges)
+            found.append(not (np.all(least >= low - self.slacks[2]) and np.all(most <= high + self.slacks[2])))
+        return found[0], found[1]
+
     @property
     def target(self) -> Signal:
         """What a target holds."""

@@ -459,20 +459,16 @@ static void nearest_displacement(const float beyond[6], float value[6])
         }
     }
 }
-/* Actuator state (limited) and drives (not limited) that out->displacement needs: at rest with settling, else at the next sample. */
-static void wanted_drives(const mems_hexapod_online_f32_state *state, int settling, mems_hexapod_online_f32_output *out)
+/* Actuator state (limited) and drives (not limited) that out->displacement needs. */
+static void wanted_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     wanted_state(out->displacement, out->state);
-    if (settling != 0) {
-        wanted_drive(out->state, out->drive);
-    } else {
-        step_drive(state->x, out->state, out->drive);
-    }
+    step_drive(state->x, out->state, out->drive);
 }
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int line_search(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out)
+static int line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
@@ -482,7 +478,7 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
         at_target[i] = out->drive[i];
         out->displacement[i] = origin[i];
     }
-    wanted_drives(state, settling, out);
+    wanted_drives(state, out);
     if (drives_admissible(out->drive) != 0) {
         float at_start[6];
         float state_at_start[6];
@@ -508,7 +504,7 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
             for (i = 0; i < 6; i++) {
                 out->displacement[i] = origin[i] + (fraction * direction[i]);
             }
-            wanted_drives(state, settling, out);
+            wanted_drives(state, out);
             if (drives_admissible(out->drive) != 0) {
                 accepted = fraction;
                 for (i = 0; i < 6; i++) {
@@ -530,6 +526,7 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
+
 void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 {
     if (state != NULL) {
@@ -583,7 +580,6 @@ static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_onlin
 static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
-    int limited = 0;
     int lost = 0;
     wanted_state(out->displacement, out->state);
     {
@@ -600,26 +596,17 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
         if (is_lost(state) != 0) {
             status = set_lost(state, out);
             lost = 1;
-        } else if (drives_admissible(out->drive) != 0) {
-            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
-            static const float home[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
-            limited = line_search(state, 1, home, out);
-            status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
+            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK); /* no displacement in range needs more than rounding beyond */
         }
     }
     if (lost == 0) {
-        if (limited != 0) {
-            wanted_advance(out->drive, state->x);
-            balance_displacement(state->x, out->displacement, out->displacement);
-        } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
-            state->x[0] = out->state[0];
-            state->x[1] = out->state[1];
-            state->x[2] = out->state[2];
-            state->x[3] = out->state[3];
-            state->x[4] = out->state[4];
-            state->x[5] = out->state[5];
-        }
+        state->x[0] = out->state[0];
+        state->x[1] = out->state[1];
+        state->x[2] = out->state[2];
+        state->x[3] = out->state[3];
+        state->x[4] = out->state[4];
+        state->x[5] = out->state[5];
         state->z[0] = out->displacement[0];
         state->z[1] = out->displacement[1];
         state->z[2] = out->displacement[2];
@@ -701,7 +688,7 @@ static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_o
         } else if (drives_admissible(out->drive) != 0) {
             (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
-            limited = line_search(state, 0, state->z, out);
+            limited = line_search(state, state->z, out);
             status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
         }
     }

@@ -1,0 +1,98 @@
+"""The test that runs on the target enters every function of the generated C, every status, and the branches that can be entered."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import re
+import shutil
+import subprocess
+from functools import reduce
+from operator import or_
+from pathlib import Path
+
+import pytest
+from conftest import SCENARIOS
+
+from ctrlgen import ControllerStatus, build_model, generate, load_scenario, solve
+from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.firmware.vectors import vectors
+from ctrlgen.model.feedforward import Controller
+from ctrlgen.model.motion_feedforward import controller_of
+from ctrlgen.trajectory.scenario import motion_targets
+
+# Share of the branches taken. What is left, by what stands in its line, cannot be entered or not for certain in float:
+LEAST = {"circle20": 0.95, "mirror_spiral": 0.95, "rrr_circle": 0.95, "flexure_axis_line": 0.9, "meso_circle": 0.7}
+NOT_ENTERED = (
+    r"^const (float|double) t\d+ = ",  # which of two numbers is the larger, in a kernel of the physics
+    r"^if \(worst > 1\.0\d+f?\)|^if \(scaled > 1\)",  # a stress within the slack of its limit
+    r"^if \(limited != 0\)",  # the line search ends at a drive within the slack
+    r"^share = |^if \(drives_admissible",  # the origin of a line search, where the device is, has admissible drives
+    r"^for \(i = 0; i < \d+; i\+\+\)",  # a loop behind one of those
+    r"is_lost\(state\)|lost == 0|_LOST\)|drive_inside\(",  # drives that no displacement in range brings to a limit
+    r"^return \(\(\(?d0 \* d0",  # the same, or the order in which axes leave their range
+    r"_DRIVE : 0U;",  # motions that meet the limit of the drive alone: the vectors at rest do not
+    r"^if \(offset >= |^if \(segment >= count\)|next <= k",  # a knot of the curve between two samples, which pieces may place on them
+)
+
+
+def solved(name: str, out: Path) -> tuple[CFolder, Controller]:
+    scenario = load_scenario(SCENARIOS / name)
+    model = build_model(scenario.device)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    return generate(scenario, model, out, solve(scenario, model)), controller
+
+
+def branches(folder: CFolder, real: Real) -> tuple[list[str], dict[str, list[tuple[str, bool]]]]:
+    """Functions never entered by the shipped test; and the branches of each function: the text of their line, whether taken."""
+    sources = [*folder.sources(real), folder.runner(real)]
+    strict = [flag for flag in FLAGS if flag != "-O2"]
+    for source in sources:
+        words = ["gcc", *strict, "-O0", "--coverage", "-I", folder.path, "-c", source]
+        subprocess.run(words, cwd=folder.path, check=True)
+    objects = [f"{source.stem}.o" for source in sources]
+    subprocess.run(["gcc", "--coverage", *objects, "-o", "covered"], cwd=folder.path, check=True)
+    subprocess.run(["./covered"], cwd=folder.path, check=True, capture_output=True)
+    never: list[str] = []
+    found: dict[str, list[tuple[str, bool]]] = {}
+    for name in (folder.online[real], folder.player[real]):
+        words = ["gcov", "--json-format", "--branch-probabilities", f"{name}.c"]
+        subprocess.run(words, cwd=folder.path, check=True, capture_output=True)
+        report = json.loads(gzip.decompress((folder.path / f"{name}.gcov.json.gz").read_bytes()))
+        (file,) = (f for f in report["files"] if f["file"].endswith(f"{name}.c"))
+        text = (folder.path / f"{name}.c").read_text().splitlines()
+        never += [f["name"] for f in file["functions"] if not f["execution_count"]]
+        for line in file["lines"]:
+            taken = [(text[line["line_number"] - 1].strip(), branch["count"] > 0) for branch in line["branches"]]
+            found.setdefault(line.get("function_name", ""), []).extend(taken)
+    return never, found
+
+
+@pytest.mark.parametrize("name", LEAST)
+def test_the_shipped_test_enters_every_function_and_the_branches_that_can_be(name, tmp_path):
+    for program in ("gcc", "gcov"):
+        if not shutil.which(program):
+            pytest.skip(f"{program} is missing: what the shipped test enters was not counted")
+    folder, _ = solved(name, tmp_path)
+    never, found = branches(folder, Real.FLOAT)
+    assert never == []
+    every = [taken for those in found.values() for _, taken in those]
+    assert sum(every) >= LEAST[name] * len(every), (sum(every), len(every))
+    missed = {text for those in found.values() for text, taken in those if not taken}
+    assert [text for text in sorted(missed) if not any(re.search(known, text) for known in NOT_ENTERED)] == []
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_the_vectors_have_every_status_that_a_target_can_bring_about(real):
+    """INPUT and LOST have calls of their own beside the vectors."""
+    for name, bits in (("circle20", 1 | 2 | 8 | 16), ("mirror_spiral", 1 | 4 | 8 | 16)):
+        scenario = load_scenario(SCENARIOS / name)
+        model = build_model(scenario.device)
+        controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+        command = motion_targets(scenario, model) if model.inertial else scenario.command(model)
+        rows = vectors(controller, command, real)["rows"]
+        assert reduce(or_, (row["status"] for row in rows)) == bits
+        stepped = reduce(or_, (row["status"] for row in rows if not row["how"] & 1))
+        assert stepped & (bits & ~ControllerStatus.STATE) == bits & ~ControllerStatus.STATE
