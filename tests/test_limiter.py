@@ -28,6 +28,7 @@ from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model import feedforward
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
+from ctrlgen.model.named_inverse import NamedInverses
 
 N = 3  # axes; enough for "some of them, not the first"
 SLACK = 2.0**-6  # coarse, so that values within it are common; a power of two keeps the arithmetic exact
@@ -137,7 +138,7 @@ def controller_of(device: Device) -> Scripted:
         device=SimpleNamespace(title="scripted", source="none"),
     )  # fmt: skip
     controller = Scripted(nominal, "displacement", 1e-3 if device.moving else None, SLACK)
-    controller.__dict__["named"] = (
+    controller.__dict__["named"] = NamedInverses(
         inverse(0.0),
         inverse(0.25) if device.moving else None,
         SimpleNamespace(laws=()),

@@ -7,6 +7,23 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
+from mechanism_files import (
+    HEAD,
+    HINGE,
+    PARALLELOGRAM,
+    REST,
+    SILICON,
+    SPRING,
+    TWO_BODIES,
+    blade,
+    dm,
+    hinged,
+    loaded,
+    number,
+    place,
+    vector,
+    with_values,
+)
 from scipy.integrate import quad
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
@@ -19,30 +36,6 @@ from ctrlgen.model.assembly import movable
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics import meso_hexapod as meso
 from ctrlgen.physics.flexure import rectangular_section
-
-HEAD = 'kind = "mechanism"\nname = "m"\ntitle = "t"\nsource = "a test"\n'
-SILICON = '[[material]]\nname = "silicon"\nyoung = "130 GPa"\npoisson = "0.28"\n'
-
-
-def number(x: float, unit: str) -> str:
-    return f'"{float(x)!r} {unit}"'
-
-
-def place(point) -> str:
-    return f"[{', '.join(number(v, 'm') for v in np.ravel(point))}]"
-
-
-def vector(v) -> str:
-    return f"[{', '.join(repr(float(x)) for x in np.ravel(v))}]"
-
-
-def dm(matrix) -> np.ndarray:
-    return ca.DM(ca.evalf(ca.SX(matrix))).full()
-
-
-def loaded(folder, text: str):
-    (folder / "device.toml").write_text(text)
-    return load_device(folder / "device.toml")
 
 
 def mems_hexapod_text(device) -> str:
@@ -86,10 +79,6 @@ def test_the_mems_hexapod_as_a_mechanism_has_the_papers_jacobian(tmp_path):
     J = dm(Condensed(*with_values(loaded(tmp_path, mems_hexapod_text(special)))).jacobian)
     wanted = hexapod_matrices(special)["J"]
     assert np.abs((J - wanted) / np.abs(wanted).max(axis=1, keepdims=True)).max() < 1e-9
-
-
-def with_values(device):
-    return device, device.values()
 
 
 def rrr_text(device) -> str:
@@ -196,42 +185,6 @@ def test_an_axis_of_the_xy_stage_as_a_mechanism_has_the_papers_stiffness(tmp_pat
     )  # of each entry's own size: turns and displacements differ by thousands
 
 
-def blade(name: str, x: float) -> str:
-    return f"""[[element]]
-kind = "blade"
-name = "{name}"
-from = "ground"
-to = "stage"
-at = ["{x} mm", "0 mm", "0 mm"]
-along = [0, 1, 0]
-across = [-1, 0, 0]
-length = "20 mm"
-thickness = "0.2 mm"
-width = "8 mm"
-material = "silicon"
-"""
-
-
-PARALLELOGRAM = f"""{HEAD}{SILICON.replace('poisson = "0.28"', 'poisson = "0.28"' + chr(10) + 'stress_limit = "300 MPa"')}
-[[body]]
-name = "stage"
-{blade("left", -10)}{blade("right", 10)}[[actuator]]
-name = "coil"
-kind = "force"
-on = "stage"
-at = ["0 mm", "-10 mm", "0 mm"]
-along = [1, 0, 0]
-gain = "2 N/A"
-low = "-1 A"
-high = "1 A"
-travel = "300 um"
-[output]
-body = "stage"
-at = ["0 mm", "0 mm", "0 mm"]
-channels = ["delta_x"]
-"""
-
-
 def test_a_parallelogram_has_the_stiffness_and_stress_of_the_textbook(tmp_path):
     """Two clamped-guided blades, 12 E I / l^3 each, pushed at their middle height, where their axial stiffness is not asked for;
     M = 6 E I d / l^2 at the ends."""
@@ -312,21 +265,6 @@ WIRE = (
     '[[element]]\nkind = "wire"\nname = "{name}"\nfrom = "ground"\nto = "plate"\nat = ["{x} mm", "{y} mm", "{z} mm"]\n'
 )
 WIRE += 'along = [{along}]\nlength = "10 mm"\ndiameter = "0.2 mm"\nmaterial = "silicon"\n'
-REST = """[[actuator]]
-name = "push"
-kind = "force"
-on = "plate"
-at = ["0 mm", "0 mm", "0 mm"]
-along = [1, 0, 0]
-gain = "1 N/V"
-low = "0 V"
-high = "1 V"
-travel = "50 um"
-[output]
-body = "plate"
-at = ["0 mm", "0 mm", "0 mm"]
-channels = ["delta_x"]
-"""
 SIX = [
     (0, 0, 0, "1, 0, 0"),
     (0, 20, 0, "1, 0, 0"),
@@ -446,24 +384,6 @@ def test_a_mechanism_read_twice_is_the_same_device_and_both_build_a_model(tmp_pa
     assert loaded(tmp_path, text.replace("25 N/um", "26 N/um")) != first
 
 
-SPRING = """[[element]]
-kind = "compliance"
-name = "{name}"
-from = "{first}"
-to = "{to}"
-at = ["{x} mm", "0 mm", "0 mm"]
-theta_x_per_M_x = "1 rad/(N*m)"
-theta_y_per_M_y = "1 rad/(N*m)"
-theta_z_per_M_z = "1 rad/(N*m)"
-delta_x_per_F_x = "{c} um/N"
-delta_y_per_F_y = "10 um/N"
-delta_z_per_F_z = "10 um/N"
-"""
-TWO_BODIES = f"""{HEAD}[[body]]
-name = "a"
-[[body]]
-name = "b"
-{SPRING.format(name="k_a", first="ground", to="a", x=0, c=0.5)}{SPRING.format(name="k_b", first="a", to="b", x=10, c=0.2)}"""
 OUTPUT_B = '[output]\nbody = "b"\nat = ["10 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]\n'
 
 
@@ -558,34 +478,6 @@ def test_a_channel_has_the_same_scale_whether_numbers_are_free_or_not(tmp_path):
     J = dm(Condensed(*with_values(device)).jacobian)
     travel = max(a.travel.si for a in device.actuator)
     assert device.channel_scale == pytest.approx(np.abs(J).sum(axis=1) * travel)
-
-
-HINGE = """[[element]]
-kind = "hinge"
-name = "{name}"
-from = "{first}"
-to = "{to}"
-at = ["{x} mm", "0 mm", "0 mm"]
-along = [{along}]
-hinge = {{ kind = "circular", R = "2 mm", t = "0.3 mm", b = "8 mm", equation = "paros_weisbord", outside = "accept" }}
-rotation_limit = "{limit} deg"
-material = "silicon"
-"""
-
-
-def hinged(limit: float) -> str:
-    """An arm 30 mm long on one hinge, pushed across its end."""
-    push = REST.replace(
-        'at = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]', 'at = ["32 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]', 1
-    )
-    push = push.replace(
-        'at = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]',
-        'at = ["32 mm", "0 mm", "0 mm"]\nchannels = ["delta_y"]',
-    )
-    push = push.replace('travel = "50 um"', 'travel = "2 mm"')
-    silicon = SILICON.replace('poisson = "0.28"', 'poisson = "0.28"\nstress_limit = "300 MPa"')
-    hinge = HINGE.format(name="notch", first="ground", to="plate", x=2, along="1, 0, 0", limit=limit)
-    return HEAD + silicon + '[[body]]\nname = "plate"\n' + hinge + push
 
 
 def test_a_circular_hinge_is_that_of_its_equations_in_the_plane_and_of_beam_theory_out_of_it(tmp_path):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
+from mechanism_files import HEAD, PARALLELOGRAM, TWO_BODIES, dm, loaded, with_values
 from numpy.polynomial import Polynomial
-from test_mechanism import HEAD, PARALLELOGRAM, TWO_BODIES, dm, loaded, with_values
 
 from ctrlgen import InputError, build_model, load_scenario, run, solve
 from ctrlgen.devices.mechanism_dynamics import condensed_modes, natural_frequencies

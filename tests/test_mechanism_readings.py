@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
-from test_mechanism import PARALLELOGRAM, dm, loaded, with_values
-from test_mechanism_springs import chain
+from mechanism_files import PARALLELOGRAM, chain, dm, loaded, with_values
 
 import ctrlgen
 from ctrlgen import InputError, build_model, run

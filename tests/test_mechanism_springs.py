@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from mechanism_files import HEAD, PARALLELOGRAM, TWO_BODIES, chain, dm, loaded, spring, with_values
 from scipy.optimize import brentq
-from test_mechanism import HEAD, PARALLELOGRAM, TWO_BODIES, dm, loaded, with_values
 
 from ctrlgen import InputError, build_model, load_scenario, run, solve
 from ctrlgen.devices.mechanism_dynamics import freedoms
@@ -14,10 +14,6 @@ from ctrlgen.devices.mechanism_model import Condensed
 from ctrlgen.model.assembly import movable
 
 K_BLADES = 24 * 130e9 * 8e-3 * 0.2e-3**3 / 12 / 20e-3**3  # of the parallelogram's two blades
-
-
-def spring(numbers: str, first: str = "ground", to: str = "stage", at: str = "0", name: str = "extra") -> str:
-    return f'[[element]]\nkind = "spring"\nname = "{name}"\nfrom = "{first}"\nto = "{to}"\nat = ["0 mm", "{at} mm", "0 mm"]\n{numbers}\n'
 
 
 def with_spring(numbers: str, at: str = "-10") -> str:
@@ -76,16 +72,6 @@ def test_c_of_a_cubic_spring_beside_the_push_computes_what_the_model_does(tmp_pa
     )
     outcome = run(tmp_path, tmp_path / "out")
     assert outcome.passed
-
-
-def chain(cubic: str, travel: str = "50 um") -> str:
-    """Ground - k_a - body a - k_b - body b, which is pushed; a cubic spring from the ground to a, which no actuator holds."""
-    push = (
-        '[[actuator]]\nname = "stack"\nkind = "force"\non = "b"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]\n'
-        f'gain = "1 N/V"\nlow = "-900 V"\nhigh = "900 V"\ntravel = "{travel}"\n'
-        '[output]\nbody = "a"\nat = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]\n'
-    )
-    return TWO_BODIES + spring(cubic, to="a") + push
 
 
 def test_a_cubic_spring_on_a_freedom_that_no_actuator_holds_is_solved_exactly(tmp_path):

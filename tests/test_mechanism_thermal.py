@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
+from mechanism_files import HEAD, dm, loaded, number, place, vector, with_values
 from scipy.optimize import brentq
-from test_mechanism import HEAD, dm, loaded, number, place, vector, with_values
 
 from ctrlgen import InputError, Unreachable, build_model, load_device, load_scenario, run, solve
 from ctrlgen.devices.mechanism_model import Condensed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import DEVICE
-from test_mechanism import dm, with_values
+from mechanism_files import dm, with_values
 
 from ctrlgen import build_model, load_device
 from ctrlgen.devices.mechanism_dynamics import condensed_modes, freedoms

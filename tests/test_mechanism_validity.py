@@ -8,8 +8,8 @@ import time
 import casadi as ca
 import numpy as np
 import pytest
+from mechanism_files import HEAD, PARALLELOGRAM, SILICON, dm, hinged, loaded, with_values
 from scipy.integrate import solve_bvp
-from test_mechanism import HEAD, PARALLELOGRAM, SILICON, dm, hinged, loaded, with_values
 
 from ctrlgen import build_model
 from ctrlgen.devices.mechanism_model import Condensed

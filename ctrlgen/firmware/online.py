@@ -14,9 +14,10 @@ from ctrlgen.firmware.cprint import Kernel, Law, Printer
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment
-from ctrlgen.model.feedforward import FAR, SECANT_FRACTION, SECANT_STEPS, SWEEPS, Controller
+from ctrlgen.model.feedforward import FAR, SECANT_FRACTION, SECANT_STEPS, Controller
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import MotionController
+from ctrlgen.model.nearest_displacement import SWEEPS
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
@@ -34,14 +35,14 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
     }  # fmt: skip
-    static, moving, named_model, numbers = controller.named
-    printer = Printer(real, ranges, {"p": numbers}, printed_laws(named_model))
+    inverses = controller.named
+    printer = Printer(real, ranges, {"p": inverses.numbers}, printed_laws(inverses.model))
     printed = _Kernels(printer, kernel_comments(controller))
 
     modes: list[dict[str, Any]] = []
     for name, inverse, z in (
-        ("settle", static, "out->displacement"),
-        ("step", moving, "state->z"),
+        ("settle", inverses.static, "out->displacement"),
+        ("step", inverses.moving, "state->z"),
     ):
         if inverse is not None:
             named = {
@@ -62,7 +63,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             for part, kernel in controller.motion.items()
         }
     iterated = ("z", controller.newton_steps) if controller.newton_steps > 1 else None
-    balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=iterated)
+    balance = printed.kernel(inverses.static.newton, "balance", ("balance_displacement",), steps=iterated)
     shares = bound = None
     if controller.guarded_limits:
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))

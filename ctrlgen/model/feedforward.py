@@ -6,7 +6,7 @@ It has no feedback: what it keeps of the device is the state that its own model 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntFlag
 from functools import cached_property
 from itertools import product
@@ -15,9 +15,12 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.model.allocation import inverse_of
-from ctrlgen.model.assembly import build_model, symbolic_model
-from ctrlgen.model.inverse import NEWTON_STEPS, Inverse, invert
+from ctrlgen.model.assembly import build_model
+from ctrlgen.model.composite_bound import composite_bound
+from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
 from ctrlgen.model.model import Limit, Model, Signal
+from ctrlgen.model.named_inverse import NamedInverses, named_inverses
+from ctrlgen.model.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.numerics.interval_arithmetic import bounds
 
 SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
@@ -26,12 +29,8 @@ COMPOSITE_ROUNDS = 8
 
 SECANT_STEPS = 3  # of the line search toward a target that the drives cannot reach in one sample
 SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
-# Of coordinate descent toward the nearest pose. On the shipped devices it ends 0.5 % farther than the optimum at most;
-# clipping alone ends 50 to 85 % farther.
-SWEEPS = 3
 FAR = 4  # times the largest magnitude in its range: a number of a state that is farther was never computed
 ENDLESS = 1e15  # SI: the magnitude taken for a state without a range; its square, of many together, is still a float
-NEGLIGIBLE = 1e-6  # of a limit: a direction that uses less of it over the whole range is left out of the bound
 
 
 class ControllerStatus(IntFlag):
@@ -65,17 +64,9 @@ class Controller:
         return None if self.sample_time is None else inverse_of(self.nominal, self.follow, self.sample_time)
 
     @cached_property
-    def named(self) -> tuple[Inverse, Inverse | None, Model, list[tuple[float, str]]]:
-        """The kernels for equilibria and for the next sample with an argument "p" more, their model, and the values of p with their
-        paths in the device: the same numbers as those of `static` and `moving`, as formulas of the device's parameters."""
-        model = symbolic_model(self.model.device)
-        paths = [symbol.name() for symbol in ca.vertsplit(model.p)]
-        numbers = list(zip(model.p_nominal.tolist(), paths, strict=True))
-        named = {
-            own: replace(invert(model, self.follow, time, symbolic=True), displacement=own.displacement)  # of matrices inverted as here
-            for own, time in ((self.static, None), (self.moving, self.sample_time)) if own is not None
-        }  # fmt: skip
-        return named[self.static], None if self.moving is None else named[self.moving], model, numbers
+    def named(self) -> NamedInverses:
+        """The same kernels with their numbers as formulas of the device's parameters."""
+        return named_inverses(self.model.device, self.follow, self.sample_time, self.static, self.moving)
 
     @cached_property
     def newton_steps(self) -> int:
@@ -143,62 +134,21 @@ class Controller:
 
     @cached_property
     def nearest_slopes(self) -> np.ndarray | None:
-        """(n, n) H_ij / H_ii of H = W^T W, W the slope of the followed signal at home in its typical sizes; None where H is diagonal:
-        then one displacement moves one channel."""
-        m, signal = self.nominal, self.nominal.signals[self.follow]
-        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(signal.expr, m.z)])(m.rest, 0 * m.z_scale).full()
-        W = slope / np.array(signal.scale)[:, None]
-        H = W.T @ W
-        return None if np.array_equal(H, np.diag(np.diag(H))) else H / np.diag(H)[:, None]
+        """(n, n) of `ctrlgen.model.nearest_displacement`; None where one displacement moves one channel."""
+        return coupling(self.nominal, self.follow)
 
     @cached_property
     def nearest(self) -> ca.Function:
-        """beyond -> the displacement in range whose followed signal is nearest to that of the displacement `beyond`.
-
-        Minimises |W (z - beyond)|^2 over the box, W the slope of the followed signal at home in its typical sizes, by
-        `SWEEPS` of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) from the clipped
-        displacement; to first order in the displacement, and exact where one displacement moves one channel.
-        """
-        m, P = self.nominal, self.nearest_slopes
-        low, high = m.z_bounds
-        beyond = ca.SX.sym("beyond", m.z.numel())
-        z = ca.fmin(ca.fmax(beyond, low), high)
-        if P is not None:
-            slopes = ca.mtimes(ca.DM(P), z - beyond)
-            for _ in range(SWEEPS):
-                for i in range(m.z.numel()):
-                    moved = ca.fmin(ca.fmax(z[i] - slopes[i], low[i]), high[i])
-                    slopes += ca.DM(P[:, i]) * (moved - z[i])
-                    z[i] = moved
-        return ca.Function("nearest", [beyond], [z], ["beyond"], ["z"], {"cse": True})
+        """beyond -> the displacement in range whose followed signal is nearest to that of the displacement `beyond`."""
+        return nearest_displacement(self.nominal.z_bounds, self.nearest_slopes)
 
     @cached_property
     def composite_bound(self) -> ca.Function | None:
-        """wanted -> a cheap upper bound of `composite_ratio`; None where there is none.
-
-        The followed signal's own directions v_k (to first order at home) are a basis, z = sum_k lambda_k v_k, and for a
-        convex f with f(s z) = |s| f(z), as stresses of a linear structure are, f(z) <= sum_k |lambda_k| f(v_k).
-        """
+        """wanted -> a cheap upper bound of `composite_ratio` (`ctrlgen.model.composite_bound`); None where there is none."""
         m = self.nominal
         if not self.guarded_limits or m.x.numel() > m.n_states:
             return None
-        slope = ca.Function("W", [m.x, m.z], [ca.jacobian(m.signals[self.follow].expr, m.z)])(m.rest, 0 * m.z_scale)
-        W = slope.full()
-        if W.shape[0] != W.shape[1] or np.linalg.matrix_rank(W) < len(W):
-            W = np.eye(m.z.numel())
-        reach = np.abs(W) @ m.z_bounds[1]  # of lambda_k over the range
-        V = np.linalg.inv(W) * reach  # columns v_k, scaled to where lambda_k = reach_k
-        shares = np.max([self._composite_ratios(side * V) for side in (-1.0, 1.0)], axis=0)
-        if not all(
-            np.allclose(self._composite_ratios(s * V), abs(s) * shares, rtol=1e-6, atol=1e-6) for s in (-0.5, 0.1)
-        ):
-            return None
-        few = shares > NEGLIGIBLE
-        wanted = ca.SX.sym("wanted", m.z.numel())
-        bound = ca.sum1(ca.fabs(ca.mtimes(ca.DM(shares[few, None] / reach[few, None] * W[few]), wanted)))
-        return ca.Function(
-            "composite_bound", [wanted], [bound + shares[~few].sum() + NEGLIGIBLE], ["wanted"], ["bound"], {"cse": True}
-        )
+        return composite_bound(m, self.follow, self._composite_ratios)
 
     def _composite_ratios(self, displacements: np.ndarray) -> np.ndarray:
         """`composite_ratio` at each column of `displacements`, with no memory of effects."""

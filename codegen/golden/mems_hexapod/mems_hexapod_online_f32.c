@@ -68,28 +68,28 @@ static float square_root(float a)
     return y;
 }
 
-static const float LEVER_LONG_1 = 1e-06f; /* stage.lever_long^2 */
-static const float LEVER_LONG = 0.001f; /* stage.lever_long */
+#define LEVER_LONG_1 (1e-06f) /* stage.lever_long^2 */
+#define LEVER_LONG (0.001f) /* stage.lever_long */
 /* f(actuator, stage, stage.lever_long, stage.lever_short, stage.notch.theta_z_per_M_z) */
-static const float ACTUATOR_STAGE_1 = 1895.5361f;
+#define ACTUATOR_STAGE_1 (1895.5361f)
 /* (((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long) / stage.lever_long */
-static const float LEVER_LONG_LEVER_SHORT_1 = 1.03154e+12f;
-static const float BEAM_ANGLE_ACTUATOR_1 = 0.0005435469f; /* sin(actuator.beam_angle) * f(actuator) */
-static const float BEAM_ANGLE_ACTUATOR_2 = 2.9544324e-07f; /* (sin(actuator.beam_angle) * f(actuator))^2 */
+#define LEVER_LONG_LEVER_SHORT_1 (1.03154e+12f)
+#define BEAM_ANGLE_ACTUATOR_1 (0.0005435469f) /* sin(actuator.beam_angle) * f(actuator) */
+#define BEAM_ANGLE_ACTUATOR_2 (2.9544324e-07f) /* (sin(actuator.beam_angle) * f(actuator))^2 */
 /* 4 * (f(actuator.beam_angle, actuator.thickness, actuator.beam_width, actuator.young, actuator.expansion_slope) / 2) */
-static const float BEAM_ANGLE_THICKNESS_1 = 2.1273852e-06f;
-static const float AMBIENT = 295.15f; /* actuator.ambient */
+#define BEAM_ANGLE_THICKNESS_1 (2.1273852e-06f)
+#define AMBIENT (295.15f) /* actuator.ambient */
 /* (1 / (actuator.thermal_resistance / actuator.time_constant)) * (1 / actuator.time_constant) */
-static const float THERMAL_RESISTANCE_TIME_CONSTANT_1 = 0.0018181818f;
-static const float THERMAL_RESISTANCE = 550.0f; /* actuator.thermal_resistance */
+#define THERMAL_RESISTANCE_TIME_CONSTANT_1 (0.0018181818f)
+#define THERMAL_RESISTANCE (550.0f) /* actuator.thermal_resistance */
 /* -(((exp(-(0.001 / actuator.time_constant)) - 1) * actuator.time_constant) / actuator.time_constant) */
-static const float TIME_CONSTANT_1 = 0.18126924f;
+#define TIME_CONSTANT_1 (0.18126924f)
 /* (-1) / f(actuator.time_constant, actuator.thermal_resistance) */
-static const float TIME_CONSTANT_THERMAL_RESISTANCE_1 = 0.010030283f;
-static const float EXPANSION = 3e-06f; /* actuator.expansion */
-static const float EXPANSION_SLOPE = 3e-09f; /* actuator.expansion_slope */
+#define TIME_CONSTANT_THERMAL_RESISTANCE_1 (0.010030283f)
+#define EXPANSION (3e-06f) /* actuator.expansion */
+#define EXPANSION_SLOPE (3e-09f) /* actuator.expansion_slope */
 /* sin(actuator.beam_angle) * (actuator.thickness * (actuator.beam_width * (actuator.young * 30))) */
-static const float BEAM_ANGLE_THICKNESS_2 = 177.2821f;
+#define BEAM_ANGLE_THICKNESS_2 (177.2821f)
 
 /* Restoring force [N] of an axis: F = F^l + F^n [N] on the bar for a stage displacement `d` [m]. Source: S1 eq. (12).
  * F^l = (K^t_14 / r + r N / (c e_4^2)) d [N] on the actuator bar, `d` [m] the stage displacement. r = e_4/e_3 is the

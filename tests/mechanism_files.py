@@ -1,0 +1,155 @@
+"""Mechanism files of several tests, and what reads them."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen import load_device
+
+HEAD = 'kind = "mechanism"\nname = "m"\ntitle = "t"\nsource = "a test"\n'
+
+
+SILICON = '[[material]]\nname = "silicon"\nyoung = "130 GPa"\npoisson = "0.28"\n'
+
+
+def number(x: float, unit: str) -> str:
+    return f'"{float(x)!r} {unit}"'
+
+
+def place(point) -> str:
+    return f"[{', '.join(number(v, 'm') for v in np.ravel(point))}]"
+
+
+def vector(v) -> str:
+    return f"[{', '.join(repr(float(x)) for x in np.ravel(v))}]"
+
+
+def dm(matrix) -> np.ndarray:
+    return ca.DM(ca.evalf(ca.SX(matrix))).full()
+
+
+def loaded(folder, text: str):
+    (folder / "device.toml").write_text(text)
+    return load_device(folder / "device.toml")
+
+
+def with_values(device):
+    return device, device.values()
+
+
+def blade(name: str, x: float) -> str:
+    return f"""[[element]]
+kind = "blade"
+name = "{name}"
+from = "ground"
+to = "stage"
+at = ["{x} mm", "0 mm", "0 mm"]
+along = [0, 1, 0]
+across = [-1, 0, 0]
+length = "20 mm"
+thickness = "0.2 mm"
+width = "8 mm"
+material = "silicon"
+"""
+
+
+PARALLELOGRAM = f"""{HEAD}{SILICON.replace('poisson = "0.28"', 'poisson = "0.28"' + chr(10) + 'stress_limit = "300 MPa"')}
+[[body]]
+name = "stage"
+{blade("left", -10)}{blade("right", 10)}[[actuator]]
+name = "coil"
+kind = "force"
+on = "stage"
+at = ["0 mm", "-10 mm", "0 mm"]
+along = [1, 0, 0]
+gain = "2 N/A"
+low = "-1 A"
+high = "1 A"
+travel = "300 um"
+[output]
+body = "stage"
+at = ["0 mm", "0 mm", "0 mm"]
+channels = ["delta_x"]
+"""
+
+
+REST = """[[actuator]]
+name = "push"
+kind = "force"
+on = "plate"
+at = ["0 mm", "0 mm", "0 mm"]
+along = [1, 0, 0]
+gain = "1 N/V"
+low = "0 V"
+high = "1 V"
+travel = "50 um"
+[output]
+body = "plate"
+at = ["0 mm", "0 mm", "0 mm"]
+channels = ["delta_x"]
+"""
+
+
+SPRING = """[[element]]
+kind = "compliance"
+name = "{name}"
+from = "{first}"
+to = "{to}"
+at = ["{x} mm", "0 mm", "0 mm"]
+theta_x_per_M_x = "1 rad/(N*m)"
+theta_y_per_M_y = "1 rad/(N*m)"
+theta_z_per_M_z = "1 rad/(N*m)"
+delta_x_per_F_x = "{c} um/N"
+delta_y_per_F_y = "10 um/N"
+delta_z_per_F_z = "10 um/N"
+"""
+
+
+TWO_BODIES = f"""{HEAD}[[body]]
+name = "a"
+[[body]]
+name = "b"
+{SPRING.format(name="k_a", first="ground", to="a", x=0, c=0.5)}{SPRING.format(name="k_b", first="a", to="b", x=10, c=0.2)}"""
+
+
+HINGE = """[[element]]
+kind = "hinge"
+name = "{name}"
+from = "{first}"
+to = "{to}"
+at = ["{x} mm", "0 mm", "0 mm"]
+along = [{along}]
+hinge = {{ kind = "circular", R = "2 mm", t = "0.3 mm", b = "8 mm", equation = "paros_weisbord", outside = "accept" }}
+rotation_limit = "{limit} deg"
+material = "silicon"
+"""
+
+
+def hinged(limit: float) -> str:
+    """An arm 30 mm long on one hinge, pushed across its end."""
+    push = REST.replace(
+        'at = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]', 'at = ["32 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]', 1
+    )
+    push = push.replace(
+        'at = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]',
+        'at = ["32 mm", "0 mm", "0 mm"]\nchannels = ["delta_y"]',
+    )
+    push = push.replace('travel = "50 um"', 'travel = "2 mm"')
+    silicon = SILICON.replace('poisson = "0.28"', 'poisson = "0.28"\nstress_limit = "300 MPa"')
+    hinge = HINGE.format(name="notch", first="ground", to="plate", x=2, along="1, 0, 0", limit=limit)
+    return HEAD + silicon + '[[body]]\nname = "plate"\n' + hinge + push
+
+
+def spring(numbers: str, first: str = "ground", to: str = "stage", at: str = "0", name: str = "extra") -> str:
+    return f'[[element]]\nkind = "spring"\nname = "{name}"\nfrom = "{first}"\nto = "{to}"\nat = ["0 mm", "{at} mm", "0 mm"]\n{numbers}\n'
+
+
+def chain(cubic: str, travel: str = "50 um") -> str:
+    """Ground - k_a - body a - k_b - body b, which is pushed; a cubic spring from the ground to a, which no actuator holds."""
+    push = (
+        '[[actuator]]\nname = "stack"\nkind = "force"\non = "b"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]\n'
+        f'gain = "1 N/V"\nlow = "-900 V"\nhigh = "900 V"\ntravel = "{travel}"\n'
+        '[output]\nbody = "a"\nat = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]\n'
+    )
+    return TWO_BODIES + spring(cubic, to="a") + push
