@@ -130,7 +130,7 @@ def controller_of(device: Device) -> Scripted:
 
     signal = SimpleNamespace(channels=("a", "b", "c"), units=("m",) * N, label="signal", scale=(1.0,) * N)
     nominal = SimpleNamespace(
-        axes=("a", "b", "c"), x=x, z=z, n_states=device.n_s, rest=np.full(device.n_x, 0.5), limits=(),
+        axes=("a", "b", "c"), x=x, z=z, n_states=device.n_s, rest=np.full(device.n_x, 0.5), limits=(), laws=(),
         z_bounds=(Z_LOW, Z_HIGH), u_bounds=(U_LOW, U_HIGH),
         x_bounds=(np.r_[S_LOW[: device.n_s], [-np.inf] * 2 * device.memory], np.r_[S_HIGH[: device.n_s], [np.inf] * 2 * device.memory]),
         x_names=tuple(f"x{i}" for i in range(device.n_x)), x_units=("K",) * device.n_x,

@@ -70,6 +70,7 @@ class Law:
     name: str
     about: str
     function: ca.Function
+    named: ca.Function | None = None  # the same with the parameters as an argument
 
 
 @dataclass
@@ -104,10 +105,19 @@ class Printer:
             ]
             for chosen in product(*standing):
                 renamed = dict(zip(names, chosen, strict=True))
-                nodes = self._graph.rows(law.function, self.ranges, self.numbers, renamed)
+                nodes = self._rows(law.function, law.named, renamed)
                 if any(node.number in needed for node in nodes):
                     found |= self._called(law, nodes)
         return found
+
+    def _rows(
+        self, function: ca.Function, named: ca.Function | None, renamed: Mapping[str, str] | None = None
+    ) -> list[Node]:
+        """The rows of `function`, with the formulas of `named`, the same function in terms of parameters."""
+        rows = self._graph.rows(function, self.ranges, None, renamed)
+        if named is None:
+            return rows
+        return self._graph.with_formulas(rows, self._graph.rows(named, self.ranges, self.numbers, renamed))
 
     def _called(self, law: Law, nodes: Sequence[Node]) -> dict[int, Call]:
         """A law's rows as calls of one function of one axis; none where axes differ or depend on each other, or it is too short."""
@@ -152,16 +162,16 @@ class Printer:
 
     def kernel(
         self, function: ca.Function, name: str, about: str = "", may_be_result: Sequence[str] = (),
-        steps: tuple[str, int] | None = None, returned: bool = False,
+        steps: tuple[str, int] | None = None, returned: bool = False, named: ca.Function | None = None,
     ) -> Kernel:  # fmt: skip
         """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter.
 
         `about`: its comment. `may_be_result`: arguments that a caller may give as the result too. With `steps` (argument, count) the
         function is one step of an iteration on that argument, and the printed one takes `count` of them. The only row can be
-        `returned` instead. Raises CtrlgenError for an
+        `returned` instead. `named` is the same function with an argument of `numbers`, from which its numbers have their formulas. Raises CtrlgenError for an
         operation C has no counterpart of.
         """
-        rows = self._graph.rows(function, self.ranges, self.numbers)
+        rows = self._rows(function, named)
         laws = self._calls({a: function.numel_in(a) for a in function.name_in()}, rows)
         body = Rows(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result, laws).run()
         sizes = {a: function.size1_in(a) for a in function.name_in()}

@@ -20,6 +20,7 @@ CONSTANT, READ = -1, -2  # operations of leaves, beside CasADi's
 TRUSTED = 1e15  # products between 1/TRUSTED and TRUSTED neither overflow nor underflow a float
 MOST_FACTORS = 64  # largest whole exponent that is printed as products
 LONGEST_FORMULA = 120  # characters of a number's formula; a longer one says nothing to a reader
+SAME_NUMBER = 1e-6  # relative difference of a number computed in two orders, digits lost to cancellation included
 PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
 TWICE_PRINTED = (ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX)  # their operands appear twice in C
 _FORMULA = {
@@ -99,6 +100,37 @@ class Graph:
             else:
                 at[outputs[0]] = self.apply(op, [at[i] for i in inputs])
         return found
+
+    def with_formulas(self, rows: Sequence[Node], named: Sequence[Node]) -> list[Node]:
+        """`rows` with the formulas of the same rows in terms of parameters, `named`; a row of another form stays without formulas.
+
+        The numbers are those of `rows`: what is computed from parameters in another order differs in the last digits.
+        """
+        made: dict[tuple[int, int], Node | None] = {}
+        return [self._paired(row, other, made) or row for row, other in zip(rows, named, strict=True)]
+
+    def _paired(self, row: Node, named: Node, made: dict[tuple[int, int], Node | None]) -> Node | None:
+        """`row` with the formulas of `named`; None where their forms differ."""
+        left = [(row, named)]
+        while left:
+            a, b = left[-1]
+            pairs = list(zip(a.operands, b.operands, strict=False))
+            missing = [pair for pair in pairs if (pair[0].number, pair[1].number) not in made]
+            if missing and a.operation == b.operation:
+                left.extend(missing)
+                continue
+            left.pop()
+            parts = [made.get((x.number, y.number)) for x, y in pairs]
+            result: Node | None = None
+            if a.constant and b.constant:
+                near = abs(a.value - b.value) <= SAME_NUMBER * abs(a.value)
+                result = self.constant(a.value, b.formula) if near else None
+            elif a.leaf or b.leaf:
+                result = a if a is b else None
+            elif a.operation == b.operation and len(a.operands) == len(b.operands) and None not in parts:
+                result = self._operation(a.operation, *(part for part in parts if part is not None))
+            made[a.number, b.number] = result
+        return made[row.number, named.number]
 
     def _input(
         self, function: ca.Function, place: Sequence[int], ranges: Mapping, numbers: Mapping, renamed: Mapping[str, str]

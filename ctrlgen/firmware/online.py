@@ -36,17 +36,22 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
     }  # fmt: skip
     inverses = controller.named
-    printer = Printer(real, ranges, {"p": inverses.numbers}, printed_laws(inverses.model))
+    printer = Printer(real, ranges, {"p": inverses.numbers}, printed_laws(model, inverses.model))
     printed = _Kernels(printer, kernel_comments(controller))
 
     modes: list[dict[str, Any]] = []
-    for name, inverse, z in (
-        ("settle", inverses.static, "out->displacement"),
-        ("step", inverses.moving, "state->z"),
+    for name, inverse, formulas, z in (
+        ("settle", controller.static, inverses.static, "out->displacement"),
+        ("step", controller.moving, inverses.moving, "state->z"),
     ):
         if inverse is not None:
             named = {
-                part: printed.kernel(getattr(inverse, part), (name, part), (f"wanted_{part}", f"{name}_{part}"))
+                part: printed.kernel(
+                    getattr(inverse, part),
+                    (name, part),
+                    (f"wanted_{part}", f"{name}_{part}"),
+                    named=getattr(formulas, part),
+                )
                 for part in ("displacement", "state", "drive", "advance")
                 if getattr(inverse, part).size1_out(0)
             }
@@ -63,7 +68,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             for part, kernel in controller.motion.items()
         }
     iterated = ("z", controller.newton_steps) if controller.newton_steps > 1 else None
-    balance = printed.kernel(inverses.static.newton, "balance", ("balance_displacement",), steps=iterated)
+    balance = printed.kernel(
+        controller.static.newton, "balance", ("balance_displacement",), steps=iterated, named=inverses.static.newton
+    )
     shares = bound = None
     if controller.guarded_limits:
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
@@ -122,13 +129,16 @@ class _Kernels:
         names: tuple[str, ...],
         steps: tuple[str, int] | None = None,
         returned: bool = False,
+        named: Any = None,
     ) -> Kernel:
         """`function` as C, named by the first of `names` that no other body has."""
         may_be_result = {"advance": ["x"], "balance": ["z"]}.get(what if what == "balance" else what[-1], [])
         taken = {kernel.name for kernel in self._by_body.values()}
-        kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps, returned)
+        kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps, returned, named)
         if kernel.body not in self._by_body and kernel.name in taken:
-            kernel = self.printer.kernel(function, names[-1], self.comments[what], may_be_result, steps, returned)
+            kernel = self.printer.kernel(
+                function, names[-1], self.comments[what], may_be_result, steps, returned, named
+            )
         return self._by_body.setdefault(kernel.body, kernel)
 
     @property
@@ -142,15 +152,20 @@ class _Kernels:
         return frozenset().union(*(kernel.calls for kernel in self.kernels))
 
 
-def printed_laws(model: Model) -> list[Law]:
-    """The named parts of a model's physics for `Printer`, with the equations and sources of their docstrings."""
+def printed_laws(model: Model, symbolic: Model) -> list[Law]:
+    """The named parts of a model's physics for `Printer`, with the equations and sources of their docstrings; `symbolic` is the same
+    model with its numbers as parameters."""
     found = []
-    for law in model.laws:
+    for law, named in zip(model.laws, symbolic.laws, strict=True):
         stated = " ".join(" ".join((function.__doc__ or "").split()) for function in law.documented)
-        arguments = [model.x, model.z, model.u, model.p]
-        function = ca.Function(law.name, arguments, [law.expr], ["x", "z", "drive", "p"], ["force"])
         about = f"{law.label[0].upper()}{law.label[1:]}" + (f": {stated}" if stated else ".")
-        found.append(Law(law.name, about, function))
+        functions = [
+            ca.Function(
+                law.name, [m.x, m.z, m.u, *([m.p] if more else [])], [part.expr], ["x", "z", "drive", *more], ["force"]
+            )
+            for m, part, more in ((model, law, ()), (symbolic, named, ("p",)))
+        ]
+        found.append(Law(law.name, about, *functions))
     return found
 
 

@@ -66,7 +66,7 @@ class Controller:
     @cached_property
     def named(self) -> NamedInverses:
         """The same kernels with their numbers as formulas of the device's parameters."""
-        return named_inverses(self.model.device, self.follow, self.sample_time, self.static, self.moving)
+        return named_inverses(self.model.device, self.follow, self.sample_time)
 
     @cached_property
     def newton_steps(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 
@@ -22,14 +22,10 @@ class NamedInverses:
     numbers: list[tuple[float, str]]
 
 
-def named_inverses(
-    device: Device, follow: str, sample_time: float | None, static: Inverse, moving: Inverse | None
-) -> NamedInverses:
-    """The inverses `static` and `moving` with formulas. Displacements stay theirs, because the slope of the pose is inverted in numbers."""
+def named_inverses(device: Device, follow: str, sample_time: float | None) -> NamedInverses:
+    """The inverses of `device` for the signal named `follow` with formulas."""
     model = symbolic_model(device)
-    at_rest = replace(invert(model, follow, None, symbolic=True), displacement=static.displacement)
-    next_sample = None
-    if moving is not None:
-        next_sample = replace(invert(model, follow, sample_time, symbolic=True), displacement=moving.displacement)
+    next_sample = None if sample_time is None else invert(model, follow, sample_time, symbolic=True)
     paths = [symbol.name() for symbol in ca.vertsplit(model.p)]
-    return NamedInverses(at_rest, next_sample, model, list(zip(model.p_nominal.tolist(), paths, strict=True)))
+    numbers = list(zip(model.p_nominal.tolist(), paths, strict=True))
+    return NamedInverses(invert(model, follow, None, symbolic=True), next_sample, model, numbers)
