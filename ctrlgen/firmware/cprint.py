@@ -168,8 +168,8 @@ class Printer:
 
         `about`: its comment. `may_be_result`: arguments that a caller may give as the result too. With `steps` (argument, count) the
         function is one step of an iteration on that argument, and the printed one takes `count` of them. The only row can be
-        `returned` instead. `named` is the same function with an argument of `numbers`, from which its numbers have their formulas. Raises CtrlgenError for an
-        operation C has no counterpart of.
+        `returned` instead. `named` is the same function with an argument of `numbers`, from which its numbers have their formulas.
+        Raises CtrlgenError for an operation C has no counterpart of.
         """
         rows = self._rows(function, named)
         laws = self._calls({a: function.numel_in(a) for a in function.name_in()}, rows)
