@@ -139,7 +139,10 @@ def controller_of(device: Device) -> Scripted:
         composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
         nearest=kernel("nearest", [u], ["beyond"], ca.fmin(ca.fmax(u, Z_LOW), Z_HIGH) * 0.75 + 0.125 * (Z_LOW + Z_HIGH)),
     )  # fmt: skip
-    assert controller.displacement_uses_state == (False, device.moving)  # worked out before the kernels are recorded
+    assert controller.examined_first == (
+        device.memory,
+        device.memory or device.moving,
+    )  # worked out before the kernels are recorded
     return controller
 
 

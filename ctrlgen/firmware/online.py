@@ -11,7 +11,8 @@ from ctrlgen.core.units import base_unit, show
 from ctrlgen.firmware.cprint import Kernel, Real, print_function
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.templates import comment
-from ctrlgen.model.feedforward import FAR, SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.model.lost_state import FAR
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
@@ -58,7 +59,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             )
             modes.append({
                 "name": name, "z": z, "uses_state": uses_state,
-                "displacement_uses_state": controller.displacement_uses_state[name == "step"],
+                "examined_first": controller.examined_first[name == "step"],
                 "drive_can_be_limited": controller.drive_can_be_limited[name == "step"], **named,
             })  # fmt: skip
     motion = {}
