@@ -304,7 +304,7 @@ def test_a_spoiled_vector_fails_on_the_boards_of_its_arithmetic(boards, small, t
     shutil.copytree(small[1].path, tmp_path / "c")
     c = replace(small[1], path=tmp_path / "c")
     path = c.path / f"{c.vectors[Real.FLOAT]}.c"
-    text, count = re.subn(r"_status\[\d+\] = \{\s*0", lambda m: m[0][:-1] + "8", path.read_text(), count=1)
+    text, count = re.subn(r"(_status\[\d+\] = \{\s*0U, )0U", r"\g<1>8U", path.read_text(), count=1)
     assert count == 1
     path.write_text(text)
     states = {(check.tool, check.subjects[0][1]): check for check in check_on_boards(c)}

@@ -155,7 +155,10 @@ def controller_of(device: Device) -> Scripted:
         nearest_slopes=np.array([[1, 0.25, 0.0625], [0.25, 1, -0.125], [0.0625, -0.125, 1]]) if device.coupled else None,
         composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
     )  # fmt: skip
-    assert controller.displacement_uses_state == (False, device.moving)  # worked out before the kernels are recorded
+    assert controller.examined_first == (
+        device.memory,
+        device.memory or device.moving,
+    )  # worked out before the kernels are recorded
     return controller
 
 

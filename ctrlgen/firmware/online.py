@@ -14,7 +14,8 @@ from ctrlgen.firmware.cprint import Kernel, Law, Printer
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment
-from ctrlgen.model.feedforward import FAR, SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.model.lost_state import FAR
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.model.nearest_displacement import SWEEPS
@@ -58,7 +59,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             uses_state = any({"x", "z"} & set(named[part].arguments) for part in ("state", "drive") if part in named)
             modes.append({
                 "name": name, "z": z, "uses_state": uses_state,
-                "displacement_uses_state": controller.displacement_uses_state[name == "step"],
+                "examined_first": controller.examined_first[name == "step"],
                 "drive_can_be_limited": controller.drive_can_be_limited[name == "step"], **named,
             })  # fmt: skip
     motion = {}

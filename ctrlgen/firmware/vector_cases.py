@@ -120,7 +120,7 @@ def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
     seen: list[tuple] = []
     # worked out from the kernels themselves, before they are watched
     _ = (
-        controller.displacement_uses_state, controller.drive_can_be_limited, controller.state_can_be_limited, controller.slacks,
+        controller.examined_first, controller.drive_can_be_limited, controller.state_can_be_limited, controller.slacks,
         controller.plausible,
     )  # fmt: skip
     x_low, x_high = (bound[:n] for bound in m.x_bounds)

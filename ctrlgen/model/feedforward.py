@@ -18,6 +18,7 @@ from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.composite_bound import composite_bound
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
+from ctrlgen.model.lost_state import Groups, is_beyond, plausible_sums
 from ctrlgen.model.model import Limit, Model, Signal
 from ctrlgen.model.named_inverse import NamedInverses, named_inverses
 from ctrlgen.model.nearest_displacement import coupling, nearest_displacement
@@ -29,8 +30,6 @@ COMPOSITE_ROUNDS = 8
 
 SECANT_STEPS = 3  # of the line search toward a target that the drives cannot reach in one sample
 SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
-FAR = 4  # times the largest magnitude in its range: a number of a state that is farther was never computed
-ENDLESS = 1e15  # SI: the magnitude taken for a state without a range; its square, of many together, is still a float
 
 
 class ControllerStatus(IntFlag):
@@ -228,36 +227,27 @@ class Controller:
         return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
     @cached_property
-    def plausible(self) -> tuple[tuple[tuple[int, ...], float], ...]:
-        """(indices into x and then z, largest sum of squares) of the numbers of a state that have the same range.
-
-        A state of which one such sum is larger, or no number, is lost: |v| > `FAR` times the largest magnitude of the range, in the
-        root mean square of the group. Equal ranges are taken together because a sum costs less than comparisons.
-        """
-        m = self.nominal
-        low, high = (np.concatenate(bound) for bound in zip(m.x_bounds, m.z_bounds, strict=True))
-        reach = np.maximum(np.abs(low), np.abs(high))
-        groups: dict[tuple[bool, float], list[int]] = {}  # of states and of displacements
-        for i, size in enumerate(np.where(np.isfinite(reach) & (reach > 0), reach, ENDLESS).tolist()):
-            groups.setdefault((i < m.x.numel(), size), []).append(i)
-        return tuple((tuple(those), len(those) * (FAR * size) ** 2) for (_, size), those in groups.items())
+    def plausible(self) -> Groups:
+        """What a state is judged by, see `plausible_sums`."""
+        return plausible_sums(self.nominal)
 
     @cached_property
-    def displacement_uses_state(self) -> tuple[bool, bool]:
-        """Whether the displacement of a target to settle at, or to step to, depends on the state: one that is lost must then be found
-        before the displacement is limited."""
+    def examined_first(self) -> tuple[bool, bool]:
+        """Whether the state is examined before it is used, to settle and to step: where the displacement of a target depends on it, or
+        effects remember. Else it is examined where a limit is met: till then one that is lost would show in the drives, or none of its
+        numbers enters the answer and all are written anew."""
         m = self.nominal
         kernels = [k.displacement for k in (self.static, self.moving or self.static)]
         targets = [ca.SX.sym("target", k.size1_in("target")) for k in kernels]
         settle, step = (
-            ca.depends_on(k(m.x, m.z, target), ca.vertcat(m.x, m.z)) for k, target in zip(kernels, targets, strict=True)
+            m.x.numel() > m.n_states or ca.depends_on(k(m.x, m.z, target), ca.vertcat(m.x, m.z))
+            for k, target in zip(kernels, targets, strict=True)
         )
         return settle, step
 
     def is_lost(self, x: np.ndarray, z: np.ndarray) -> bool:
-        """Whether the state (x, z) cannot be one that the controller left (`plausible`)."""
-        numbers = [*map(float, x), *map(float, z)]
-        return not all(sum(numbers[i] * numbers[i] for i in those) <= most for those, most in self.plausible)
+        """Whether the state (x, z) cannot be one that the controller left."""
+        return is_beyond(self.plausible, x, z)
 
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
         """State (x, z) of a device at rest at ambient temperature."""
@@ -267,13 +257,14 @@ class Controller:
         """Drives that bring the followed signal to `target` (channels,) [SI] at the next sample, from `state` (x, z).
 
         With `settle`: the equilibrium at `target`, and its state. Every limit is kept; `ControllerStatus` says which ones acted.
-        Where a limit is met the state is examined: one that is lost (`is_lost`) is answered with the safe drive, and is NaN from then on,
-        which is answered so too; go on from `rest` once the device is there. A lost state that meets no limit does not matter.
+        A state that is found lost (`is_lost`, `examined_first`) is answered with the safe drive, and is NaN from then on, which is
+        answered so too; go on from `rest` once the device is there.
         A target that the drives cannot reach in one sample is approached along the straight line of displacements, on
         which convex limits hold.
         """
         m, (x, z) = self.nominal, state
-        if np.all(np.isnan([*x, *z])):
+        first = self.examined_first[not settle and self.moving is not None]
+        if np.all(np.isnan([*x, *z])) or (first and self.is_lost(x, z)):
             return self._without_state()
         k = self.static if settle or self.moving is None else self.moving
         n, static = m.n_states, k is self.static
@@ -281,10 +272,9 @@ class Controller:
         wanted, status = _row(k.displacement(x, z, target)), ControllerStatus(0)
         if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
             usable = np.all(np.abs(target) <= self.input_limits[: len(target)])
-            if (self.displacement_uses_state[not static] or not usable) and self.is_lost(x, z):
-                return self._without_state()
             if not usable:
-                return self._without_target(k, x, z)
+                lost = not first and self.is_lost(x, z)
+                return self._without_state() if lost else self._without_target(k, x, z)
             beyond = wanted
             wanted, hit = _clamp(beyond, *m.z_bounds, z_slack)
             if hit:
@@ -300,7 +290,8 @@ class Controller:
         if worst > 1 + self.slack:
             status |= ControllerStatus.COMPOSITE
         drive = _row(k.drive(x, z, wanted, state_wanted))
-        if not np.all((drive >= m.u_bounds[0]) & (drive <= m.u_bounds[1])) and self.is_lost(x, z):
+        outside = not np.all((drive >= m.u_bounds[0]) & (drive <= m.u_bounds[1]))
+        if outside and not first and self.is_lost(x, z):
             return self._without_state()
         u, limited = _clamp(drive, *m.u_bounds, u_slack)
         if limited:

@@ -541,8 +541,8 @@ void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
     }
 }
 
-/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked where a limit is met: until then a state either leads to
- * drives within their limits or does not matter. Numbers with one range are judged by the sum of their squares, at most their count
+/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
+ * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged by the sum of their squares, at most their count
  * times (4 times the largest magnitude of the range) squared. */
 static int is_lost(const mems_hexapod_online_f32_state *state)
 {
