@@ -32,8 +32,9 @@ static float square_root(float a)
 #elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__SSE2__)
     __asm__("sqrtss %1, %0" : "=x"(y) : "x"(a));
 #else
-    if ((a > 0.0f) && (a <= 3.4028235e+38f)) {
-        union { float number; uint32_t bits; } v;
+    union { float number; uint32_t bits; } v;
+    v.number = a;
+    if ((a > 0.0f) && (v.bits < 0x7F800000U)) {
         const float up = (a < 1.1754944e-38f) ? 1.6777216e+07f : 1.0f; /* where there are fewer digits */
         const float h = 0.5f * (a * up);
         uint32_t exponent;
@@ -60,7 +61,8 @@ static float square_root(float a)
         v.bits = (exponent << 23U) + (S - 0x800000U);
         y = v.number * ((up > 1.0f) ? 0.00024414062f : 1.0f);
     } else if (a < 0.0f) {
-        y = (a - a) / (a - a);
+        v.bits = 0x7FC00000U;
+        y = v.number;
     } else {
         /* zero, infinity and what is not a number are their own roots */
     }
@@ -393,9 +395,10 @@ static int limit_composite(const mems_hexapod_online_f32_state *state, float wan
     int hit = 0;
     if (!(composite_bound(wanted) <= 1.0f)) {
         float share[12];
-        float worst = 0.0f;
+        float worst;
         int i;
         composite_shares(wanted, share);
+        worst = share[0];
         for (i = 0; i < 12; i++) {
             worst = (share[i] > worst) ? share[i] : worst;
         }
