@@ -145,6 +145,7 @@ class RrrStage(Device):
             rates=lambda V, u: piezo_stack.voltage_rate(V, u, p.piezo),
             force=lambda u, V, d: piezo_stack.blocked_force(V, p.piezo),
             restoring_force=lambda d: ca.mtimes(K_in, d) + piezo_stack.stiffness(p.piezo) * d,
+            documented={"force": (piezo_stack.blocked_force,)},
             restoring_force_parts=lambda d: {
                 "hinges": ca.mtimes(K_in, d),
                 "stacks": piezo_stack.stiffness(p.piezo) * d,
