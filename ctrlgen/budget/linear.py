@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.budget.uncertain_path import UncertainPath
+from ctrlgen.budget.uncertainty import Uncertainties
 from ctrlgen.numerics.batched_evaluation import evaluate
 
 BLOCK = 500  # samples whose Jacobians are kept at once
@@ -33,6 +34,12 @@ class Propagated:
     sensitivity: dict[str, np.ndarray]
     scatter: dict[str, dict[str, np.ndarray]]
     states: np.ndarray
+
+    def combined(self, name: str, stated: Uncertainties) -> np.ndarray:
+        """(n, n_y) combined standard uncertainty, GUM 5.2: u_c^2 = Y cov Y' and what scatters."""
+        Y = self.sensitivity[name]
+        variance = np.sum((Y @ stated.covariance) * Y, axis=2)
+        return np.sqrt(np.maximum(variance, 0.0) + sum(sd**2 for sd in self.scatter[name].values()))
 
 
 def propagate(path: UncertainPath) -> Propagated:
@@ -99,7 +106,7 @@ def _drive_covariance(path: UncertainPath, name: str) -> np.ndarray:
 
 def _diagonal(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     """The diagonal of C P C'."""
-    return np.einsum("ij,jk,ik->i", C, P, C)
+    return np.sum((C @ P) * C, axis=1)
 
 
 def _columns(path: UncertainPath) -> np.ndarray:

@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 from ctrlgen.budget.uncertainty import AMBIENT, Uncertainties
 from ctrlgen.devices import Limit
 from ctrlgen.model.assembly import build_model, movable
-from ctrlgen.model.discretisation import one_step_map, settling_time
+from ctrlgen.model.discretisation import NEWTON_STEPS, one_step_map, settling_time
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import Recursion
 from ctrlgen.trajectory.solution import Solution
@@ -47,29 +47,41 @@ class UncertainPath:
         self.rise = ca.SX.sym("surroundings")
         self.model = _warmed(build_model(device, self.free, self.rise), self.free, self.rise)
         self.sample_time = inf if scenario.sample_time is None else scenario.sample_time
-        sample = one_step_map(self.model, self.sample_time)
         m = self.model
         self.state, self.q = ca.vertcat(m.x, m.z), ca.vertcat(m.p, self.rise)
         self.q_nominal = np.append(m.p_nominal, 0.0)
-        following = ca.substitute(ca.vertcat(sample.x, sample.z), sample.u_next, m.u)
         self.signal = m.signals[scenario.file.follow]
         self.limits = tuple(limit for limit in m.limits if not self._commanded(limit))
-        self.parts = {
-            "step": following,
-            "pose": self.signal.expr,
-            "limits": ca.vertcat(ca.SX(0, 1), *(limit.expr for limit in self.limits)),
-        }
         self.constants: dict[str, ca.Function] = {}
         self.of_sample: dict[str, ca.Function] = {}
-        for name, value in self.parts.items():
-            (expression,), symbols, values = ca.extract_parametric([value], self.q, {"extract_trivial": True})
-            c = ca.vertcat(ca.SX(0, 1), *symbols)
-            given = [self.state, m.u, c]
-            self.parts[name] = expression
-            self.constants[name] = ca.Function(f"{name}_constants", [self.q], [ca.vertcat(ca.SX(0, 1), *values)])
-            self.of_sample[name] = ca.Function(name, given, [ca.densify(expression)], {"cse": True})
+        self._add("step", self._following(NEWTON_STEPS))
+        self._add("pose", self.signal.expr)
+        self._add("limits", ca.vertcat(ca.SX(0, 1), *(limit.expr for limit in self.limits)))
         self.drive, self.before = self._drives()
         self.start = self._start()
+
+    def _following(self, newton_steps: int) -> ca.SX:
+        sample = one_step_map(self.model, self.sample_time, newton_steps=newton_steps)
+        return ca.substitute(ca.vertcat(sample.x, sample.z), sample.u_next, self.model.u)
+
+    def _add(self, name: str, value: ca.SX) -> None:
+        """A part (S, v, c) -> value, with c(q) what depends on q alone."""
+        (expression,), symbols, values = ca.extract_parametric([value], self.q, {"extract_trivial": True})
+        c = ca.vertcat(ca.SX(0, 1), *symbols)
+        given = [self.state, self.model.u, c]
+        self.constants[name] = ca.Function(f"{name}_constants", [self.q], [ca.vertcat(ca.SX(0, 1), *values)])
+        self.of_sample[name] = ca.Function(name, given, [ca.densify(expression)], {"cse": True})
+
+    def quickest_step(self, states: np.ndarray, allowed: np.ndarray) -> str:
+        """The name of the step with the fewest of Newton's iterations that takes the followed signal along the described path's `states`
+        within `allowed` (n_y,) [SI]: each sample begins at the displacement of the one before."""
+        exact = self.evaluate("pose", states, self.drive)
+        for newton_steps in range(1, NEWTON_STEPS if not self.model.inertial else 1):
+            self._add("quick_step", self._following(newton_steps))
+            found = self.evaluate("pose", self.nominal(step="quick_step"), self.drive)
+            if np.all(np.abs(found - exact).max(axis=0) <= allowed):
+                return "quick_step"
+        return "step"
 
     def _commanded(self, limit: Limit) -> bool:
         """Whether it limits the commanded drives, which are computed and hence known."""
@@ -131,14 +143,13 @@ class UncertainPath:
         """The place behind all gains, of what acts on no motion."""
         return len(self.q_nominal) + 1 + self.drive.shape[1]
 
-    def nominal(self, drive: np.ndarray | None = None) -> np.ndarray:
+    def nominal(self, drive: np.ndarray | None = None, step: str = "step") -> np.ndarray:
         """S (before + n, n_s) of the described device, under the path's `drive` (before + n, n_u) or another one."""
-        constants = self.constants["step"](self.q_nominal)
-        one = self.of_sample["step"]
+        constants, one = self.constants[step](self.q_nominal), self.of_sample[step]
         state, v = ca.MX.sym("S", self.state.numel()), ca.MX.sym("v", self.model.u.numel())
         following = one(state, v, constants)
-        step = Recursion(ca.Function("step", [state, v], [following, following]))
-        return step.run(self.start, self.drive if drive is None else drive)[0]
+        recursion = Recursion(ca.Function("step", [state, v], [following, following]))
+        return recursion.run(self.start, self.drive if drive is None else drive)[0]
 
     def evaluate(self, name: str, S: np.ndarray, drive: np.ndarray) -> np.ndarray:
         """The `pose` or the `limits` (n, n_y) of the described device, at states S (n, n_s) and drives (n, n_u)."""
