@@ -31,7 +31,8 @@ from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.evidence.unknown_input import estimate_unknown_input
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, written
+from ctrlgen.devices.changed_numbers import written
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.recordings.reader import load_recordings
