@@ -153,6 +153,15 @@ def error_budget(
     Sources: JCGM 100:2008 section 5; JCGM 101:2008; A. H. Slocum, Precision Machine Design (1992), chapter 2.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    _check(probability, draws)
+    progress("symbolic model")
+    model = model_of(scenario)
+    stated = load_uncertainties(scenario, model, uncertainty)
+    return budget_of(solve(scenario, model, progress), stated, probability, draws, seed, progress)
+
+
+def _check(probability: float, draws: int) -> None:
+    """Refuses a probability or a number of draws that means nothing. Raises InputError."""
     faults = []
     if not 0.5 <= probability < 1:
         faults.append(Fault("probability", f"{probability:g} must be at least 0.5 and below 1, such as 0.999"))
@@ -160,10 +169,17 @@ def error_budget(
         faults.append(Fault("draws", f"{draws} must be 0, or between {FEWEST_DRAWS} and {MOST_DRAWS}"))
     if faults:
         raise InputError("budget", faults)
-    progress("symbolic model")
-    model = model_of(scenario)
-    stated = load_uncertainties(scenario, model, uncertainty)
-    solution = solve(scenario, model, progress)
+
+
+def budget_of(
+    solution: Solution,
+    stated: Uncertainties,
+    probability: float = PROBABILITY,
+    draws: int = DRAWS,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> ErrorBudget:
+    """The error budget of a path that is solved already; as `error_budget`."""
     progress("sensitivities along the path")
     path = UncertainPath(solution, stated)
     linear = _propagated(path)

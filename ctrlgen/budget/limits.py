@@ -27,7 +27,7 @@ SAME = 1e-12  # relative change of a bound that is rounding
 
 @dataclass(frozen=True)
 class Safety:
-    """One limit where it is least safe, SI: `channel`, `sample`, the `bound` on its `side`, the margin as described, its standard
+    """One bound of a limit where it is least safe, SI: `channel`, `sample`, the `bound` on its `side`, the margin as described, its standard
     uncertainty `sd`, what is left of it at the chosen probability (`kept`, negative where it is not kept), and the `probability` with
     which it holds there. `drawn`: what the draws leave at the chosen probability; None where they are too few to say."""
 
@@ -69,15 +69,24 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
     def model_with(columns: Sequence[int]) -> Model:
         return build_model(changed(path.model.device, {names[i]: values[names[i]] + sds[i] for i in columns}))
 
-    def moved(columns: Sequence[int]) -> list[int]:
-        """Those of the columns that change a bound, found by halving."""
-        if not columns or np.allclose(_bounds(path, model_with(columns)), before, rtol=SAME, atol=0.0):
+    def same(bounds: np.ndarray, others: np.ndarray) -> bool:
+        return np.allclose(bounds, others, rtol=SAME, atol=0.0)
+
+    def moved(columns: Sequence[int], after: np.ndarray) -> list[int]:
+        """Those of the columns, with which the bounds are those `after`, that change one: by halving, for a model takes its time."""
+        if not columns or same(after, before):
             return []
-        half = len(columns) // 2
-        return list(columns) if len(columns) == 1 else moved(columns[:half]) + moved(columns[half:])
+        if len(columns) == 1:
+            return list(columns)
+        first, second = columns[: len(columns) // 2], columns[len(columns) // 2 :]
+        bounds = _bounds(path, model_with(first))
+        if same(bounds, after):
+            return moved(first, after)
+        return moved(first, bounds) + moved(second, after if same(bounds, before) else _bounds(path, model_with(second)))
 
     idle, faults = [i for i in own if names[i] in path.idle], list[Fault]()
-    for i in {*moved([i for i in own if i not in idle]), *idle}:
+    moving = [i for i in own if i not in idle]
+    for i in {*moved(moving, _bounds(path, model_with(moving))), *idle}:
         other = model_with([i])
         after = _bounds(path, other)
         with np.errstate(invalid="ignore"):  # what has no bound stays without
@@ -114,8 +123,8 @@ def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) ->
 
 @dataclass(frozen=True)
 class Margins:
-    """Of each side of each limited quantity, (2, n, channels): the margin (infinite without a bound), its sd, and the slopes
-    (2, n, channels, m) are those of `Slopes` and of the propagation, `sign` -1 where the bound is above."""
+    """Of the lower and the upper bound of each limited quantity: the margin (2, n, channels), infinite without a bound, its sd, and the
+    `bounds` (2, channels)."""
 
     margin: np.ndarray
     sd: np.ndarray
@@ -142,22 +151,25 @@ def margins(path: UncertainPath, linear: Propagated, slopes: Slopes) -> Margins:
 def safeties(
     path: UncertainPath, found: Margins, slopes: Slopes, drawn: Drawn | None, critical: np.ndarray, probability: float
 ) -> tuple[Safety, ...]:
-    """Each limit where it is least safe; `critical` (channels,) are the samples of the draws."""
+    """Each bound of each limit where it is least safe; `critical` (2, channels) are the samples of the draws."""
     z = float(norm.ppf(probability))
     least, rows = found.least(z), []
     places = [limit.name for limit, _ in path.channels]
     for limit in path.limits:
         own = [i for i, name in enumerate(places) if name == limit.name]
-        side, i = min(((s, i) for s in (0, 1) for i in own), key=lambda at: least[at[0], critical[at[1]], at[1]])
-        k = int(critical[i])
-        margin, sd = float(found.margin[side, k, i]), float(found.sd[side, k, i])
-        rows.append(
-            Safety(
-                limit, limit.channels[i - own[0]], "lower" if side == 0 else "upper", k, float(found.bounds[side, i]), margin, sd,
-                margin - z * sd, float(norm.cdf(margin / sd)) if sd else float(margin >= 0),
-                _drawn_margin(drawn, slopes, side, k, i, float(found.bounds[side, i]), probability),
-            )
-        )  # fmt: skip
+        for side in (0, 1):
+            i = min(own, key=lambda i: least[side, critical[side, i], i])
+            if not np.isfinite(found.bounds[side, i]):
+                continue
+            k = int(critical[side, i])
+            margin, sd = float(found.margin[side, k, i]), float(found.sd[side, k, i])
+            rows.append(
+                Safety(
+                    limit, limit.channels[i - own[0]], "lower" if side == 0 else "upper", k, float(found.bounds[side, i]), margin, sd,
+                    margin - z * sd, float(norm.cdf(margin / sd)) if sd else float(margin >= 0),
+                    _drawn_margin(drawn, slopes, side, k, i, float(found.bounds[side, i]), probability),
+                )
+            )  # fmt: skip
     return tuple(rows)
 
 
@@ -167,12 +179,11 @@ def _drawn_margin(
     """The margin that is exceeded with the `probability` in the draws."""
     if drawn is None or len(drawn.columns) * (1 - probability) < LEAST_TAIL:
         return None
-    y = drawn.limits[:, i] + drawn.columns @ slopes.direct[k, i]
+    y = drawn.limits[:, side, i] + drawn.columns @ slopes.direct[k, i]
     b = bound + drawn.columns @ (slopes.lower if side == 0 else slopes.upper)[i]
     return float(np.quantile(y - b if side == 0 else b - y, 1 - probability))
 
 
 def critical_samples(found: Margins, probability: float) -> np.ndarray:
-    """(channels,) the sample at which each limited quantity is least safe."""
-    least = found.least(float(norm.ppf(probability))).min(axis=0)
-    return np.asarray(np.argmin(least, axis=0))
+    """(2, channels) the sample at which each limited quantity is nearest to its lower and to its upper bound, at the `probability`."""
+    return np.asarray(np.argmin(found.least(float(norm.ppf(probability))), axis=1))

@@ -23,10 +23,10 @@ STEP_ERROR = 1e-3  # of the combined uncertainty: what a step of a draw may leav
 @dataclass(frozen=True)
 class Drawn:
     """What the draws gave, SI: deviations of the followed signal `pose` (draws, kept, n_y) at the samples `kept`; limited quantities
-    `limits` (draws, channels), each at its own sample; `columns` (draws, m) the deviations that were drawn; `lost`, how many further
+    `limits` (draws, 2, channels), each at its own sample for the lower and the upper bound; `columns` (draws, m) the deviations that were drawn; `lost`, how many further
     draws ended in no number.
 
-    `alone` (2, m, kept, n_y): the pose's deviations with each column alone at plus and minus its standard deviation.
+    `alone` (2, m, kept, n_y): the pose's deviations with each column alone at plus and minus its standard deviation, nothing scattering.
     """
 
     kept: np.ndarray
@@ -42,21 +42,21 @@ def draw(
 ) -> Drawn:
     """`draws` devices led along the path, compared with its nominal pose in `linear` at the samples `kept`.
 
-    `critical` (channels,): the sample at which each limited quantity is kept.
+    `critical` (2, channels): the sample at which each limited quantity is kept, for its lower and its upper bound.
     """
     rng, stated, pose = np.random.default_rng(seed), path.uncertainties, linear.nominal["pose"]
     m = len(stated.sds)
     deviations = rng.multivariate_normal(np.zeros(m), stated.covariance, draws, method="eigh")
     one_by_one = np.diag(stated.sds)
-    columns = np.vstack([deviations, one_by_one, -one_by_one])
+    columns = np.vstack([deviations, one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
     q, gain = _numbers(path, columns)
-    scatter = _Scatter(path, rng, draws, 2 * m)
+    scatter = _Scatter(path, rng, draws, 2 * m + 1)
     allowed = STEP_ERROR * linear.combined("pose", stated).max(axis=0)
     step = _Mapped(path, path.quickest_step(linear.states, allowed), q)
     outputs = {"pose": _Mapped(path, "pose", q), "limits": _Mapped(path, "limits", q)}
     S = np.tile(path.start, (len(q), 1))
     found = np.empty((len(q), len(kept), pose.shape[1]))
-    limits = np.empty((len(q), len(critical)))
+    limits = np.empty((len(q), *critical.shape))
     place = {int(k): i for i, k in enumerate(kept)}
     for k, v in enumerate(path.drive):
         drive = v * gain + scatter.at(k)
@@ -65,11 +65,11 @@ def draw(
         if sample in place:
             found[:, place[sample]] = outputs["pose"](S, drive) - pose[sample]
         if np.any(here := critical == sample):
-            limits[:, here] = outputs["limits"](S, drive)[:, here]
-    good = np.isfinite(found[:draws]).all(axis=(1, 2)) & np.isfinite(limits[:draws]).all(axis=1)
+            limits[:, here] = np.stack([outputs["limits"](S, drive)] * 2, axis=1)[:, here]
+    good = np.isfinite(found[:draws]).all(axis=(1, 2)) & np.isfinite(limits[:draws]).all(axis=(1, 2))
     return Drawn(
         kept, found[:draws][good], limits[:draws][good], deviations[good],
-        found[draws:].reshape(2, m, *found.shape[1:]), int((~good).sum()),
+        (found[draws:-1] - found[-1]).reshape(2, m, *found.shape[1:]), int((~good).sum()),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import Quantity, parse, to_si, written_unit
+from ctrlgen.core.units import Quantity, parse, same_dimension, to_si, written_unit
 from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Input, Scenario
@@ -228,6 +228,8 @@ class _Reader:
         values = [abs(self.numbers[path].si) for path in paths]
         if to_si(0.0, unit):
             per = "1 K", (1.0,) * len(paths)
+        elif same_dimension(unit, "rad"):
+            per = "1 mrad", (1e-3,) * len(paths)
         elif min(values) > 0:
             per = "1 %", tuple(0.01 * value for value in values)
         else:
