@@ -35,17 +35,19 @@ def print_budget(budget: ErrorBudget) -> None:
         halves = ", ".join(
             f"{g.shown(budget.peak(g)):.4g} -> {g.shown(line.halved[g.name]):.4g} {g.unit}" for g in budget.groups
         )
-        out.print(f"{'next' if k == 0 else 'then'}: halve the sd of {line.name}: {halves}", markup=False, soft_wrap=True)
+        out.print(
+            f"{'next' if k == 0 else 'then'}: halve the sd of {line.name}: {halves}", markup=False, soft_wrap=True
+        )
     for safety in budget.safeties:
         style = None if safety.kept >= 0 else "red"
         out.print(safety_sentence(safety, budget.probability), markup=False, soft_wrap=True, style=style)
     for a in budget.agreements:
-        g = a.group
-        verdict = "agree" if a.passed else "DIFFER"
-        out.print(
-            f"{budget.draws} draws: {g.name} {g.shown(a.drawn):.4g} {g.unit}, first order {g.shown(a.linear):.4g} {g.unit}; they {verdict}: "
-            f"at most {100 * a.difference:.1f} % in the sd, {100 * a.difference_of_interval:.1f} % in the 95 % interval",
-            markup=False, soft_wrap=True, style=None if a.passed else "yellow",
-        )  # fmt: skip
-    for reason in budget.reasons:
+        g, verdict = a.group, "agree" if a.passed else "DIFFER"
+        both = f"{g.name} {g.shown(a.drawn):.4g} {g.unit}, first order {g.shown(a.linear):.4g} {g.unit}"
+        off = (
+            f"at most {100 * a.difference:.1f} % in the sd, {100 * a.difference_of_interval:.1f} % in the 95 % interval"
+        )
+        style = None if a.passed else "yellow"
+        out.print(f"{budget.draws} draws: {both}; they {verdict}: {off}", markup=False, soft_wrap=True, style=style)
+    for reason in (*budget.reasons, *budget.notes):
         out.print(reason, markup=False, soft_wrap=True, style="yellow")

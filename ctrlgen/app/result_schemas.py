@@ -1,4 +1,4 @@
-"""Writes the JSON Schemas of budget.json, build.json, diagnosis.json and summary.json: `python -m ctrlgen.app.result_schemas`, `make schemas`."""
+"""Writes the JSON Schemas of the result files: `python -m ctrlgen.app.result_schemas`, `make schemas`."""
 
 from __future__ import annotations
 

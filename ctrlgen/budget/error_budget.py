@@ -29,6 +29,7 @@ FEWEST_DRAWS = 200  # the sd of as many draws is itself known to 5 %
 MOST_DRAWS = 1_000_000
 PROBABILITY = 0.999
 COVERAGE = 0.95
+MOST_LOST = 0.01  # share of draws that may end in no number, as a device beyond buckling does
 KEPT = 60  # samples along the path at which draws are kept
 TOLERANCE = 0.10  # of the first-order result, within which the draws confirm it
 COMPARED = 0.5  # of the largest uncertainty along the path: smaller ones are not compared
@@ -119,6 +120,15 @@ class ErrorBudget:
         return _rms(self.combined[:, group.channels])
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader should know of how the budget was made."""
+        lost = 0 if self.drawn is None else self.drawn.lost
+        what = (
+            f"{lost} of {self.draws} draws ended in no number, as of a device that no longer works, and were left out"
+        )
+        return (what,) if lost else ()
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """Why the draws differ from the first order; empty where they agree."""
         found = []
@@ -192,7 +202,7 @@ def budget_of(
     if draws:
         progress(f"{draws} draws")
         drawn = draw(path, linear, _kept(combined, groups), critical, draws, seed)
-        if drawn.lost:
+        if drawn.lost > MOST_LOST * draws:
             raise SolverError(
                 f"{drawn.lost} of {draws} draws ended in no number: some sds are so large that a draw is no device any more; lower them"
             )
@@ -243,22 +253,12 @@ def _lines(
     """Every contributor, the largest share first."""
     stated, Y = path.uncertainties, linear.sensitivity["pose"]
     covariance, lines, first = stated.covariance, list[BudgetLine](), 0
-    at = {g.name: np.unravel_index(int(combined[:, g.channels].argmax()), (len(combined), len(g.channels))) for g in groups}
 
-    def line(
-        name: str, sd: str, per: str, source: str, by_step: np.ndarray, own: np.ndarray, without: np.ndarray, half: np.ndarray,
-        bend: np.ndarray,
-    ) -> BudgetLine:  # fmt: skip
-        """`by_step`, `own` standard uncertainty, what is combined `without` it and with `half` of it: each (n, channels)."""
-        share = 0.0
-        for g in groups:
-            k, i = at[g.name]
-            if (total := combined[k, g.channels[i]]) > 0:
-                share = max(share, 1 - float(without[k, g.channels[i]] / total) ** 2)
+    def line(name: str, texts: tuple[str, str, str], seen: _Seen) -> BudgetLine:
         return BudgetLine(
-            name, sd, per, source, {g.name: _largest(by_step, g) for g in groups}, {g.name: _largest(own, g) for g in groups},
-            {g.name: _rms(own[:, g.channels]) for g in groups}, share, {g.name: _largest(half, g) for g in groups},
-            {g.name: _largest(bend, g) for g in groups},
+            name, *texts, {g.name: _largest(seen.by_step, g) for g in groups}, {g.name: _largest(seen.own, g) for g in groups},
+            {g.name: _rms(seen.own[:, g.channels]) for g in groups}, _share(combined, seen.without, groups),
+            {g.name: _largest(seen.half, g) for g in groups}, {g.name: _largest(seen.bend, g) for g in groups},
         )  # fmt: skip
 
     for uncertain in stated.lines:
@@ -266,27 +266,50 @@ def _lines(
         first = columns.stop
         own = np.sqrt(np.sum((Y[:, :, columns] * uncertain.sds) ** 2, axis=2))
         by_step = np.abs(Y[:, :, columns] * uncertain.per[1]).max(axis=2)
-        halves = []
-        for factor in (0.0, 0.5):
-            scale = np.ones(len(covariance))
-            scale[columns] = factor
-            halves.append(_combined(linear, covariance * np.outer(scale, scale)))
         bend = np.zeros((1, Y.shape[1]))
         if drawn is not None:  # of several columns the one that bends most
             bend = np.abs(drawn.alone[:, columns].sum(axis=0) / 2).max(axis=0)
-        lines.append(
-            line(uncertain.name, uncertain.text, uncertain.per[0], uncertain.source, by_step, own, *halves, bend)
-        )
+        without, half = (_combined(linear, _scaled(covariance, columns, factor)) for factor in (0.0, 0.5))
+        texts = uncertain.text, uncertain.per[0], uncertain.source
+        lines.append(line(uncertain.name, texts, _Seen(by_step, own, without, half, bend)))
     for name, own in linear.scatter["pose"].items():
         others = {of: sd for of, sd in linear.scatter["pose"].items() if of != name}
-        halves = [
-            np.sqrt(np.maximum(_combined(linear, covariance, others) ** 2 + (f * own) ** 2, 0.0)) for f in (0.0, 0.5)
-        ]
+        without = _combined(linear, covariance, others)
         per, by_step = _by_step(path, linear, name, own)
+        texts = stated.texts[name], per, stated.sources[name]
         lines.append(
-            line(f"drive.{name}", stated.texts[name], per, stated.sources[name], by_step, own, *halves, np.zeros_like(own))
+            line(f"drive.{name}", texts, _Seen(by_step, own, without, np.hypot(without, own / 2), np.zeros_like(own)))
         )
     return tuple(sorted(lines, key=lambda found: -found.share))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What one contributor does, each (n, channels) [SI]: for one step, its standard uncertainty, what is combined without it and with
+    half of it, its second order."""
+
+    by_step: np.ndarray
+    own: np.ndarray
+    without: np.ndarray
+    half: np.ndarray
+    bend: np.ndarray
+
+
+def _share(combined: np.ndarray, without: np.ndarray, groups: tuple[Group, ...]) -> float:
+    """By how much the variance falls without it where the combined one is largest, of the group in which that is most."""
+    shares = []
+    for g in groups:
+        k, i = np.unravel_index(int(combined[:, g.channels].argmax()), (len(combined), len(g.channels)))
+        total = combined[k, g.channels[i]]
+        shares.append(1 - float(without[k, g.channels[i]] / total) ** 2 if total else 0.0)
+    return max(shares)
+
+
+def _scaled(covariance: np.ndarray, columns: slice, factor: float) -> np.ndarray:
+    """The covariance with the sds of some columns times a factor."""
+    scale = np.ones(len(covariance))
+    scale[columns] = factor
+    return covariance * np.outer(scale, scale)
 
 
 def _combined(linear: Propagated, covariance: np.ndarray, scatter: dict[str, np.ndarray] | None = None) -> np.ndarray:
@@ -320,5 +343,3 @@ def _agreement(group: Group, combined: np.ndarray, drawn: Drawn) -> Agreement:
     return Agreement(
         group, float(linear.max()), float(sd.max()), off(sd, linear), off((high - low) / 2, expected), float(np.abs(mean).max())
     )  # fmt: skip
-
-

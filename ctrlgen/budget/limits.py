@@ -27,8 +27,8 @@ SAME = 1e-12  # relative change of a bound that is rounding
 
 @dataclass(frozen=True)
 class Safety:
-    """One bound of a limit where it is least safe, SI: `channel`, `sample`, the `bound` on its `side`, the margin as described, its standard
-    uncertainty `sd`, what is left of it at the chosen probability (`kept`, negative where it is not kept), and the `probability` with
+    """One bound of a limit where it is least safe, SI: `channel`, `sample`, the `bound` on its `side`, the margin as described, its
+    standard uncertainty `sd`, what is left of it at the chosen probability (`kept`, negative where it is not kept), and the `probability` with
     which it holds there. `drawn`: what the draws leave at the chosen probability; None where they are too few to say."""
 
     limit: Limit
@@ -82,7 +82,9 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
         bounds = _bounds(path, model_with(first))
         if same(bounds, after):
             return moved(first, after)
-        return moved(first, bounds) + moved(second, after if same(bounds, before) else _bounds(path, model_with(second)))
+        return moved(first, bounds) + moved(
+            second, after if same(bounds, before) else _bounds(path, model_with(second))
+        )
 
     idle, faults = [i for i in own if names[i] in path.idle], list[Fault]()
     moving = [i for i in own if i not in idle]
@@ -95,7 +97,9 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
             values_of = [_limited(path, model, trace.x, trace.z) for model in (path.solution.model, other)]
             slopes.direct[:, :, i] = (values_of[1] - values_of[0]) / sds[i]
         if i in idle and not (slopes.lower[:, i].any() or slopes.upper[:, i].any() or slopes.direct[:, :, i].any()):
-            faults.append(Fault(f'numbers."{names[i]}"', "acts on neither motion nor limits of this device; leave it out"))
+            faults.append(
+                Fault(f'numbers."{names[i]}"', "acts on neither motion nor limits of this device; leave it out")
+            )
     if faults:
         source = path.uncertainties.inputs.get("uncertainty")
         raise InputError(source.path if source else path.solution.scenario.path, faults)
@@ -117,7 +121,9 @@ def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) ->
     n, wanted = path.n, [limit.name for limit in path.limits]
     u = path.drive[path.before :]
     values = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
-    named = dict(zip((limit.name for limit in model.limits), values if len(model.limits) > 1 else [values], strict=True))
+    named = dict(
+        zip((limit.name for limit in model.limits), values if len(model.limits) > 1 else [values], strict=True)
+    )
     return np.vstack([named[name].full() for name in wanted]).T
 
 

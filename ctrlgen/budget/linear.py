@@ -54,9 +54,7 @@ def propagate(path: UncertainPath) -> Propagated:
     X, P = np.zeros((n_s, len(columns))), {of: np.zeros((n_s, n_s)) for of in scatters}
     outputs = {name: _slopes(path, name) for name, y in nominal.items() if y.shape[1]}
     for a, b, (A, B, F_q) in _along(path, _slopes(path, "step"), np.vstack([path.start, S[:-1]])):
-        measured = {
-            name: next(_along(path, slopes, S, (a, b)))[2] for name, slopes in outputs.items() if b > before
-        }
+        measured = {name: next(_along(path, slopes, S, (a, b)))[2] for name, slopes in outputs.items() if b > before}
         for k in range(a, b):
             j, v = k - a, path.drive[k]
             X = A[j] @ X + _with_gains(F_q[j], B[j], v)[:, columns]
@@ -150,7 +148,11 @@ def _along(
     for a in range(0, len(S), BLOCK) if only is None else (only[0],):
         b = min(a + BLOCK, len(S)) if only is None else only[1]
         values = evaluate(slopes.map(b - a), S[a:b], path.drive[a:b])
-        yield a, b, [
-            value.reshape(b - a, slopes.size2_out(i), slopes.size1_out(i)).transpose(0, 2, 1)
-            for i, value in enumerate(values)
-        ]
+        yield (
+            a,
+            b,
+            [
+                value.reshape(b - a, slopes.size2_out(i), slopes.size1_out(i)).transpose(0, 2, 1)
+                for i, value in enumerate(values)
+            ],
+        )

@@ -23,8 +23,8 @@ STEP_ERROR = 1e-3  # of the combined uncertainty: what a step of a draw may leav
 @dataclass(frozen=True)
 class Drawn:
     """What the draws gave, SI: deviations of the followed signal `pose` (draws, kept, n_y) at the samples `kept`; limited quantities
-    `limits` (draws, 2, channels), each at its own sample for the lower and the upper bound; `columns` (draws, m) the deviations that were drawn; `lost`, how many further
-    draws ended in no number.
+    `limits` (draws, 2, channels), each at its own sample for the lower and the upper bound; `columns` (draws, m) the deviations that
+    were drawn; `lost`, how many further draws ended in no number.
 
     `alone` (2, m, kept, n_y): the pose's deviations with each column alone at plus and minus its standard deviation, nothing scattering.
     """
@@ -97,18 +97,19 @@ class _Scatter:
     def __init__(self, path: UncertainPath, rng: np.random.Generator, draws: int, still: int) -> None:
         stated = path.uncertainties
         names = {"converter": stated.bits is not None, "arithmetic": stated.single, "jitter": stated.jitter > 0}
-        self.sources = [drive_deviations(path, name) for name, given in names.items() if given]
+        given = [drive_deviations(path, name) for name, given in names.items() if given]
+        zero = np.zeros(path.drive.shape)
+        self.rounding = np.sqrt(3 * sum((sd**2 for sd, together in given if not together), zero))
+        self.late = sum((sd for sd, together in given if together), zero)
         self.rng, self.shape, self.still = rng, (draws, path.drive.shape[1]), still
 
     def at(self, k: int) -> np.ndarray:
-        """(draws + still, n_u) errors of the drive number `k`: rounding is uniform, jitter normal."""
+        """(draws + still, n_u) errors of the drive number `k`: rounding is uniform, of converter and arithmetic together, jitter normal."""
         error = np.zeros((self.shape[0] + self.still, self.shape[1]))
-        for sd, together in self.sources:
-            if together:
-                error[: self.shape[0]] += self.rng.standard_normal((self.shape[0], 1)) * sd[k]
-            else:
-                uniform = self.rng.random(self.shape, dtype=np.float32)
-                error[: self.shape[0]] += (2 * uniform - 1) * (np.sqrt(3) * sd[k])
+        if self.rounding[k].any():
+            error[: self.shape[0]] += (2 * self.rng.random(self.shape, dtype=np.float32) - 1) * self.rounding[k]
+        if self.late[k].any():
+            error[: self.shape[0]] += self.rng.standard_normal((self.shape[0], 1)) * self.late[k]
         return error
 
 

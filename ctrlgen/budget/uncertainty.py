@@ -187,7 +187,9 @@ class _Reader:
                 of = model.signals["drive"].channels if key == "channel_gain" else ("all",)
                 name, per = f"drive.{key}", ("1 %", (0.01,) * len(of))
                 self.lines.append(Uncertain(name, kind, of, (share,) * len(of), own.sd, own.source, per))
-        self.jitter = 0.0 if file.drive.jitter is None else self._absolute("drive.jitter.sd", file.drive.jitter.sd, "s", "1 us")
+        self.jitter = (
+            0.0 if file.drive.jitter is None else self._absolute("drive.jitter.sd", file.drive.jitter.sd, "s", "1 us")
+        )
         self._check_drive(scenario, model)
         self._check_correlations()
 
@@ -212,7 +214,9 @@ class _Reader:
             unit = written_unit(number.text)
             if stated.sd.strip().endswith("%"):
                 if number.si == 0 or to_si(0.0, unit):
-                    what = f'sd = "{stated.sd}" is a share of {number.text}, which does not count from a zero of its own'
+                    what = (
+                        f'sd = "{stated.sd}" is a share of {number.text}, which does not count from a zero of its own'
+                    )
                     self.faults.append(Fault(where, f'{what}; write a difference, such as "1 {_step(unit)}"'))
                     return
                 sds.append(self._share(f"{where}.sd", stated.sd) * abs(number.si))
@@ -240,7 +244,9 @@ class _Reader:
     def _share(self, where: str, text: str) -> float:
         """A share such as "5 %" or 0.05, as a number; NaN with a fault where it is none."""
         body = text.strip()
-        return self._positive(where, text, "1", body.removesuffix("%").strip(), 0.01 if body.endswith("%") else 1.0, "0.5 %")
+        return self._positive(
+            where, text, "1", body.removesuffix("%").strip(), 0.01 if body.endswith("%") else 1.0, "0.5 %"
+        )
 
     def _absolute(self, where: str, text: str, unit: str, example: str) -> float:
         return self._positive(where, text, "delta_degC" if to_si(0.0, unit) else unit, text, 1.0, example)
@@ -259,13 +265,19 @@ class _Reader:
         """Faults of what is stated of a drive or of surroundings that have no such thing."""
         low, high = model.u_bounds
         if self.file.drive.converter is not None and not np.all(np.isfinite(high - low)):
-            what = "needs a range, but the drive has no limits of its own; state them in the device file, or leave it out"
+            what = (
+                "needs a range, but the drive has no limits of its own; state them in the device file, or leave it out"
+            )
             self.faults.append(Fault("drive.converter", what))
         if self.file.drive.jitter is not None and scenario.sample_time is None:
             what = "is of a motion in time, but the scenario is a row of equilibria; leave it out"
             self.faults.append(Fault("drive.jitter", what))
         heated = model.n_states > 0 and any(path.endswith(AMBIENT) for path in self.numbers)
-        if self.file.surroundings is not None and not heated and not any("ambient" in e.requires for e in model.device.effect):
+        if (
+            self.file.surroundings is not None
+            and not heated
+            and not any("ambient" in e.requires for e in model.device.effect)
+        ):
             what = "act on nothing: no heater of this device cools to them, no effect reads them; leave them out"
             self.faults.append(Fault("surroundings", what))
 

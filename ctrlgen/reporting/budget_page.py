@@ -1,4 +1,4 @@
-"""The report of an error budget: budget.json, budget.csv of the band along the path, band.svg, one self-contained budget.html."""
+"""The report of an error budget: budget.json, figures, one self-contained budget.html."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def budget_record(budget: ErrorBudget) -> dict[str, Any]:
     signal = solution.model.signals[scenario.file.follow]
     inputs = {**scenario.digest, **{name: read.sha256 for name, read in stated.inputs.items()}}
     return {
-        **origin(inputs, budget.seed if budget.draws else None),
+        **origin(inputs, budget.seed if budget.draws else None, budget.notes),
         "scenario": scenario.name, "title": scenario.file.title, "device": solution.model.name, "signal": scenario.file.follow,
         "samples": len(solution.command), "coverage_factor": budget.factor,
         "groups": [
@@ -217,7 +217,9 @@ def _magnification(half: float, extent: float) -> float:
 def _draw_contributors(budget: ErrorBudget) -> Figure:
     """The largest contributors: the standard uncertainty that each causes, and all combined."""
     lines = [line for line in budget.lines if any(line.peak.values())][:SHOWN]
-    figure, axes = plt.subplots(1, len(budget.groups), figsize=(8.2, 0.6 + 0.24 * (len(lines) + 1)), sharey=True, squeeze=False)
+    figure, axes = plt.subplots(
+        1, len(budget.groups), figsize=(8.2, 0.6 + 0.24 * (len(lines) + 1)), sharey=True, squeeze=False
+    )
     names = [line.name for line in lines] + ["combined"]
     for axis, group in zip(axes[0], budget.groups, strict=True):
         values = [group.shown(line.peak[group.name]) for line in lines] + [group.shown(budget.peak(group))]

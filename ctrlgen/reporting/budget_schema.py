@@ -17,14 +17,18 @@ class GroupEntry(Keys):
     channels: list[str] = Field(description="Its channels.")
     combined_peak: float = Field(description="Largest combined standard uncertainty of a channel along the path.")
     combined_rms: float = Field(description="Root mean square along the path, of the channel with the largest.")
-    band95: float = Field(description="Half width of the 95 % band where it is widest: coverage_factor times combined_peak.")
+    band95: float = Field(
+        description="Half width of the 95 % band where it is widest: coverage_factor times combined_peak."
+    )
 
 
 class ByGroup(Keys):
     """Effect of one contributor on one group, in the unit of the group."""
 
     group: str = Field(description="Name of the group.")
-    sensitivity: float = Field(description="Largest deviation of a channel along the path for one step `per` of the contributor.")
+    sensitivity: float = Field(
+        description="Largest deviation of a channel along the path for one step `per` of the contributor."
+    )
     peak: float = Field(description="Largest standard uncertainty that it causes in a channel along the path.")
     rms: float = Field(description="Root mean square along the path, of the channel with the largest.")
     combined_if_halved: float = Field(description="Largest combined standard uncertainty if its sd were half.")
@@ -54,7 +58,9 @@ class AgreementEntry(Keys):
     linear: float = Field(description="Largest combined standard uncertainty to first order, at the compared samples.")
     drawn: float = Field(description="Largest standard deviation of the draws.")
     difference: float = Field(description="Largest relative difference of the standard deviation along the path.")
-    difference_of_interval: float = Field(description="Largest relative difference of the half width of the 95 % interval.")
+    difference_of_interval: float = Field(
+        description="Largest relative difference of the half width of the 95 % interval."
+    )
     mean: float = Field(description="Largest mean deviation of the draws.")
     tolerance: float = Field(description="Difference within which both agree.")
     passed: bool = Field(description="Whether they do.")
@@ -74,7 +80,9 @@ class SafetyEntry(Keys):
     margin_unit: str = Field(description="Unit of the three margins and of sd; K for a temperature.")
     margin: float = Field(description="Margin of the device as described.")
     sd: float = Field(description="Its standard uncertainty.")
-    margin_at_probability: float = Field(description="What is left of the margin at the chosen probability; negative where it is not kept.")
+    margin_at_probability: float = Field(
+        description="What is left of the margin at the chosen probability; negative where it is not kept."
+    )
     margin_drawn: Number = Field(description="The same by the draws; null where they are too few.")
     probability: float = Field(description="Probability with which the bound is kept at that sample, to first order.")
     kept: bool = Field(description="Whether the bound is kept at the chosen probability.")

@@ -21,7 +21,11 @@ def budget(
     scenario: ScenarioPath,
     out_folder: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder for budget.html, budget.json and figures; without it only the tables are printed.", show_default=False),
+        typer.Option(
+            "--out",
+            help="Folder for budget.html, budget.json and figures; without it only the tables are printed.",
+            show_default=False,
+        ),
     ] = None,
     uncertainty: Annotated[
         Path | None,
@@ -81,4 +85,6 @@ def _probability(text: str) -> float:
     try:
         return float(body.removesuffix("%")) / (100 if body.endswith("%") else 1)
     except ValueError:
-        raise InputError("--probability", [Fault(repr(text), 'is not a probability; write "99.9 %" or 0.999')]) from None
+        raise InputError(
+            "--probability", [Fault(repr(text), 'is not a probability; write "99.9 %" or 0.999')]
+        ) from None

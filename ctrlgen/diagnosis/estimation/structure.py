@@ -14,8 +14,7 @@ import numpy as np
 
 from ctrlgen.core.units import Quantity, written_unit
 from ctrlgen.devices import Device
-from ctrlgen.devices.changed_numbers import written
-from ctrlgen.devices.section import Section
+from ctrlgen.devices.changed_numbers import changed, written
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.hypotheses import (
     PARAMETER,

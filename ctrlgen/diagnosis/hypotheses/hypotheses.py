@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.units import Quantity, from_si
+from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.base import Section
 from ctrlgen.diagnosis.hypotheses.priors import DEFAULT, LawPrior, prior_of
