@@ -28,8 +28,10 @@ SAME = 1e-12  # relative change of a bound that is rounding
 @dataclass(frozen=True)
 class Safety:
     """One bound of a limit where it is least safe, SI: `channel`, `sample`, the `bound` on its `side`, the margin as described, its
-    standard uncertainty `sd`, what is left of it at the chosen probability (`kept`, negative where it is not kept), and the `probability` with
-    which it holds there. `drawn`: what the draws leave at the chosen probability; None where they are too few to say."""
+    standard uncertainty `sd`, and what is left of the margin at the chosen probability: `kept`, negative where it is not kept.
+
+    `probability` is that with which the bound is kept there; `drawn` what the draws leave of the margin, None where they are too few.
+    """
 
     limit: Limit
     channel: str
