@@ -112,7 +112,8 @@ def test_a_sensitivity_is_that_of_a_device_with_another_number(circle, linear, p
     pair = [driven(circle, {path: number(circle, path) + sign * step}) for sign in (1, -1)]
     slope = (pair[0] - pair[1]) / (2 * step)
     found = linear.sensitivity["pose"][:, :, columns.index(path)]
-    np.testing.assert_allclose(found, slope, atol=1e-4 * np.abs(slope).max(axis=0))  # of what differences leave
+    for kind in (slice(0, 3), TRANSLATIONS):  # by symmetry some numbers do not turn the platform: then rounding is left of a channel
+        assert np.abs(found - slope)[:, kind].max() <= 1e-4 * np.abs(slope[:, kind]).max()  # what differences leave
 
 
 def test_gains_are_those_of_scaled_drives(circle, linear, rng):
@@ -167,9 +168,11 @@ def test_a_draw_is_a_simulated_device(circle, budget):
     R = numbers["actuator.thermal_resistance"]
     u = circle.drive * gains + warmer / R
     deviation = driven(circle, numbers, u)[budget.drawn.kept]
-    np.testing.assert_allclose(
-        budget.drawn.pose[3], deviation, atol=3e-9
-    )  # m, rad: converter and jitter scatter by 0.2 nm
+    off = np.abs(budget.drawn.pose[3] - deviation).max(axis=0)
+    scatter = np.sqrt(sum(sd**2 for sd in budget.linear.scatter["pose"].values())).max(axis=0)
+    assert np.all(off < 5 * scatter) and np.all(
+        np.abs(deviation).max(axis=0) > 20 * scatter
+    )  # converter and jitter are drawn anew
 
 
 def test_the_ranking_is_by_what_is_left_without(circle, budget, tmp_path):
@@ -211,7 +214,9 @@ def test_a_limit_that_is_itself_uncertain(circle, tmp_path):
     np.testing.assert_allclose(
         found.sd[1][:, hot], np.hypot(5, 2), rtol=1e-6
     )  # T rises with the ambient, its limit does not
-    np.testing.assert_allclose(found.sd[0][:, hot], 0, atol=1e-6)  # T and the ambient, its lower bound, rise alike
+    np.testing.assert_allclose(
+        found.sd[0][:, hot], 0, atol=1e-5
+    )  # T and its lower bound, the ambient, rise alike; e^-14 is left of 2 K
     stress = [i for i, (limit, _) in enumerate(path.channels) if limit.name == "wire_stress"]
     step = changed(circle.model.device, {"actuator.ambient": number(circle, "actuator.ambient") + 2})
     trace = simulate(

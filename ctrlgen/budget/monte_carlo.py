@@ -46,7 +46,9 @@ def draw(
     """
     rng, stated, pose = np.random.default_rng(seed), path.uncertainties, linear.nominal["pose"]
     m = len(stated.sds)
-    deviations = rng.multivariate_normal(np.zeros(m), stated.covariance, draws, method="eigh")
+    deviations = (
+        rng.multivariate_normal(np.zeros(m), stated.covariance, draws, method="eigh") if m else np.zeros((draws, 0))
+    )
     one_by_one = np.diag(stated.sds)
     columns = np.vstack([deviations, one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
     q, gain = _numbers(path, columns)

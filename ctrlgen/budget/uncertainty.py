@@ -298,7 +298,7 @@ class _Reader:
         for pair in self.file.correlation:
             i, j = (columns.index(name) for name in pair.between)
             matrix[i, j] = matrix[j, i] = pair.coefficient
-        if np.linalg.eigvalsh(matrix).min() < -SINGULAR:
+        if np.linalg.eigvalsh(matrix).min(initial=0.0) < -SINGULAR:
             what = "contradict one another: no deviations can have these coefficients together; lower some of them"
             raise InputError(path, [Fault("correlation", what)])
         return matrix
