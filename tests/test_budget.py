@@ -112,7 +112,8 @@ def test_a_sensitivity_is_that_of_a_device_with_another_number(circle, linear, p
     pair = [driven(circle, {path: number(circle, path) + sign * step}) for sign in (1, -1)]
     slope = (pair[0] - pair[1]) / (2 * step)
     found = linear.sensitivity["pose"][:, :, columns.index(path)]
-    for kind in (slice(0, 3), TRANSLATIONS):  # by symmetry some numbers do not turn the platform: then rounding is left of a channel
+    # by symmetry some numbers do not turn the platform about an axis: rounding is then all that is left of that channel
+    for kind in (slice(0, 3), TRANSLATIONS):
         assert np.abs(found - slope)[:, kind].max() <= 1e-4 * np.abs(slope[:, kind]).max()  # what differences leave
 
 

@@ -97,7 +97,15 @@ def test_every_page_is_in_the_contents():
     assert pages <= {*listed, *(page for page in pages if page.startswith("reference/generated"))}
 
 
-FILES = [*Device.library.values(), DisplacementSensor, InterferometerSensor, ScenarioFile, RecordingFile, BatchFile, UncertaintyFile]
+FILES = [
+    *Device.library.values(),
+    DisplacementSensor,
+    InterferometerSensor,
+    ScenarioFile,
+    RecordingFile,
+    BatchFile,
+    UncertaintyFile,
+]
 
 
 @pytest.mark.parametrize("file", [*FILES, *RESULTS.values()], ids=lambda model: model.__name__)

@@ -85,7 +85,7 @@ class UncertaintyFile(Section):
     surroundings: Deviation | None = None
     """Temperature of what the heaters cool to, and of what effects call the surroundings, over the described one; the temperature at
     which the actuators are without force stays as described."""
-    drive: DriveChain = DriveChain()
+    drive: DriveChain | None = None
     """What stands between the computed drives and the actuators."""
     correlation: tuple[Correlation, ...] = ()
     """`[[correlation]]` tables; all other deviations are independent."""
@@ -145,7 +145,7 @@ def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None
     read = _Reader(scenario, model, file)
     if read.faults:
         raise InputError(found or scenario.path, read.faults)
-    drive = file.drive
+    drive = file.drive or DriveChain()
     if not read.lines and drive.converter is None and drive.jitter is None and drive.arithmetic == "double":
         what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{EXAMPLE}"
         raise InputError(found or scenario.path, [Fault("uncertainty", what)])
@@ -165,7 +165,7 @@ class _Reader:
     """The lines of a file and of the device's own sds, with all faults."""
 
     def __init__(self, scenario: Scenario, model: Model, file: UncertaintyFile) -> None:
-        self.numbers, self.file = dict(model.device.quantities()), file
+        self.numbers, self.file, self.drive = dict(model.device.quantities()), file, file.drive or DriveChain()
         self.faults: list[Fault] = []
         self.lines: list[Uncertain] = []
         self._taken: dict[str, str] = {}
@@ -182,13 +182,13 @@ class _Reader:
             )
         kinds: dict[str, Literal["gain", "channel gain"]] = {"gain": "gain", "channel_gain": "channel gain"}
         for key, kind in kinds.items():
-            if (own := getattr(file.drive, key)) is not None:
+            if (own := getattr(self.drive, key)) is not None:
                 share = self._share(f"drive.{key}.sd", own.sd)
                 of = model.signals["drive"].channels if key == "channel_gain" else ("all",)
                 name, per = f"drive.{key}", ("1 %", (0.01,) * len(of))
                 self.lines.append(Uncertain(name, kind, of, (share,) * len(of), own.sd, own.source, per))
         self.jitter = (
-            0.0 if file.drive.jitter is None else self._absolute("drive.jitter.sd", file.drive.jitter.sd, "s", "1 us")
+            0.0 if self.drive.jitter is None else self._absolute("drive.jitter.sd", self.drive.jitter.sd, "s", "1 us")
         )
         self._check_drive(scenario, model)
         self._check_correlations()
@@ -264,12 +264,12 @@ class _Reader:
     def _check_drive(self, scenario: Scenario, model: Model) -> None:
         """Faults of what is stated of a drive or of surroundings that have no such thing."""
         low, high = model.u_bounds
-        if self.file.drive.converter is not None and not np.all(np.isfinite(high - low)):
+        if self.drive.converter is not None and not np.all(np.isfinite(high - low)):
             what = (
                 "needs a range, but the drive has no limits of its own; state them in the device file, or leave it out"
             )
             self.faults.append(Fault("drive.converter", what))
-        if self.file.drive.jitter is not None and scenario.sample_time is None:
+        if self.drive.jitter is not None and scenario.sample_time is None:
             what = "is of a motion in time, but the scenario is a row of equilibria; leave it out"
             self.faults.append(Fault("drive.jitter", what))
         heated = model.n_states > 0 and any(path.endswith(AMBIENT) for path in self.numbers)

@@ -37,7 +37,8 @@ def write_all() -> None:
     """Every generated page."""
     OUT.mkdir(parents=True, exist_ok=True)
     pages = {
-        "devices": device_page(), "scenario": scenario_page(), "recording": recording_page(), "uncertainty": uncertainty_page(), "effects": effects_page(),
+        "devices": device_page(), "scenario": scenario_page(), "recording": recording_page(), "effects": effects_page(),
+        "uncertainty": uncertainty_page(),
         "commands": commands_page(), "results": results_page(), "settings": settings_page(), "python": python_page(),
         "equations": equations_page(), "priors": priors_page(),
     }  # fmt: skip
@@ -310,8 +311,8 @@ def results_page() -> str:
     folder = Path(reporting.__file__).parent / "schemas"
     lines = [
         GENERATED, "# Result files", "",
-        "`summary.json` (of `run` and `solve`), `build.json` (of `verify`), `diagnosis.json` (of `diagnose`) and `budget.json` (of `budget`) "
-        "hold every "
+        "`summary.json` (of `run` and `solve`), `build.json` (of `verify`), `diagnosis.json` (of `diagnose`) and `budget.json` (of "
+        "`budget`) hold every "
         "result for programs. Each states the version of its schema, the program's version, the sha256 of its inputs and the "
         "seed. The JSON Schemas are shipped with the package in `ctrlgen/reporting/schemas/`.", "",
     ]  # fmt: skip
