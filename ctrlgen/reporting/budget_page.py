@@ -149,7 +149,7 @@ def draw_band(budget: ErrorBudget) -> Figure:
     right.set_xlabel("sample" if static else "time [s]")
     right.set_ylabel(f"half width of the 95 % band [{group.unit}]")
     right.set_title("lines: first order" + ("" if budget.drawn is None else "; points: draws"), fontsize=8)
-    right.legend(fontsize=8, ncols=3, loc="lower right")
+    right.legend(fontsize=8, ncols=3, loc="best")
     return figure
 
 
@@ -179,7 +179,8 @@ def _draw_path_with_band(axes: Axes, budget: ErrorBudget, shown: list[int]) -> N
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel(f"{signal.channels[shown[0]]} [{unit}]")
         axes.set_ylabel(f"{signal.channels[shown[1]]} [{unit}]")
-    axes.set_title(f"95 % band across the path, {times:g} times as wide as it is", fontsize=8)
+    width = "to scale" if times == 1 else f"{times:g} times as wide as it is"
+    axes.set_title(f"95 % band across the path, {width}", fontsize=8)
 
 
 def _tangent(path: np.ndarray, closed: bool) -> np.ndarray:
@@ -225,6 +226,6 @@ def _draw_contributors(budget: ErrorBudget) -> Figure:
         values = [group.shown(line.peak[group.name]) for line in lines] + [group.shown(budget.peak(group))]
         axis.barh(range(len(names)), values, color=[COLOURS[0]] * len(lines) + [COLOURS[2]])
         axis.set_yticks(range(len(names)), names, fontsize=7)
-        axis.invert_yaxis()
         axis.set_xlabel(f"standard uncertainty, {group.name} [{group.unit}]")
+    axes[0, 0].invert_yaxis()  # shared: the first contributor on top
     return figure
