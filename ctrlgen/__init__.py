@@ -12,6 +12,7 @@ from ctrlgen.version import __version__
 if TYPE_CHECKING:
     from ctrlgen.app.batch import load_batch, run_batch
     from ctrlgen.app.pipeline import Outcome, run, verify
+    from ctrlgen.budget.error_budget import ErrorBudget, error_budget
     from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user import user_device
@@ -40,6 +41,10 @@ _EXPORTS = {
         "Outcome",
         "run",
         "verify",
+    ),
+    "budget.error_budget": (
+        "ErrorBudget",
+        "error_budget",
     ),
     "core.errors": (
         "CtrlgenError",
@@ -121,6 +126,7 @@ __all__ = [
     "CtrlgenError",
     "Device",
     "Diagnosis",
+    "ErrorBudget",
     "Estimate",
     "Fault",
     "Finding",
@@ -143,6 +149,7 @@ __all__ = [
     "build_model",
     "compare",
     "diagnose",
+    "error_budget",
     "generate",
     "load_batch",
     "load_device",

@@ -26,6 +26,7 @@ COMMANDS = (
     "bode",
     "workspace",
     "reproduce",
+    "budget",
     "example",
     "diagnose",
     "batch",

@@ -14,6 +14,7 @@ from scipy.signal import lfilter
 
 from ctrlgen import build_model, load_device, load_scenario
 from ctrlgen.core.to_json import plain
+from ctrlgen.devices.changed_numbers import written
 from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.estimation.noise import Noise, estimate_noise
 from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, profiles
@@ -31,7 +32,7 @@ from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.evidence.unknown_input import estimate_unknown_input
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, written
+from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.recordings.reader import load_recordings

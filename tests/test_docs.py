@@ -17,6 +17,7 @@ from markdown_it import MarkdownIt
 
 from ctrlgen.app.batch import BatchFile
 from ctrlgen.app.result_schemas import RESULTS
+from ctrlgen.budget.uncertainty import UncertaintyFile
 from ctrlgen.devices import Device
 from ctrlgen.devices.sensor import DisplacementSensor, InterferometerSensor
 from ctrlgen.diagnosis import settings
@@ -96,7 +97,15 @@ def test_every_page_is_in_the_contents():
     assert pages <= {*listed, *(page for page in pages if page.startswith("reference/generated"))}
 
 
-FILES = [*Device.library.values(), DisplacementSensor, InterferometerSensor, ScenarioFile, RecordingFile, BatchFile]
+FILES = [
+    *Device.library.values(),
+    DisplacementSensor,
+    InterferometerSensor,
+    ScenarioFile,
+    RecordingFile,
+    BatchFile,
+    UncertaintyFile,
+]
 
 
 @pytest.mark.parametrize("file", [*FILES, *RESULTS.values()], ids=lambda model: model.__name__)

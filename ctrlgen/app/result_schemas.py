@@ -1,4 +1,4 @@
-"""Writes the JSON Schemas of diagnosis.json, summary.json and build.json: `python -m ctrlgen.app.result_schemas`, `make schemas`."""
+"""Writes the JSON Schemas of the result files: `python -m ctrlgen.app.result_schemas`, `make schemas`."""
 
 from __future__ import annotations
 
@@ -8,9 +8,15 @@ from pydantic import BaseModel
 
 from ctrlgen.core.files import write_text
 from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
+from ctrlgen.reporting.budget_schema import BudgetRecord
 from ctrlgen.reporting.result_schemas import SCHEMAS, BuildRecord, Summary, schema_text
 
-RESULTS: dict[str, type[BaseModel]] = {"build": BuildRecord, "diagnosis": DiagnosisRecord, "summary": Summary}
+RESULTS: dict[str, type[BaseModel]] = {
+    "budget": BudgetRecord,
+    "build": BuildRecord,
+    "diagnosis": DiagnosisRecord,
+    "summary": Summary,
+}
 
 
 def schemas() -> dict[str, str]:

@@ -38,6 +38,7 @@ def write_all() -> None:
     OUT.mkdir(parents=True, exist_ok=True)
     pages = {
         "devices": device_page(), "scenario": scenario_page(), "recording": recording_page(), "effects": effects_page(),
+        "uncertainty": uncertainty_page(),
         "commands": commands_page(), "results": results_page(), "settings": settings_page(), "python": python_page(),
         "equations": equations_page(), "priors": priors_page(),
     }  # fmt: skip
@@ -255,6 +256,13 @@ def recording_page() -> str:
     return "\n".join([GENERATED, *model_section(RecordingFile, "recording.toml", level=1)])
 
 
+def uncertainty_page() -> str:
+    """uncertainty.toml."""
+    from ctrlgen.budget.uncertainty import UncertaintyFile
+
+    return "\n".join([GENERATED, *model_section(UncertaintyFile, "uncertainty.toml", level=1)])
+
+
 def effects_page() -> str:
     """Every law of the library: equation, parameters, source; and what the search believes of it."""
     from ctrlgen.effects import Effect
@@ -303,7 +311,8 @@ def results_page() -> str:
     folder = Path(reporting.__file__).parent / "schemas"
     lines = [
         GENERATED, "# Result files", "",
-        "`summary.json` (of `run` and `solve`), `build.json` (of `verify`) and `diagnosis.json` (of `diagnose`) hold every "
+        "`summary.json` (of `run` and `solve`), `build.json` (of `verify`), `diagnosis.json` (of `diagnose`) and `budget.json` (of "
+        "`budget`) hold every "
         "result for programs. Each states the version of its schema, the program's version, the sha256 of its inputs and the "
         "seed. The JSON Schemas are shipped with the package in `ctrlgen/reporting/schemas/`.", "",
     ]  # fmt: skip

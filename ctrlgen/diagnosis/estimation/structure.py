@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.core.units import Quantity, written_unit
 from ctrlgen.devices import Device
-from ctrlgen.devices.section import Section
+from ctrlgen.devices.changed_numbers import changed, written
 from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.hypotheses.hypotheses import (
     PARAMETER,
@@ -22,7 +22,6 @@ from ctrlgen.diagnosis.hypotheses.hypotheses import (
     nominal_physics,
     nuisances,
     numbers,
-    written,
 )
 from ctrlgen.diagnosis.settings import FIT
 from ctrlgen.effects import Channel, Param
@@ -263,23 +262,3 @@ def _movable(device: Device) -> frozenset[str]:
         _MOVABLE.clear()  # the device is kept with its answer, so that no other one gets its id meanwhile
         _MOVABLE[id(device)] = (device, frozenset(movable(device)))
     return _MOVABLE[id(device)][1]
-
-
-def changed(device: Device, values: dict[str, float]) -> Device:
-    """The device with some of its numbers at other values [SI]."""
-
-    def walk(node: Any, prefix: str) -> Any:
-        if isinstance(node, Quantity):
-            return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
-        if isinstance(node, Section):
-            fields = {
-                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key)
-                for key in type(node).model_fields
-                if key != "effect"
-            }
-            return node.model_copy(update=fields)
-        if isinstance(node, tuple):
-            return tuple(walk(member, f"{prefix}[{i}]") for i, member in enumerate(node))
-        return node
-
-    return walk(device, "") if values else device

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.units import Quantity, from_si
+from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.base import Section
 from ctrlgen.diagnosis.hypotheses.priors import DEFAULT, LawPrior, prior_of
@@ -226,9 +226,3 @@ def nuisances(device: Device) -> dict[str, float]:
         if sd and not number.whole:
             found[path] = sd
     return found
-
-
-def written(si: float, unit: str, source: str | None = None) -> Quantity:
-    """A number in SI as a device file would write it in `unit`."""
-    shown = f"{from_si(si, unit):.9g} {'' if unit == '1' else unit}".strip()
-    return Quantity(si, shown, source)

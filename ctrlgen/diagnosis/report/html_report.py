@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.units import show
+from ctrlgen.devices.changed_numbers import written
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers, written
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
 from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.narrative import (
     gathered,

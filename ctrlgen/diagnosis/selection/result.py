@@ -10,14 +10,15 @@ import numpy as np
 
 from ctrlgen.core.units import difference, from_si, to_si
 from ctrlgen.devices import Device
+from ctrlgen.devices.changed_numbers import changed, written
 from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
 from ctrlgen.diagnosis.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.diagnosis.estimation.profile_likelihood import Profile
 from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
 from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
 from ctrlgen.diagnosis.estimation.spikes import Spikes
-from ctrlgen.diagnosis.estimation.structure import Structure, changed
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, written
+from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.selection.attribution import Attribution, Share
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.verdict import unconfirmed

@@ -1,0 +1,53 @@
+"""Console output of an error budget."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from ctrlgen.app.console import out, show_table, table_of
+
+if TYPE_CHECKING:
+    from ctrlgen.budget.error_budget import ErrorBudget
+
+
+def print_budget(budget: ErrorBudget) -> None:
+    """The contributors in their order, all combined, the limits, and whether the draws agree."""
+    from ctrlgen.reporting.budget_page import safety_sentence
+
+    out.print(f"[bold]error budget: {escape(budget.solution.scenario.file.title)}[/bold]", soft_wrap=True)
+    heads = [(f"{g.unit} {what}", "right") for g in budget.groups for what in ("per step", "peak", "rms")]
+    table = table_of(("contributor", "left"), ("sd", "right"), ("step", "right"), *heads, ("share", "right"))  # type: ignore[arg-type]
+    for line in budget.lines:
+        cells = []
+        for g in budget.groups:
+            cells += [f"{g.shown(v[g.name]):.3g}" for v in (line.sensitivity, line.peak, line.rms)]
+        table.add_row(escape(line.name), line.sd, line.per, *cells, f"{100 * line.share:.1f} %")
+    cells = []
+    for g in budget.groups:
+        cells += ["", f"{g.shown(budget.peak(g)):.4g}", f"{g.shown(budget.rms(g)):.4g}"]
+    table.add_row("combined standard uncertainty", "", "", *cells, "", style="bold")
+    show_table(table)
+    bands = ", ".join(f"± {g.shown(budget.factor * budget.peak(g)):.4g} {g.unit} ({g.name})" for g in budget.groups)
+    out.print(f"95 % band where it is widest: {bands}", markup=False, soft_wrap=True)
+    for k, line in enumerate([line for line in budget.lines if any(line.peak.values())][:3]):
+        halves = ", ".join(
+            f"{g.shown(budget.peak(g)):.4g} -> {g.shown(line.halved[g.name]):.4g} {g.unit}" for g in budget.groups
+        )
+        out.print(
+            f"{'next' if k == 0 else 'then'}: halve the sd of {line.name}: {halves}", markup=False, soft_wrap=True
+        )
+    for safety in budget.safeties:
+        style = None if safety.kept >= 0 else "red"
+        out.print(safety_sentence(safety, budget.probability), markup=False, soft_wrap=True, style=style)
+    for a in budget.agreements:
+        g, verdict = a.group, "agree" if a.passed else "DIFFER"
+        both = f"{g.name} {g.shown(a.drawn):.4g} {g.unit}, first order {g.shown(a.linear):.4g} {g.unit}"
+        off = (
+            f"at most {100 * a.difference:.1f} % in the sd, {100 * a.difference_of_interval:.1f} % in the 95 % interval"
+        )
+        style = None if a.passed else "yellow"
+        out.print(f"{budget.draws} draws: {both}; they {verdict}: {off}", markup=False, soft_wrap=True, style=style)
+    for reason in (*budget.reasons, *budget.notes):
+        out.print(reason, markup=False, soft_wrap=True, style="yellow")

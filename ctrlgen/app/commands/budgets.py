@@ -1,0 +1,90 @@
+"""The error budget of a path: budget."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from ctrlgen.app.budget_console import print_budget
+from ctrlgen.app.commands.app import OtherDevice, ScenarioPath, app
+from ctrlgen.app.console import out, progress
+from ctrlgen.core.errors import Fault, InputError
+
+DRAWS = 10_000  # as in ctrlgen.budget.error_budget, which is imported when it is needed
+
+
+@app.command()
+def budget(
+    scenario: ScenarioPath,
+    out_folder: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Folder for budget.html, budget.json and figures; without it only the tables are printed.",
+            show_default=False,
+        ),
+    ] = None,
+    uncertainty: Annotated[
+        Path | None,
+        typer.Option(help="The file of standard deviations.", show_default="uncertainty.toml beside the scenario"),
+    ] = None,
+    probability: Annotated[str, typer.Option(help='At which limits are judged, as "99.9 %" or 0.999.')] = "99.9 %",
+    draws: Annotated[int, typer.Option(min=0, metavar="N", help="Monte Carlo draws; 0 leaves it out.")] = DRAWS,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the draws.")] = 0,
+    device: OtherDevice = None,
+) -> None:
+    """Draw up the error budget of a path: what everything uncertain does to the pose, in nm and urad.
+
+    There is no position sensor: drives computed for the device as described act on one whose numbers differ. The budget gives, for
+    every uncertain number, the surroundings, supply, converter, jitter and arithmetic, its sensitivity (per K, per %, per LSB), its
+    standard uncertainty along the path (peak and rms), and all combined (GUM) with the 95 % band; what to measure or tighten next;
+    and by how much each limit is kept at a chosen probability. Monte Carlo on the nonlinear model (GUM supplement 1) must agree
+    within 10 %, or it is said why not.
+
+    What is uncertain stands in uncertainty.toml beside the scenario, each sd with its source:
+
+    \b
+      [numbers]
+      "actuator.thermal_resistance" = { sd = "5 %", source = "five specimens" }
+      [surroundings]
+      sd = "0.5 K"
+      source = "laboratory log"
+      [drive]
+      gain = { sd = "0.1 %", source = "data sheet of the reference" }
+      converter = { bits = 16, source = "data sheet" }
+
+    A number that has an sd in the device file, as a diagnosis writes it into device.next.toml, counts too.
+
+    Example:  ctrlgen budget scenarios/circle20 --out out/budget
+    """
+    from ctrlgen.budget.error_budget import error_budget
+    from ctrlgen.core.files import whole_folder
+    from ctrlgen.reporting.budget_page import write_budget
+    from ctrlgen.trajectory.scenario import load_scenario
+
+    chance = _probability(probability)
+    with progress() as advance:
+        found = error_budget(
+            load_scenario(scenario, device), uncertainty, probability=chance, draws=draws, seed=seed, progress=advance
+        )
+        if out_folder is not None:
+            advance("report")
+            with whole_folder(out_folder) as draft:
+                write_budget(draft, found)
+    print_budget(found)
+    if out_folder is not None:
+        out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'budget.html'))}", soft_wrap=True)
+
+
+def _probability(text: str) -> float:
+    """0.999 for '99.9 %' and for '0.999'. Raises InputError."""
+    body = text.strip()
+    try:
+        return float(body.removesuffix("%")) / (100 if body.endswith("%") else 1)
+    except ValueError:
+        raise InputError(
+            "--probability", [Fault(repr(text), 'is not a probability; write "99.9 %" or 0.999')]
+        ) from None

@@ -1,0 +1,345 @@
+"""The error budget of a solved path, as precision engineers draw it up (Slocum): every contributor, their combination, their order.
+
+The drives are those computed for the device as described; what acts on them is a device with other numbers, in other surroundings,
+through a converter. To first order by the law of propagation of uncertainty (GUM, JCGM 100), and by Monte Carlo on the
+nonlinear model (GUM supplement 1, JCGM 101).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import norm
+
+from ctrlgen.budget.limits import Safety, critical_samples, margins, safeties, slopes_of_limits
+from ctrlgen.budget.linear import Propagated, propagate
+from ctrlgen.budget.monte_carlo import Drawn, draw
+from ctrlgen.budget.uncertain_path import UncertainPath
+from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
+from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.units import difference, same_dimension
+from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
+from ctrlgen.trajectory.solution import Solution, solve
+
+DRAWS = 10_000  # of JCGM 101 7.2.1 the smallest that gives a 95 % interval to two digits
+FEWEST_DRAWS = 200  # the sd of as many draws is itself known to 5 %
+MOST_DRAWS = 1_000_000
+PROBABILITY = 0.999
+COVERAGE = 0.95
+MOST_LOST = 0.01  # share of draws that may end in no number, as a device beyond buckling does
+KEPT = 60  # samples along the path at which draws are kept
+TOLERANCE = 0.10  # of the first-order result, within which the draws confirm it
+COMPARED = 0.5  # of the largest uncertainty along the path: smaller ones are not compared
+JITTER_STEP = 1e-6  # s
+
+
+@dataclass(frozen=True)
+class Group:
+    """Channels of the followed signal with one kind of unit: translations in nm, rotations in urad."""
+
+    name: str
+    unit: str
+    channels: tuple[int, ...]
+
+    def shown(self, si: float) -> float:
+        """An SI difference in the unit of the group."""
+        return float(difference(si, self.unit))
+
+
+@dataclass(frozen=True)
+class BudgetLine:
+    """One contributor. By group, SI: `sensitivity`, the largest deviation along the path for the step `per`; `peak` and `rms`, its
+    standard uncertainty there; `alone`, what its second order adds at one sd.
+
+    `share` of the variance at the largest combined uncertainty, of the group in which it counts most, and `halved`, the combined
+    peak [SI, by group] if its sd were half.
+    """
+
+    name: str
+    sd: str
+    per: str
+    source: str
+    sensitivity: dict[str, float]
+    peak: dict[str, float]
+    rms: dict[str, float]
+    share: float
+    halved: dict[str, float]
+    alone: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """First order against the draws for one group, SI: largest combined standard uncertainty by both, largest relative difference
+    along the path of the standard deviation and of the half width of the 95 % interval, and the largest mean of the draws."""
+
+    group: Group
+    linear: float
+    drawn: float
+    difference: float
+    difference_of_interval: float
+    mean: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether both agree within `TOLERANCE`."""
+        return max(self.difference, self.difference_of_interval) <= TOLERANCE
+
+
+@dataclass(frozen=True)
+class ErrorBudget:
+    """The error budget of a path. `combined` (n, channels) is the standard uncertainty u_c of the followed signal [SI], `lines` come in
+    the order of what to measure or tighten next; `safeties` of the limits at `probability`. Without draws `drawn` is None."""
+
+    solution: Solution
+    uncertainties: Uncertainties
+    groups: tuple[Group, ...]
+    lines: tuple[BudgetLine, ...]
+    combined: np.ndarray
+    linear: Propagated
+    drawn: Drawn | None
+    agreements: tuple[Agreement, ...]
+    safeties: tuple[Safety, ...]
+    probability: float
+    draws: int
+    seed: int
+
+    @property
+    def factor(self) -> float:
+        """Coverage factor k of the 95 % band, GUM 6.3: deviations are normal to first order."""
+        return float(norm.ppf(0.5 + COVERAGE / 2))
+
+    def peak(self, group: Group) -> float:
+        """The largest combined standard uncertainty of a group [SI]."""
+        return float(self.combined[:, group.channels].max())
+
+    def rms(self, group: Group) -> float:
+        """Root mean square along the path of the combined standard uncertainty of the channel where it is largest [SI]."""
+        return _rms(self.combined[:, group.channels])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader should know of how the budget was made."""
+        lost = 0 if self.drawn is None else self.drawn.lost
+        what = (
+            f"{lost} of {self.draws} draws ended in no number, as of a device that no longer works, and were left out"
+        )
+        return (what,) if lost else ()
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the draws differ from the first order; empty where they agree."""
+        found = []
+        for agreement in self.agreements:
+            if agreement.passed:
+                continue
+            group = agreement.group
+            most = max(self.lines, key=lambda line: line.alone[group.name])
+            found.append(
+                f"{group.name}: the draws differ by {100 * max(agreement.difference, agreement.difference_of_interval):.0f} % from the "
+                f"first order, because the path is not linear in what is uncertain: at one standard deviation the second order of "
+                f"{most.name} adds {group.shown(most.alone[group.name]):.3g} {group.unit}, and the mean of the draws lies "
+                f"{group.shown(agreement.mean):.3g} {group.unit} off; take the draws' numbers"
+            )
+        return tuple(found)
+
+
+def error_budget(
+    scenario: Scenario | Path | str,
+    uncertainty: Path | str | None = None,
+    *,
+    probability: float = PROBABILITY,
+    draws: int = DRAWS,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> ErrorBudget:
+    """The error budget of a scenario: y(q) of the path under the drives computed for the described device, q what `uncertainty` states
+    (a file; by default uncertainty.toml beside the scenario) and the sds of the device file.
+
+    u_c^2 = sum_ij dy/dq_i cov(q_i, q_j) dy/dq_j plus what scatters from sample to sample. Limits are judged at `probability` at each
+    sample; 0 `draws` leave the Monte Carlo out. Raises InputError (with all faults), Unreachable, SolverError.
+    Sources: JCGM 100:2008 section 5; JCGM 101:2008; A. H. Slocum, Precision Machine Design (1992), chapter 2.
+    """
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    _check(probability, draws)
+    progress("symbolic model")
+    model = model_of(scenario)
+    stated = load_uncertainties(scenario, model, uncertainty)
+    return budget_of(solve(scenario, model, progress), stated, probability, draws, seed, progress)
+
+
+def _check(probability: float, draws: int) -> None:
+    """Refuses a probability or a number of draws that means nothing. Raises InputError."""
+    faults = []
+    if not 0.5 <= probability < 1:
+        faults.append(Fault("probability", f"{probability:g} must be at least 0.5 and below 1, such as 0.999"))
+    if draws and not FEWEST_DRAWS <= draws <= MOST_DRAWS:
+        faults.append(Fault("draws", f"{draws} must be 0, or between {FEWEST_DRAWS} and {MOST_DRAWS}"))
+    if faults:
+        raise InputError("budget", faults)
+
+
+def budget_of(
+    solution: Solution,
+    stated: Uncertainties,
+    probability: float = PROBABILITY,
+    draws: int = DRAWS,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> ErrorBudget:
+    """The error budget of a path that is solved already; as `error_budget`."""
+    progress("sensitivities along the path")
+    path = UncertainPath(solution, stated)
+    linear = _propagated(path)
+    combined = linear.combined("pose", stated)
+    groups = _groups(path)
+    slopes = slopes_of_limits(path, linear)
+    found = margins(path, linear, slopes)
+    critical = critical_samples(found, probability)
+    drawn = None
+    if draws:
+        progress(f"{draws} draws")
+        drawn = draw(path, linear, _kept(combined, groups), critical, draws, seed)
+        if drawn.lost > MOST_LOST * draws:
+            raise SolverError(
+                f"{drawn.lost} of {draws} draws ended in no number: some sds are so large that a draw is no device any more; lower them"
+            )
+    rows = safeties(path, found, slopes, drawn, critical, probability)
+    lines = _lines(path, linear, combined, groups, drawn)
+    agreements = () if drawn is None else tuple(_agreement(g, combined, drawn) for g in groups)
+    return ErrorBudget(
+        solution, stated, groups, lines, combined, linear, drawn, agreements, rows, probability, draws, seed
+    )
+
+
+def _propagated(path: UncertainPath) -> Propagated:
+    try:
+        return propagate(path)
+    except FloatingPointError as error:
+        raise SolverError(f"{error}; a law of the device has no slope along it") from None
+
+
+def _groups(path: UncertainPath) -> tuple[Group, ...]:
+    """Translations in nm, rotations in urad, and what has another unit in that."""
+    units: dict[tuple[str, str], list[int]] = {}
+    for i, unit in enumerate(path.signal.units):
+        kinds = (("translation", "nm", "m"), ("rotation", "urad", "rad"))
+        name, shown = next(((n, s) for n, s, base in kinds if same_dimension(unit, base)), (f"in {unit}", unit))
+        units.setdefault((name, shown), []).append(i)
+    order = sorted(units, key=lambda key: key[0] != "translation")
+    return tuple(Group(*key, tuple(units[key])) for key in order)
+
+
+def _kept(combined: np.ndarray, groups: tuple[Group, ...]) -> np.ndarray:
+    """The samples at which draws are kept: some along the path, and the largest uncertainty of each group."""
+    n = len(combined)
+    peaks = [int(combined[:, g.channels].max(axis=1).argmax()) for g in groups]
+    return np.unique([*np.linspace(0, n - 1, min(n, KEPT)).astype(int), *peaks])
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2, axis=0)).max())
+
+
+def _largest(values: np.ndarray, group: Group) -> float:
+    return float(np.abs(values[:, group.channels]).max())
+
+
+def _lines(
+    path: UncertainPath, linear: Propagated, combined: np.ndarray, groups: tuple[Group, ...], drawn: Drawn | None
+) -> tuple[BudgetLine, ...]:
+    """Every contributor, the largest share first."""
+    stated, Y = path.uncertainties, linear.sensitivity["pose"]
+    covariance, lines, first = stated.covariance, list[BudgetLine](), 0
+
+    def line(name: str, texts: tuple[str, str, str], seen: _Seen) -> BudgetLine:
+        return BudgetLine(
+            name, *texts, {g.name: _largest(seen.by_step, g) for g in groups}, {g.name: _largest(seen.own, g) for g in groups},
+            {g.name: _rms(seen.own[:, g.channels]) for g in groups}, _share(combined, seen.without, groups),
+            {g.name: _largest(seen.half, g) for g in groups}, {g.name: _largest(seen.bend, g) for g in groups},
+        )  # fmt: skip
+
+    for uncertain in stated.lines:
+        columns = slice(first, first + len(uncertain.sds))
+        first = columns.stop
+        own = np.sqrt(np.sum((Y[:, :, columns] * uncertain.sds) ** 2, axis=2))
+        by_step = np.abs(Y[:, :, columns] * uncertain.per[1]).max(axis=2)
+        bend = np.zeros((1, Y.shape[1]))
+        if drawn is not None:  # of several columns the one that bends most
+            bend = np.abs(drawn.alone[:, columns].sum(axis=0) / 2).max(axis=0)
+        without, half = (_combined(linear, _scaled(covariance, columns, factor)) for factor in (0.0, 0.5))
+        texts = uncertain.text, uncertain.per[0], uncertain.source
+        lines.append(line(uncertain.name, texts, _Seen(by_step, own, without, half, bend)))
+    for name, own in linear.scatter["pose"].items():
+        others = {of: sd for of, sd in linear.scatter["pose"].items() if of != name}
+        without = _combined(linear, covariance, others)
+        per, by_step = _by_step(path, linear, name, own)
+        texts = stated.texts[name], per, stated.sources[name]
+        lines.append(
+            line(f"drive.{name}", texts, _Seen(by_step, own, without, np.hypot(without, own / 2), np.zeros_like(own)))
+        )
+    return tuple(sorted(lines, key=lambda found: -found.share))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What one contributor does, each (n, channels) [SI]: for one step, its standard uncertainty, what is combined without it and with
+    half of it, its second order."""
+
+    by_step: np.ndarray
+    own: np.ndarray
+    without: np.ndarray
+    half: np.ndarray
+    bend: np.ndarray
+
+
+def _share(combined: np.ndarray, without: np.ndarray, groups: tuple[Group, ...]) -> float:
+    """By how much the variance falls without it where the combined one is largest, of the group in which that is most."""
+    shares = []
+    for g in groups:
+        k, i = np.unravel_index(int(combined[:, g.channels].argmax()), (len(combined), len(g.channels)))
+        total = combined[k, g.channels[i]]
+        shares.append(1 - float(without[k, g.channels[i]] / total) ** 2 if total else 0.0)
+    return max(shares)
+
+
+def _scaled(covariance: np.ndarray, columns: slice, factor: float) -> np.ndarray:
+    """The covariance with the sds of some columns times a factor."""
+    scale = np.ones(len(covariance))
+    scale[columns] = factor
+    return covariance * np.outer(scale, scale)
+
+
+def _combined(linear: Propagated, covariance: np.ndarray, scatter: dict[str, np.ndarray] | None = None) -> np.ndarray:
+    """(n, channels) combined with another covariance, or other things that scatter."""
+    Y, present = linear.sensitivity["pose"], linear.scatter["pose"] if scatter is None else scatter
+    variance = np.sum((Y @ covariance) * Y, axis=2)
+    return np.sqrt(np.maximum(variance, 0.0) + sum((sd**2 for sd in present.values()), np.zeros(variance.shape)))
+
+
+def _by_step(path: UncertainPath, linear: Propagated, name: str, own: np.ndarray) -> tuple[str, np.ndarray]:
+    """Text and deviation (n, channels) of one step: of a converter and of arithmetic the path under the rounded drives."""
+    if name == "jitter":
+        return "1 us", own / path.uncertainties.jitter * JITTER_STEP
+    single = path.drive.astype(np.float32).astype(float)
+    rounded = path.nominal(path.rounded() if name == "converter" else single)
+    pose = path.evaluate("pose", rounded[path.before :], path.drive[path.before :])
+    return "1 LSB" if name == "converter" else "rounding", pose - linear.nominal["pose"]
+
+
+def _agreement(group: Group, combined: np.ndarray, drawn: Drawn) -> Agreement:
+    linear = combined[drawn.kept][:, group.channels]
+    deviations = drawn.pose[:, :, group.channels]
+    sd, mean = deviations.std(axis=0, ddof=1), deviations.mean(axis=0)
+    low, high = np.quantile(deviations, [0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2], axis=0)
+    compared = (linear >= COMPARED * linear.max()) & (linear > 0)
+    expected = float(norm.ppf(0.5 + COVERAGE / 2)) * linear
+
+    def off(values: np.ndarray, against: np.ndarray) -> float:
+        return float(np.abs(values[compared] / against[compared] - 1).max(initial=0.0))
+
+    return Agreement(
+        group, float(linear.max()), float(sd.max()), off(sd, linear), off((high - low) / 2, expected), float(np.abs(mean).max())
+    )  # fmt: skip

@@ -1,0 +1,197 @@
+"""How safe each limit is: its margin along the path under everything that is uncertain, at a chosen probability.
+
+A limited quantity y with the bound b has the margin M = b - y (or y - b); to first order it is normal with sd u(M), and the limit
+holds at a sample with the probability p where M - z_p u(M) > 0, z_p the quantile of the normal distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from ctrlgen.budget.linear import Propagated
+from ctrlgen.budget.monte_carlo import Drawn
+from ctrlgen.budget.uncertain_path import UncertainPath
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.devices import Limit
+from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.model.assembly import build_model
+from ctrlgen.model.model import Model
+
+LEAST_TAIL = 5  # draws beyond a quantile, below which it is not estimated
+SAME = 1e-12  # relative change of a bound that is rounding
+
+
+@dataclass(frozen=True)
+class Safety:
+    """One bound of a limit where it is least safe, SI: `channel`, `sample`, the `bound` on its `side`, the margin as described, its
+    standard uncertainty `sd`, and what is left of the margin at the chosen probability: `kept`, negative where it is not kept.
+
+    `probability` is that with which the bound is kept there; `drawn` what the draws leave of the margin, None where they are too few.
+    """
+
+    limit: Limit
+    channel: str
+    side: str
+    sample: int
+    bound: float
+    margin: float
+    sd: float
+    kept: float
+    probability: float
+    drawn: float | None = None
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives by each of the m columns: of the bounds `lower`, `upper` (channels, m), and of the limited quantities by numbers
+    that act on no motion, `direct` (n, channels, m)."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+    direct: np.ndarray
+
+
+def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
+    """How the stated numbers act on the limits themselves, by devices with one of them changed by its standard deviation. Raises
+    InputError for a number that acts on neither motion nor limits."""
+    names = [name for line in path.uncertainties.lines for name in line.paths]
+    kinds = [line.kind for line in path.uncertainties.lines for _ in line.paths]
+    sds, n = path.uncertainties.sds, len(names)
+    own = [i for i in range(n) if kinds[i] == "number" and not names[i].startswith("effect[")]
+    values = {path_: number.si for path_, number in path.model.device.quantities()}
+    channels = len(path.channels)
+    slopes = Slopes(np.zeros((channels, n)), np.zeros((channels, n)), np.zeros((path.n, channels, n)))
+    before = _bounds(path, path.solution.model)
+    trace = path.solution.trace
+
+    def model_with(columns: Sequence[int]) -> Model:
+        return build_model(changed(path.model.device, {names[i]: values[names[i]] + sds[i] for i in columns}))
+
+    def same(bounds: np.ndarray, others: np.ndarray) -> bool:
+        return np.allclose(bounds, others, rtol=SAME, atol=0.0)
+
+    def moved(columns: Sequence[int], after: np.ndarray) -> list[int]:
+        """Those of the columns, with which the bounds are those `after`, that change one: by halving, for a model takes its time."""
+        if not columns or same(after, before):
+            return []
+        if len(columns) == 1:
+            return list(columns)
+        first, second = columns[: len(columns) // 2], columns[len(columns) // 2 :]
+        bounds = _bounds(path, model_with(first))
+        if same(bounds, after):
+            return moved(first, after)
+        return moved(first, bounds) + moved(
+            second, after if same(bounds, before) else _bounds(path, model_with(second))
+        )
+
+    idle, faults = [i for i in own if names[i] in path.idle], list[Fault]()
+    moving = [i for i in own if i not in idle]
+    for i in {*moved(moving, _bounds(path, model_with(moving))), *idle}:
+        other = model_with([i])
+        after = _bounds(path, other)
+        with np.errstate(invalid="ignore"):  # what has no bound stays without
+            slopes.lower[:, i], slopes.upper[:, i] = np.nan_to_num((after - before) / sds[i])
+        if i in idle and channels:
+            values_of = [_limited(path, model, trace.x, trace.z) for model in (path.solution.model, other)]
+            slopes.direct[:, :, i] = (values_of[1] - values_of[0]) / sds[i]
+        if i in idle and not (slopes.lower[:, i].any() or slopes.upper[:, i].any() or slopes.direct[:, :, i].any()):
+            faults.append(
+                Fault(f'numbers."{names[i]}"', "acts on neither motion nor limits of this device; leave it out")
+            )
+    if faults:
+        source = path.uncertainties.inputs.get("uncertainty")
+        raise InputError(source.path if source else path.solution.scenario.path, faults)
+    return slopes
+
+
+def _bounds(path: UncertainPath, model: Model) -> np.ndarray:
+    """(2, channels) lower and upper bounds; infinite where there is none."""
+    by_name = {limit.name: limit for limit in model.limits}
+    found = [by_name[limit.name] for limit, _ in path.channels]
+    return np.array([
+        [-np.inf if limit.lower is None else limit.lower for limit in found],
+        [np.inf if limit.upper is None else limit.upper for limit in found],
+    ])  # fmt: skip
+
+
+def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """(n, channels) the limited quantities of a `model` at the path's states."""
+    n, wanted = path.n, [limit.name for limit in path.limits]
+    u = path.drive[path.before :]
+    values = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
+    named = dict(
+        zip((limit.name for limit in model.limits), values if len(model.limits) > 1 else [values], strict=True)
+    )
+    return np.vstack([named[name].full() for name in wanted]).T
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Of the lower and the upper bound of each limited quantity: the margin (2, n, channels), infinite without a bound, its sd, and the
+    `bounds` (2, channels)."""
+
+    margin: np.ndarray
+    sd: np.ndarray
+    bounds: np.ndarray
+
+    def least(self, z: float) -> np.ndarray:
+        """(2, n, channels) what is left of the margins at the quantile z."""
+        return self.margin - z * self.sd
+
+
+def margins(path: UncertainPath, linear: Propagated, slopes: Slopes) -> Margins:
+    """Both sides' margins with their standard uncertainties, to first order."""
+    y, bounds = linear.nominal["limits"], _bounds(path, path.solution.model)
+    margin = np.stack([y - bounds[0], bounds[1] - y])
+    by_numbers = linear.sensitivity["limits"] + slopes.direct
+    scattered = sum((sd**2 for sd in linear.scatter["limits"].values()), np.zeros(y.shape))
+    sds = []
+    for bound in (slopes.lower, slopes.upper):
+        G = by_numbers - bound
+        sds.append(np.sqrt(np.maximum(np.sum((G @ path.uncertainties.covariance) * G, axis=2), 0.0) + scattered))
+    return Margins(margin, np.stack(sds), bounds)
+
+
+def safeties(
+    path: UncertainPath, found: Margins, slopes: Slopes, drawn: Drawn | None, critical: np.ndarray, probability: float
+) -> tuple[Safety, ...]:
+    """Each bound of each limit where it is least safe; `critical` (2, channels) are the samples of the draws."""
+    z = float(norm.ppf(probability))
+    least, rows = found.least(z), []
+    places = [limit.name for limit, _ in path.channels]
+    for limit in path.limits:
+        own = [i for i, name in enumerate(places) if name == limit.name]
+        for side in (0, 1):
+            i = min(own, key=lambda i: least[side, critical[side, i], i])
+            if not np.isfinite(found.bounds[side, i]):
+                continue
+            k = int(critical[side, i])
+            margin, sd = float(found.margin[side, k, i]), float(found.sd[side, k, i])
+            rows.append(
+                Safety(
+                    limit, limit.channels[i - own[0]], "lower" if side == 0 else "upper", k, float(found.bounds[side, i]), margin, sd,
+                    margin - z * sd, float(norm.cdf(margin / sd)) if sd else float(margin >= 0),
+                    _drawn_margin(drawn, slopes, side, k, i, float(found.bounds[side, i]), probability),
+                )
+            )  # fmt: skip
+    return tuple(rows)
+
+
+def _drawn_margin(
+    drawn: Drawn | None, slopes: Slopes, side: int, k: int, i: int, bound: float, probability: float
+) -> float | None:
+    """The margin that is exceeded with the `probability` in the draws."""
+    if drawn is None or len(drawn.columns) * (1 - probability) < LEAST_TAIL:
+        return None
+    y = drawn.limits[:, side, i] + drawn.columns @ slopes.direct[k, i]
+    b = bound + drawn.columns @ (slopes.lower if side == 0 else slopes.upper)[i]
+    return float(np.quantile(y - b if side == 0 else b - y, 1 - probability))
+
+
+def critical_samples(found: Margins, probability: float) -> np.ndarray:
+    """(2, channels) the sample at which each limited quantity is nearest to its lower and to its upper bound, at the `probability`."""
+    return np.asarray(np.argmin(found.least(float(norm.ppf(probability))), axis=1))

@@ -1,0 +1,137 @@
+"""Propagation of distributions by Monte Carlo (GUM supplement 1, JCGM 101) along a path, on the nonlinear model.
+
+Each draw is a device with other numbers, surroundings and gains, and drives with an error of their own at every sample; all draws
+take each sample together.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.budget.linear import Propagated, drive_deviations
+from ctrlgen.budget.uncertain_path import UncertainPath
+from ctrlgen.numerics.batched_evaluation import evaluate
+from ctrlgen.numerics.compiled import Compilable
+
+STEP_ERROR = 1e-3  # of the combined uncertainty: what a step of a draw may leave
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What the draws gave, SI: deviations of the followed signal `pose` (draws, kept, n_y) at the samples `kept`; limited quantities
+    `limits` (draws, 2, channels), each at its own sample for the lower and the upper bound; `columns` (draws, m) the deviations that
+    were drawn; `lost`, how many further draws ended in no number.
+
+    `alone` (2, m, kept, n_y): the pose's deviations with each column alone at plus and minus its standard deviation, nothing scattering.
+    """
+
+    kept: np.ndarray
+    pose: np.ndarray
+    limits: np.ndarray
+    columns: np.ndarray
+    alone: np.ndarray
+    lost: int
+
+
+def draw(
+    path: UncertainPath, linear: Propagated, kept: np.ndarray, critical: np.ndarray, draws: int, seed: int
+) -> Drawn:
+    """`draws` devices led along the path, compared with its nominal pose in `linear` at the samples `kept`.
+
+    `critical` (2, channels): the sample at which each limited quantity is kept, for its lower and its upper bound.
+    """
+    rng, stated, pose = np.random.default_rng(seed), path.uncertainties, linear.nominal["pose"]
+    m = len(stated.sds)
+    deviations = (
+        rng.multivariate_normal(np.zeros(m), stated.covariance, draws, method="eigh") if m else np.zeros((draws, 0))
+    )
+    one_by_one = np.diag(stated.sds)
+    columns = np.vstack([deviations, one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
+    q, gain = _numbers(path, columns)
+    scatter = _Scatter(path, rng, draws, 2 * m + 1)
+    allowed = STEP_ERROR * linear.combined("pose", stated).max(axis=0)
+    step = _Mapped(path, path.quickest_step(linear.states, allowed), q)
+    outputs = {"pose": _Mapped(path, "pose", q), "limits": _Mapped(path, "limits", q)}
+    S = np.tile(path.start, (len(q), 1))
+    found = np.empty((len(q), len(kept), pose.shape[1]))
+    limits = np.empty((len(q), *critical.shape))
+    place = {int(k): i for i, k in enumerate(kept)}
+    for k, v in enumerate(path.drive):
+        drive = v * gain + scatter.at(k)
+        S = step(S, drive)
+        sample = k - path.before
+        if sample in place:
+            found[:, place[sample]] = outputs["pose"](S, drive) - pose[sample]
+        if np.any(here := critical == sample):
+            limits[:, here] = np.stack([outputs["limits"](S, drive)] * 2, axis=1)[:, here]
+    good = np.isfinite(found[:draws]).all(axis=(1, 2)) & np.isfinite(limits[:draws]).all(axis=(1, 2))
+    return Drawn(
+        kept, found[:draws][good], limits[:draws][good], deviations[good],
+        (found[draws:-1] - found[-1]).reshape(2, m, *found.shape[1:]), int((~good).sum()),
+    )  # fmt: skip
+
+
+def _numbers(path: UncertainPath, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """q (draws, n_q) and the gain of each drive (draws, n_u) for deviations (draws, m)."""
+    q = np.tile(path.q_nominal, (len(columns), 1))
+    gain, k = np.ones((len(columns), path.drive.shape[1])), 0
+    for line in path.uncertainties.lines:
+        own = columns[:, k : k + len(line.sds)]
+        k += len(line.sds)
+        if line.kind == "surroundings":
+            q[:, -1] += own[:, 0]
+        elif line.kind != "number":
+            gain += own
+        else:
+            for i, name in enumerate(line.paths):
+                if name in path.free:
+                    q[:, path.free.index(name)] += own[:, i]
+    return q, gain
+
+
+class _Scatter:
+    """Errors of the drives that are drawn anew at every sample; none for the last `still` rows."""
+
+    def __init__(self, path: UncertainPath, rng: np.random.Generator, draws: int, still: int) -> None:
+        stated = path.uncertainties
+        names = {"converter": stated.bits is not None, "arithmetic": stated.single, "jitter": stated.jitter > 0}
+        given = [drive_deviations(path, name) for name, given in names.items() if given]
+        zero = np.zeros(path.drive.shape)
+        self.rounding = np.sqrt(3 * sum((sd**2 for sd, together in given if not together), zero))
+        self.late = sum((sd for sd, together in given if together), zero)
+        self.rng, self.shape, self.still = rng, (draws, path.drive.shape[1]), still
+
+    def at(self, k: int) -> np.ndarray:
+        """(draws + still, n_u) errors of the drive number `k`: rounding is uniform, of converter and arithmetic together, jitter normal."""
+        error = np.zeros((self.shape[0] + self.still, self.shape[1]))
+        if self.rounding[k].any():
+            error[: self.shape[0]] += (2 * self.rng.random(self.shape, dtype=np.float32) - 1) * self.rounding[k]
+        if self.late[k].any():
+            error[: self.shape[0]] += self.rng.standard_normal((self.shape[0], 1)) * self.late[k]
+        return error
+
+
+class _Mapped:
+    """A part of the path for all draws at once, compiled where that pays."""
+
+    def __init__(self, path: UncertainPath, name: str, q: np.ndarray) -> None:
+        constants = path.constants[name]
+        self.count = len(q)
+        self.c = np.zeros((self.count, 0))
+        if constants.numel_out(0):
+            dense = ca.Function("constants", [path.q], [ca.densify(constants(path.q))])
+            (self.c,) = evaluate(dense.map(self.count), q)
+        self.one = Compilable(path.of_sample[name])
+        self.mapped = self.one.function.map(self.count)
+
+    def __call__(self, S: np.ndarray, drive: np.ndarray) -> np.ndarray:
+        """(draws, n) from states (draws, n_s) and drives (draws, n_u)."""
+        begin = time.perf_counter()
+        (value,) = evaluate(self.mapped, S, drive, self.c)
+        if self.one.spent(time.perf_counter() - begin):
+            self.mapped = self.one.function.map(self.count)
+        return value

@@ -1,0 +1,309 @@
+"""uncertainty.toml: the standard deviations of what is not known exactly, each with its source."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.files import read_text, read_toml, validate
+from ctrlgen.core.units import Quantity, parse, same_dimension, to_si, written_unit
+from ctrlgen.devices.base import Section
+from ctrlgen.model.model import Model
+from ctrlgen.trajectory.scenario import Input, Scenario
+
+FILE = "uncertainty.toml"
+AMBIENT = ".ambient"  # how the path of a temperature to which heaters cool ends
+FROM_DEVICE = "sd in the device file"
+EXAMPLE = """[numbers]
+"actuator.thermal_resistance" = { sd = "5 %", source = "spread of five specimens" }"""
+SINGULAR = 1e-9  # of an eigenvalue of a matrix of correlations, below zero: rounding
+
+
+class Deviation(Section):
+    """A standard uncertainty, GUM 3.3.5: the standard deviation of what is not known exactly."""
+
+    sd: str
+    """Standard deviation: a difference with its unit, such as "0.5 K", or a share of the number, such as "5 %"."""
+    source: str
+    """Where it comes from: repeated measurements, a certificate, a data sheet, experience."""
+
+
+class Converter(Section):
+    """The digital-to-analogue converter that makes the drives."""
+
+    bits: Annotated[int, Field(ge=4, le=32)]
+    """Its resolution; its 2^bits - 1 steps span the limits of the drive, and each drive is rounded to the nearest."""
+    source: str
+    """Where the resolution comes from."""
+
+
+class DriveChain(Section):
+    """What stands between the computed drives and the actuators."""
+
+    gain: Deviation | None = None
+    """Gain that all drives share, such as that of the supply or the reference voltage; sd as a share, "0.2 %"."""
+    channel_gain: Deviation | None = None
+    """Gain of each channel by itself, the same sd for all, independent of each other."""
+    converter: Converter | None = None
+    """Resolution of the converter: an error of LSB/sqrt(12) in each drive, independent from sample to sample."""
+    jitter: Deviation | None = None
+    """By how much the moments at which the drives change scatter, independent from sample to sample; for all channels the same."""
+    arithmetic: Literal["double", "float"] = "double"
+    """In which the drives are computed; `float` rounds each of them to 24 bits."""
+
+
+class Correlation(Section):
+    """Two numbers whose deviations depend on one another."""
+
+    between: tuple[str, str]
+    """Two names of `[numbers]`."""
+    coefficient: Annotated[float, Field(ge=-1, le=1)]
+    """Their coefficient of correlation, GUM 5.2.2."""
+    source: str
+    """Where it comes from."""
+
+
+class UncertaintyFile(Section):
+    """What is not known exactly of a device that follows a path, with standard deviations and their sources.
+
+    A number of the device file that states its own `sd` counts too; what stands here replaces that.
+    """
+
+    title: str
+    """What the file describes, in words."""
+    numbers: dict[str, Deviation] = {}
+    """By the path of a number of the device, such as `"actuator.young"`; `"hexapod.base_angles[*]"` is each of a list, independent
+    of each other."""
+    surroundings: Deviation | None = None
+    """Temperature of what the heaters cool to, and of what effects call the surroundings, over the described one; the temperature at
+    which the actuators are without force stays as described."""
+    drive: DriveChain | None = None
+    """What stands between the computed drives and the actuators."""
+    correlation: tuple[Correlation, ...] = ()
+    """`[[correlation]]` tables; all other deviations are independent."""
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """One line of the budget: `paths` of numbers of the device, each with the standard deviation of `sds` [SI, or a share for
+    a gain], independent of each other.
+
+    `per` is the step for which a sensitivity is shown: its text, such as "1 %", and its sizes [as `sds`].
+    """
+
+    name: str
+    kind: Literal["number", "surroundings", "gain", "channel gain"]
+    paths: tuple[str, ...]
+    sds: tuple[float, ...]
+    text: str
+    source: str
+    per: tuple[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Uncertainties:
+    """What is uncertain: `lines` with `correlation` (m, m), m the paths of all lines in their order, and the drive's own: steps of
+    the converter `lsb` (n_u,) [SI] or None, `jitter` [s], whether `single` precision; `texts` and `sources` of those three."""
+
+    lines: tuple[Uncertain, ...]
+    correlation: np.ndarray
+    bits: int | None
+    jitter: float
+    single: bool
+    texts: dict[str, str]
+    sources: dict[str, str]
+    inputs: dict[str, Input]
+
+    @property
+    def sds(self) -> np.ndarray:
+        """(m,) standard deviations of all columns."""
+        return np.array([sd for line in self.lines for sd in line.sds])
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(m, m) covariance of all columns."""
+        return self.correlation * np.outer(self.sds, self.sds)
+
+
+def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None = None) -> Uncertainties:
+    """What is uncertain of `scenario` with its `model`: its device's stated sds, and the file at `path`, by default uncertainty.toml
+    beside the scenario where there is one. Raises InputError listing every fault."""
+    beside = scenario.path.parent / FILE
+    found = Path(path) if path is not None else beside if beside.is_file() else None
+    file, inputs = UncertaintyFile(title=""), dict[str, Input]()
+    if found is not None:
+        file = validate(UncertaintyFile, read_toml(found), found)
+        inputs["uncertainty"] = Input(found, read_text(found))
+    read = _Reader(scenario, model, file)
+    if read.faults:
+        raise InputError(found or scenario.path, read.faults)
+    drive = file.drive or DriveChain()
+    if not read.lines and drive.converter is None and drive.jitter is None and drive.arithmetic == "double":
+        what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{EXAMPLE}"
+        raise InputError(found or scenario.path, [Fault("uncertainty", what)])
+    correlation = read.correlation(found or scenario.path)
+    texts, sources = {"arithmetic": "float"}, {"arithmetic": "IEEE 754, round to nearest"}
+    if drive.converter is not None:
+        texts["converter"], sources["converter"] = f"{drive.converter.bits} bit", drive.converter.source
+    if drive.jitter is not None:
+        texts["jitter"], sources["jitter"] = drive.jitter.sd, drive.jitter.source
+    return Uncertainties(
+        tuple(read.lines), correlation, None if drive.converter is None else drive.converter.bits, read.jitter,
+        drive.arithmetic == "float", texts, sources, inputs,
+    )  # fmt: skip
+
+
+class _Reader:
+    """The lines of a file and of the device's own sds, with all faults."""
+
+    def __init__(self, scenario: Scenario, model: Model, file: UncertaintyFile) -> None:
+        self.numbers, self.file, self.drive = dict(model.device.quantities()), file, file.drive or DriveChain()
+        self.faults: list[Fault] = []
+        self.lines: list[Uncertain] = []
+        self._taken: dict[str, str] = {}
+        for name, stated in file.numbers.items():
+            self._number(name, stated)
+        for path, number in self.numbers.items():
+            if number.sd and path not in self._taken:
+                self._add(path, "number", (path,), (number.sd,), "", number.source or FROM_DEVICE, number)
+        if file.surroundings is not None:
+            sd = self._absolute("surroundings.sd", file.surroundings.sd, "degC", "1 K")
+            stated = file.surroundings
+            self.lines.append(
+                Uncertain("surroundings", "surroundings", ("",), (sd,), stated.sd, stated.source, ("1 K", (1.0,)))
+            )
+        kinds: dict[str, Literal["gain", "channel gain"]] = {"gain": "gain", "channel_gain": "channel gain"}
+        for key, kind in kinds.items():
+            if (own := getattr(self.drive, key)) is not None:
+                share = self._share(f"drive.{key}.sd", own.sd)
+                of = model.signals["drive"].channels if key == "channel_gain" else ("all",)
+                name, per = f"drive.{key}", ("1 %", (0.01,) * len(of))
+                self.lines.append(Uncertain(name, kind, of, (share,) * len(of), own.sd, own.source, per))
+        self.jitter = (
+            0.0 if self.drive.jitter is None else self._absolute("drive.jitter.sd", self.drive.jitter.sd, "s", "1 us")
+        )
+        self._check_drive(scenario, model)
+        self._check_correlations()
+
+    def _number(self, name: str, stated: Deviation) -> None:
+        where = f'numbers."{name}"'
+        pattern = re.escape(name).replace(re.escape("[*]"), r"\[\d+\]")
+        paths = tuple(path for path in self.numbers if re.fullmatch(pattern, path))
+        if not paths:
+            near = difflib.get_close_matches(name, self.numbers, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else "ctrlgen check DEVICE lists them"
+            self.faults.append(Fault(where, f"is not a number of the device; {hint}"))
+            return
+        sds = []
+        for path in paths:
+            if path in self._taken:
+                self.faults.append(Fault(where, f"states {path} again, after {self._taken[path]!r}; leave one out"))
+            self._taken[path] = name
+            number = self.numbers[path]
+            if number.whole:
+                self.faults.append(Fault(where, "is a count, which has no standard deviation; leave it out"))
+                return
+            unit = written_unit(number.text)
+            if stated.sd.strip().endswith("%"):
+                if number.si == 0 or to_si(0.0, unit):
+                    what = (
+                        f'sd = "{stated.sd}" is a share of {number.text}, which does not count from a zero of its own'
+                    )
+                    self.faults.append(Fault(where, f'{what}; write a difference, such as "1 {_step(unit)}"'))
+                    return
+                sds.append(self._share(f"{where}.sd", stated.sd) * abs(number.si))
+            else:
+                sds.append(self._absolute(f"{where}.sd", stated.sd, unit, f"1 {_step(unit)}".replace(" 1", "")))
+        self._add(name, "number", paths, tuple(sds), stated.sd, stated.source, self.numbers[paths[0]])
+
+    def _add(
+        self, name: str, kind: Literal["number"], paths: tuple[str, ...], sds: tuple[float, ...], text: str, source: str,
+        number: Quantity,
+    ) -> None:  # fmt: skip
+        unit = written_unit(number.text)
+        values = [abs(self.numbers[path].si) for path in paths]
+        if to_si(0.0, unit):
+            per = "1 K", (1.0,) * len(paths)
+        elif same_dimension(unit, "rad"):
+            per = "1 mrad", (1e-3,) * len(paths)
+        elif min(values) > 0:
+            per = "1 %", tuple(0.01 * value for value in values)
+        else:
+            per = f"1 {unit}", (to_si(1.0, unit),) * len(paths)
+        shown = text or f"{100 * sds[0] / values[0]:.3g} %" if values[0] else text or f"{sds[0]:.3g} (SI)"
+        self.lines.append(Uncertain(name, kind, paths, sds, shown, source, per))
+
+    def _share(self, where: str, text: str) -> float:
+        """A share such as "5 %" or 0.05, as a number; NaN with a fault where it is none."""
+        body = text.strip()
+        return self._positive(
+            where, text, "1", body.removesuffix("%").strip(), 0.01 if body.endswith("%") else 1.0, "0.5 %"
+        )
+
+    def _absolute(self, where: str, text: str, unit: str, example: str) -> float:
+        return self._positive(where, text, "delta_degC" if to_si(0.0, unit) else unit, text, 1.0, example)
+
+    def _positive(self, where: str, text: str, unit: str, body: str, scale: float, example: str) -> float:
+        try:
+            value = parse(body, unit) * scale
+        except ValueError as error:
+            self.faults.append(Fault(where, f'{error}; an sd is a difference, such as "{example}"'))
+            return math.nan
+        if value <= 0:
+            self.faults.append(Fault(where, f"{text!r} must be above zero; leave out what is known exactly"))
+        return value
+
+    def _check_drive(self, scenario: Scenario, model: Model) -> None:
+        """Faults of what is stated of a drive or of surroundings that have no such thing."""
+        low, high = model.u_bounds
+        if self.drive.converter is not None and not np.all(np.isfinite(high - low)):
+            what = (
+                "needs a range, but the drive has no limits of its own; state them in the device file, or leave it out"
+            )
+            self.faults.append(Fault("drive.converter", what))
+        if self.drive.jitter is not None and scenario.sample_time is None:
+            what = "is of a motion in time, but the scenario is a row of equilibria; leave it out"
+            self.faults.append(Fault("drive.jitter", what))
+        heated = model.n_states > 0 and any(path.endswith(AMBIENT) for path in self.numbers)
+        if (
+            self.file.surroundings is not None
+            and not heated
+            and not any("ambient" in e.requires for e in model.device.effect)
+        ):
+            what = "act on nothing: no heater of this device cools to them, no effect reads them; leave them out"
+            self.faults.append(Fault("surroundings", what))
+
+    def _check_correlations(self) -> None:
+        single = {line.name for line in self.lines if len(line.paths) == 1 and line.kind == "number"}
+        for k, pair in enumerate(self.file.correlation):
+            for name in pair.between:
+                if name not in single:
+                    what = f"{name!r} is not a single number of which an sd is stated"
+                    self.faults.append(Fault(f"correlation[{k}].between", what))
+            if pair.between[0] == pair.between[1]:
+                self.faults.append(Fault(f"correlation[{k}].between", "names one number twice"))
+
+    def correlation(self, path: Path) -> np.ndarray:
+        """(m, m) coefficients of correlation. Raises InputError where no deviations can have them."""
+        columns = [line.name for line in self.lines for _ in line.paths]
+        matrix = np.eye(len(columns))
+        for pair in self.file.correlation:
+            i, j = (columns.index(name) for name in pair.between)
+            matrix[i, j] = matrix[j, i] = pair.coefficient
+        if np.linalg.eigvalsh(matrix).min(initial=0.0) < -SINGULAR:
+            what = "contradict one another: no deviations can have these coefficients together; lower some of them"
+            raise InputError(path, [Fault("correlation", what)])
+        return matrix
+
+
+def _step(unit: str) -> str:
+    """The unit of a difference of numbers in `unit`."""
+    return "K" if to_si(0.0, unit) else unit
