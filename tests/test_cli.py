@@ -41,7 +41,7 @@ def test_every_command_has_a_help_with_an_example(command):
 
 def test_no_command_at_all_shows_the_help():
     done = ctrlgen()
-    assert "Start with" in done.stdout and "error" not in done.stdout + done.stderr
+    assert "Start with" in done.stdout and "error:" not in done.stdout + done.stderr
 
 
 def test_help_names_every_command_and_a_first_step():
