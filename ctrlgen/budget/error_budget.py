@@ -143,8 +143,8 @@ class ErrorBudget:
             if a.outlying and not a.passed:
                 found.append(
                     f"{group.name}: {a.outlying} of {self.draws} draws lie more than {OUTLYING:g} standard uncertainties off and make "
-                    "the sd of the draws: such a device is near a pole or resonates, or its simulation grows, whose steps are exact for the numbers "
-                    "as described; lower the sds, or simulate such a device by itself"
+                    "the sd of the draws: the device is near a pole or resonates, or the simulation grows, whose steps are exact for the "
+                    "numbers as described; lower the sds, or simulate such a device by itself"
                 )
             if off > TOLERANCE:
                 most = max(self.lines, key=lambda line: line.alone[group.name])
