@@ -36,9 +36,9 @@ def budget(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draws.")] = 0,
     device: OtherDevice = None,
 ) -> None:
-    """Draw up the error budget of a path: what everything uncertain does to the pose, in nm and urad.
+    """Draw up what everything uncertain does to the pose along a path, in nm and urad, and to the limits.
 
-    There is no position sensor: drives computed for the device as described act on one whose numbers differ. The budget gives, for
+    There is no position sensor: drives computed for the device as described act on one whose numbers differ. The error budget gives, for
     every uncertain number, the surroundings, supply, converter, jitter and arithmetic, its sensitivity (per K, per %, per LSB), its
     standard uncertainty along the path (peak and rms), and all combined (GUM) with the 95 % band; what to measure or tighten next;
     and by how much each limit is kept at a chosen probability. Monte Carlo on the nonlinear model (GUM supplement 1) must agree
