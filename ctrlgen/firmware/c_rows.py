@@ -127,7 +127,8 @@ class Rows:
         """A group's lines, as a loop where it has several rows."""
         many, first = len(group.places) > 1, group.texts[0]
         self.groups += 1
-        offset = 0 if many else self.parts
+        offset = self.parts
+        self.parts += len(first.lines)
 
         def filled(match: re.Match) -> str:
             kind, k = match[1], int(match[2])
@@ -150,7 +151,6 @@ class Rows:
             self.copied |= set(self.copies)
             self.lines += [f"for (i = 0; i < {len(group.places)}; i++) {{", *(f"    {line}" for line in written), "}"]
         else:
-            self.parts += len(first.lines)
             self.lines += written
 
     def _constant(self, nodes: Sequence[Node]) -> str:

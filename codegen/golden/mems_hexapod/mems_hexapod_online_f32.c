@@ -278,18 +278,18 @@ static void composite_shares(const float wanted[6], float result[12])
         shared1[i] = (t1 < 0.0f) ? -t1 : t1;
     }
     for (i = 0; i < 6; i++) {
-        const float t1 = (TABLE_2[i][0] * wanted_0) + (TABLE_2[i][1] * wanted_1) + (TABLE_2[i][2] * wanted_2) +
+        const float t2 = (TABLE_2[i][0] * wanted_0) + (TABLE_2[i][1] * wanted_1) + (TABLE_2[i][2] * wanted_2) +
             (TABLE_2[i][3] * wanted_3) + (TABLE_2[i][4] * wanted_4) + (TABLE_2[i][5] * wanted_5);
-        shared2[i] = 3.0f * (t1 * t1);
+        shared2[i] = 3.0f * (t2 * t2);
     }
     for (i = 0; i < 12; i++) {
-        const float t1 = (TABLE_3[i][0] * wanted_0) + (TABLE_3[i][1] * wanted_1) + (TABLE_3[i][2] * wanted_2) +
+        const float t3 = (TABLE_3[i][0] * wanted_0) + (TABLE_3[i][1] * wanted_1) + (TABLE_3[i][2] * wanted_2) +
             (TABLE_3[i][3] * wanted_3) + (TABLE_3[i][4] * wanted_4) + (TABLE_3[i][5] * wanted_5);
-        const float t2 = (TABLE_4[i][0] * wanted_0) + (TABLE_4[i][1] * wanted_1) + (TABLE_4[i][2] * wanted_2) +
+        const float t4 = (TABLE_4[i][0] * wanted_0) + (TABLE_4[i][1] * wanted_1) + (TABLE_4[i][2] * wanted_2) +
             (TABLE_4[i][3] * wanted_3) + (TABLE_4[i][4] * wanted_4) + (TABLE_4[i][5] * wanted_5);
-        const float t3 = ((t1 * t1) + (t2 * t2)) + 0.3025f;
-        const float t4 = square_root(t3) + shared1[i / 2];
-        result[i] = 3.3057851e-18f * ((t4 * t4) + shared2[i / 2]);
+        const float t5 = ((t3 * t3) + (t4 * t4)) + 0.3025f;
+        const float t6 = square_root(t5) + shared1[i / 2];
+        result[i] = 3.3057851e-18f * ((t6 * t6) + shared2[i / 2]);
     }
 }
 
