@@ -14,7 +14,7 @@ from ctrlgen.firmware.c_expression import PLACE, SCALAR, Call, Linear, Text, tex
 from ctrlgen.firmware.expression_graph import Node, reached
 from ctrlgen.firmware.real import Real
 
-DIVISORS = (1, 2, 3, 4, 6)  # of a loop's index, where several rows read the same element
+DIVISORS = (2, 3, 4, 6)  # of a loop's index, where several rows read the same element
 
 
 class Rows:
@@ -81,7 +81,7 @@ class Rows:
         """What several rows need, in local arrays and variables."""
         linear = Linear(self.ends)
         new: dict[int, Node] = {}
-        for group in self._groups(roots, list(range(len(roots))), linear, []):
+        for group in self._groups(roots, linear, False):
             self.locals += 1
             if len(group.places) == 1:
                 node = roots[group.places[0]]
@@ -101,19 +101,16 @@ class Rows:
         terms = [linear.terms(row) for row in self.rows]
         arrays = {t[0] for t in terms if t}
         as_row = len(arrays) == 1 and all(terms) and any(len(t[1]) > 2 for t in terms if t)
-        for group in self._groups(self.rows, list(range(len(self.rows))), linear, self.rows if as_row else []):
-            index = str(group.places[0]) if len(group.places) == 1 else group.index("i", group.places)
+        for group in self._groups(self.rows, linear, as_row):
+            index = str(group.places[0]) if len(group.places) == 1 else group.index(group.places)
             self._write(group, f"{result}[{index}] = ")
 
-    def _groups(
-        self, roots: Sequence[Node], places: Sequence[int], linear: Linear, as_rows: Sequence[Node]
-    ) -> list[_Group]:
-        """Roots of equal shape whose elements follow the loop's index, in the order of the first of each."""
+    def _groups(self, roots: Sequence[Node], linear: Linear, as_row: bool) -> list[_Group]:
+        """Roots of equal shape whose elements follow the loop's index, in the order of the first of each; with `as_row` all are rows of
+        one matrix, the short ones too."""
         groups: list[_Group] = []
-        forced = {node.number for node in as_rows}
-        for place in places:
-            root = roots[place]
-            text = text_of(root, self.ends, linear, self.real, root.number in forced, self.laws)
+        for place, root in enumerate(roots):
+            text = text_of(root, self.ends, linear, self.real, as_row, self.laws)
             self.calls |= text.calls
             self.operations += text.operations
             for group in groups:
@@ -163,7 +160,7 @@ class Rows:
         if nodes[0].index == SCALAR:
             return nodes[0].array
         indices = [node.index for node in nodes]
-        return f"{nodes[0].array}[{indices[0] if len(set(indices)) == 1 else group.index('i', indices)}]"
+        return f"{nodes[0].array}[{indices[0] if len(set(indices)) == 1 else group.index(indices)}]"
 
     def _row(self, group: _Group, rows: Sequence[tuple[str, dict[int, float]]]) -> str:
         """A row of a matrix times an array."""
@@ -214,63 +211,52 @@ class _Group:
         if text.shape != self.texts[0].shape:
             return False
         places, texts = [*self.places, place], [*self.texts, text]
-        if self.index("i", places) is None:
+        if self.index(places) is None:
             return False
         for k in range(len(text.reads)):
             indices = [t.reads[k].index for t in texts]
-            if len(set(indices)) > 1 and self.index("i", indices) is None:
+            if len(set(indices)) > 1 and self.index(indices) is None:
                 return False
         self.places, self.texts = places, texts
         return True
 
     @staticmethod
-    def index(i: str, values: Sequence[int]) -> str | None:
-        """`values` as an expression of the loop's index 0, 1, 2 ...; None where they follow no simple one."""
-        first = values[0]
-        if len(values) == 2 and values[1] == first:
-            return str(first)
-        for step in (values[1] - first,) if values[1] > first else ():
-            if all(v == first + step * k for k, v in enumerate(values)):
-                scaled = i if step == 1 else f"({step} * {i})"
-                return scaled if first == 0 else f"{scaled} + {first}"
-        for divisor in DIVISORS[1:]:
+    def index(values: Sequence[int]) -> str | None:
+        """`values` as an expression of the loop's index i = 0, 1, 2 ...; None where they follow no simple one."""
+        first, step = values[0], values[1] - values[0]
+        if step > 0 and all(v == first + step * k for k, v in enumerate(values)):
+            scaled = "i" if step == 1 else f"({step} * i)"
+            return scaled if first == 0 else f"{scaled} + {first}"
+        for divisor in DIVISORS:
             if all(v == first + k // divisor for k, v in enumerate(values)):
-                return f"{i} / {divisor}" if first == 0 else f"({i} / {divisor}) + {first}"
+                return f"i / {divisor}" if first == 0 else f"(i / {divisor}) + {first}"
         return None
 
 
 def _shared(rows: Sequence[Node], linear: Linear) -> list[Node]:
     """The largest expressions that several rows, or several of these, need."""
-    roots = {row.number: row for row in rows if not _plain(row, linear)}
-    while True:
-        order = [n for n in reached(roots.values()) if not n.leaf]
-        of: dict[int, int] = {}  # the roots that need a node, as bits
-        parents: dict[int, set[int]] = {}
-        for bit, number in enumerate(sorted(roots)):
-            of[number] = of.get(number, 0) | 0
-            for operand in roots[number].operands if not _plain(roots[number], linear) else ():
-                of[operand.number] = of.get(operand.number, 0) | 1 << bit
-        needed = {number: bits for number, bits in of.items()}
-        for node in reversed(order):
-            if node.number in roots or _plain(node, linear):
-                continue
-            for operand in node.operands:
-                needed[operand.number] = needed.get(operand.number, 0) | needed.get(node.number, 0)
-                parents.setdefault(operand.number, set()).add(node.number)
-        for bit, number in enumerate(sorted(roots)):
-            for operand in roots[number].operands:
-                parents.setdefault(operand.number, set()).add(-1 - bit)
-        found = [
-            node for node in order
-            if node.number not in roots and not _plain(node, linear) and needed.get(node.number, 0).bit_count() > 1
-            and any(p < 0 or needed.get(p) != needed[node.number] for p in parents.get(node.number, ()))
-        ]  # fmt: skip
-        if not found:
-            break
+    own = {row.number: row for row in rows if not _plain(row, linear)}
+    roots = dict(own)
+    while found := _needed_by_several(roots, linear):
         roots |= {node.number: node for node in found}
-    own = {row.number for row in rows}
-    used = {n.number for root in roots.values() for n in reached(root.operands, [r for r in roots.values()])}
+    used = {n.number for root in roots.values() for n in reached(root.operands, roots.values())}
     return [node for number, node in sorted(roots.items()) if number not in own or number in used]
+
+
+def _needed_by_several(roots: Mapping[int, Node], linear: Linear) -> list[Node]:
+    """The largest expressions below several `roots`: other roots need them than need what they are a part of."""
+    needed: dict[int, frozenset[int]] = {}  # node -> the roots above it
+    above: dict[int, set[frozenset[int]]] = {}  # node -> those of each expression that it is a part of
+    order = [node for node in reached(roots.values()) if not _plain(node, linear)]
+    for node in reversed(order):  # what uses a node before the node
+        those = frozenset((node.number,)) if node.number in roots else needed.get(node.number, frozenset())
+        for operand in node.operands if those else ():  # below the row of a matrix nothing is needed by itself
+            needed[operand.number] = needed.get(operand.number, frozenset()) | those
+            above.setdefault(operand.number, set()).add(those)
+    return [
+        node for node in order
+        if node.number not in roots and len(needed.get(node.number, ())) > 1 and above[node.number] != {needed[node.number]}
+    ]  # fmt: skip
 
 
 def _plain(node: Node, linear: Linear) -> bool:
