@@ -429,3 +429,9 @@ def test_the_command_leaves_page_record_and_figures(tmp_path):
 def test_the_command_refuses_what_it_cannot_read(tmp_path):
     assert "is not a probability" in ctrlgen("budget", SCENARIOS / "circle20", "--probability", "often").stderr
     assert "does not exist" in ctrlgen("budget", SCENARIOS / "circle20", "--uncertainty", tmp_path / "none.toml").stderr
+
+
+def test_the_help_shows_the_sections_of_the_file():
+    """Square brackets are markup to the library that prints the help."""
+    text = ctrlgen("budget", "--help").stdout
+    assert all(f"[{name}]" in text for name in ("numbers", "surroundings", "drive"))
