@@ -12,12 +12,13 @@ from operator import or_
 from pathlib import Path
 
 import pytest
-from conftest import SCENARIOS
+from conftest import SCENARIOS, effect_device
 
 from ctrlgen import ControllerStatus, build_model, generate, load_scenario, solve
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.firmware.vector_cases import limiter_calls
 from ctrlgen.firmware.vectors import vectors
 from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.motion_feedforward import controller_of
@@ -96,3 +97,12 @@ def test_the_vectors_have_every_status_that_a_target_can_bring_about(real):
         assert reduce(or_, (row["status"] for row in rows)) == bits
         stepped = reduce(or_, (row["status"] for row in rows if not row["how"] & 1))
         assert stepped & (bits & ~ControllerStatus.STATE) == bits & ~ControllerStatus.STATE
+
+
+def test_a_device_whose_limits_have_no_cheap_bound_has_vectors_too():
+    """With stages that yield less to the struts as they stiffen the wire stress is not of the first degree in the displacement."""
+    model = build_model(effect_device({"kind": "link_load", "at": "all", "share": "1.15"}))
+    controller = controller_of(model, "pose", 1e-3)
+    assert controller.guarded_limits and controller.composite_bound is None
+    fresh = controller_of(model, "pose", 1e-3)  # nothing of which is worked out yet
+    assert {call.settle for call in limiter_calls(fresh, 2.0**-24, 8)} == {True, False}

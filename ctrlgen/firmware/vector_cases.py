@@ -121,7 +121,7 @@ def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
     # worked out from the kernels themselves, before they are watched
     _ = (
         controller.examined_first, controller.drive_can_be_limited, controller.state_can_be_limited, controller.slacks,
-        controller.plausible,
+        controller.plausible, controller.composite_bound,
     )  # fmt: skip
     x_low, x_high = (bound[:n] for bound in m.x_bounds)
     limits = {
