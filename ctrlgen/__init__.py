@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ctrlgen.app.batch import load_batch, run_batch
     from ctrlgen.app.pipeline import Outcome, run, verify
     from ctrlgen.budget.error_budget import ErrorBudget, error_budget
+    from ctrlgen.budget.robust import solve
     from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user import user_device
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from ctrlgen.recordings.recording import Record, Recording
     from ctrlgen.reporting.build_record import Build
     from ctrlgen.trajectory.scenario import Scenario, load_scenario
-    from ctrlgen.trajectory.solution import Margin, Solution, solve
+    from ctrlgen.trajectory.solution import Margin, Solution
     from ctrlgen.trajectory.workspace import Workspace
     from ctrlgen.verification.comparison import Comparison, compare
 
@@ -46,6 +47,7 @@ _EXPORTS = {
         "ErrorBudget",
         "error_budget",
     ),
+    "budget.robust": ("solve",),
     "core.errors": (
         "CtrlgenError",
         "Fault",
@@ -98,7 +100,6 @@ _EXPORTS = {
     "trajectory.solution": (
         "Margin",
         "Solution",
-        "solve",
     ),
     "trajectory.workspace": ("Workspace",),
     "verification.comparison": (

@@ -53,8 +53,16 @@ def print_solution(outcome: pipeline.Outcome) -> None:
             signal.channels, signal.units, error, solution.between_samples, strict=True
         ):
             out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
+    if (sentence := report.robust_sentence(solution)) is not None:
+        out.print(sentence, markup=False, soft_wrap=True)
+    robust: tuple[Column, ...] = (("reserved", "right"),) if sentence is not None else ()
     table = table_of(
-        ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
+        ("limit", "left"),
+        ("closest at", "left"),
+        ("value", "right"),
+        ("bound", "right"),
+        *robust,
+        ("range left", "right"),
     )
     for margin in solution.margins:
         unit, tightest = margin.limit.unit, margin is solution.tightest
@@ -62,7 +70,9 @@ def print_solution(outcome: pipeline.Outcome) -> None:
         where = f"{margin.channel}, " + (
             f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
         )
-        row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
+        reserved = (show(margin.reserve, "K" if unit == "degC" else unit, 3) if margin.reserve else "",) * len(robust)
+        bound = show(margin.limit.described(margin.bound), unit)
+        row = (margin.limit.label, where, show(margin.value, unit), bound, *reserved, share)
         table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
     show_table(table)
     if outcome.expected:

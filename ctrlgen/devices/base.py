@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
@@ -44,6 +44,8 @@ class Limit:
 
     A limit on an expression that is not a variable of the model itself must be convex in the displacement, never negative,
     and zero at home: the controller keeps it by scaling the displacement toward home.
+
+    `reserve` [SI]: by how much the lower and the upper bound of the device have been tightened for what is not known exactly.
     """
 
     name: str
@@ -53,6 +55,17 @@ class Limit:
     expr: ca.SX
     lower: float | None = None
     upper: float | None = None
+    reserve: tuple[float, float] = (0.0, 0.0)
+
+    def tightened(self, below: float, above: float) -> Limit:
+        """The same with its bounds moved inward by `below` and `above`, which are added to what has been reserved."""
+        lower = None if self.lower is None else self.lower + below
+        upper = None if self.upper is None else self.upper - above
+        return replace(self, lower=lower, upper=upper, reserve=(self.reserve[0] + below, self.reserve[1] + above))
+
+    def described(self, bound: float) -> float:
+        """The device's own bound, of which `bound` is the tightened one."""
+        return bound - self.reserve[0] if bound == self.lower else bound + self.reserve[1]
 
 
 def rate_limit(drive: Signal, i: int, low: float, high: float, unit: str) -> Limit:

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import base_unit, show
+from ctrlgen.devices import Limit
 from ctrlgen.firmware.cprint import Kernel, Law, Printer
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.real import Real
@@ -91,6 +92,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
+        "reserved_for": None if model.probability is None else f"{100 * model.probability:.10g} % along {scenario.name}",
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
         "elementary": elementary_text(called, real), "bound": bound, "nearest_slopes": controller.nearest_slopes, "sweeps": SWEEPS,
@@ -242,7 +244,10 @@ def _si_text(signal: Any) -> str:
     return ", ".join(f"{c} [{base_unit(u)}]" for c, u in zip(signal.channels, signal.units, strict=True))
 
 
-def _limit_text(limit: Any) -> str:
+def _limit_text(limit: Limit) -> str:
     low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
     high = "" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"
-    return f"{low}{limit.label}{high}"
+    step = "K" if limit.unit == "degC" else limit.unit
+    sides = zip((limit.lower, limit.upper), limit.reserve, strict=True)
+    reserved = [f"{show(limit.described(b), limit.unit)} less {show(r, step)}" for b, r in sides if b is not None and r]
+    return f"{low}{limit.label}{high}" + (f" ({'; '.join(reserved)} reserved)" if reserved else "")

@@ -7,8 +7,8 @@ z' = v. All SX, SI inside. `ctrlgen.model.assembly` builds it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -90,6 +90,8 @@ class Model:
     z_scale: np.ndarray
     u_scale: np.ndarray
     force_scale: float
+
+    probability: float | None = None  # with which the limits, tightened by their reserves, hold; None: as described
 
     @cached_property
     def rates(self) -> ca.SX:
@@ -220,6 +222,18 @@ class Model:
         for i, limit in zip(self.rate_places, self.rate_limits, strict=True):
             low[i], high[i] = limit.lower, limit.upper
         return low, high
+
+    def tightened(self, reserves: Mapping[str, tuple[float, float]], probability: float | None) -> Model:
+        """The model with the bounds of the named limits moved inward by (below, above) [SI], which then hold with the `probability`:
+        whatever reads its limits keeps the tightened ones."""
+        limits = tuple(limit.tightened(*reserves.get(limit.name, (0.0, 0.0))) for limit in self.limits)
+        return replace(self, limits=limits, probability=probability)
+
+    def limited_as(self, other: Model) -> Model:
+        """The model with the reserves of the `other` of the same device, but for its effects."""
+        if other.probability is None:
+            return self
+        return self.tightened({limit.name: limit.reserve for limit in other.limits}, other.probability)
 
     @property
     def redundant(self) -> bool:

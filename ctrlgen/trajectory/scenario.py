@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import re
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import In, Quantity, read_quantity, show, written_unit
+from ctrlgen.core.units import In, Quantity, read_probability, read_quantity, show, written_unit
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.base import Section
 from ctrlgen.effects import Place
@@ -46,6 +46,32 @@ class Expectation(Section):
     """Where the expected value comes from."""
 
 
+class Robust(Section):
+    """Limits that hold for what is not known exactly: the standard deviations of uncertainty.toml beside the scenario and those of the
+    device file."""
+
+    probability: str
+    """With which all limits hold along the whole path, such as "99.9 %"."""
+    home: tuple[str, ...] = ()
+    """Channels of the followed signal along which the whole path may be moved; of the places where the limits hold, that with the
+    smallest expected error is taken."""
+
+    @model_validator(mode="after")
+    def _meaning(self) -> Robust:
+        if not 0.5 <= self.chance < 1:
+            raise ValueError(
+                f'probability = "{self.probability}" must be at least 50 % and below 100 %, such as "99.9 %"'
+            )
+        if len(set(self.home)) < len(self.home):
+            raise ValueError(f"home names a channel twice: {', '.join(self.home)}; name each once")
+        return self
+
+    @property
+    def chance(self) -> float:
+        """The probability as a number, 0.999 for "99.9 %"."""
+        return read_probability(self.probability)
+
+
 class ScenarioFile(Section):
     """A path for a device to follow.
 
@@ -69,6 +95,8 @@ class ScenarioFile(Section):
     """The commanded path; its `kind` chooses the shape."""
     outcome: Literal["solved", "unreachable"] = "solved"
     """Whether a trajectory is expected to exist; `unreachable` passes where none does."""
+    robust: Robust | None = None
+    """Left out: the limits hold for the device as described, and may be broken by one whose numbers differ."""
     expect: tuple[Expectation, ...] = ()
     """`[[expect]]` tables: values that the solution must have."""
 
@@ -109,7 +137,7 @@ class Scenario:
     """A scenario ready to be solved. `file` is what scenario.toml says; `name` the folder's name as a C identifier.
 
     `inputs`: the "scenario" itself, its "device" (with "device_code" where that names a Python file) and, where a path is read from
-    a file, its "poses".
+    a file, its "poses"; of a robust one that is solved its "uncertainty". `home` [SI] is by how much the path is moved, by channel.
     """
 
     name: str
@@ -117,6 +145,7 @@ class Scenario:
     file: ScenarioFile
     device: Device
     inputs: dict[str, Input]
+    home: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def digest(self) -> dict[str, str]:
@@ -154,7 +183,7 @@ class Scenario:
 
     def command(self, model: Model) -> np.ndarray:
         """The commanded samples (n, channels) of the followed signal, SI. Raises InputError."""
-        samples = self._on_path(model, lambda path, frame, n: path.samples(frame, n))
+        samples = self._on_path(model, lambda path, frame, n: path.samples(frame, n)) + self._moved_by(model)
         if self.sample_time and len(samples) < 2:
             what = "has one sample, but motion in time needs two or more; for one pose leave out sample_rate"
             raise InputError(self.path, [Fault("path", what)])
@@ -179,7 +208,11 @@ class Scenario:
         places = np.arange(len(samples)) if at is None else at
         tables = self._on_path(model, lambda path, frame, n: path.derivatives(frame, n, order, places))
         rates = self.sample_time ** -np.arange(1.0, order + 1)
-        return Motion(tables[0], tables[1:] * rates[:, None, None])
+        return Motion(tables[0] + self._moved_by(model), tables[1:] * rates[:, None, None])
+
+    def _moved_by(self, model: Model) -> np.ndarray:
+        """(channels,) by how much the path is moved."""
+        return np.array([self.home.get(channel, 0.0) for channel in model.signals[self.file.follow].channels])
 
     def _check_smoothness(self, model: Model, samples: np.ndarray, order: int) -> None:
         """Refuses a path whose derivative of this order jumps, so that the drive would."""
@@ -233,6 +266,14 @@ class Scenario:
         if what:
             raise InputError(self.path, [Fault("duration", what)])
         return n
+
+
+def check_tightened(scenario: Scenario, model: Model) -> None:
+    """Refuses the model of a device as described where the scenario asks for limits that hold for what is not known exactly. Raises
+    InputError."""
+    if scenario.file.robust is not None and model.probability is None:
+        what = "asks for tightened limits, which this model does not have: take ctrlgen.solve, and the model of the solution"
+        raise InputError(scenario.path, [Fault("robust", what)])
 
 
 def model_of(scenario: Scenario) -> Model:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -19,7 +19,8 @@ from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, 
 from ctrlgen.trajectory.motion import Motion
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
-from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.sampled_inverse import SampledTrajectory
+from ctrlgen.trajectory.scenario import Scenario, check_tightened
 from ctrlgen.trajectory.violations import Before, limited_values, violations
 
 LOOKED_AT_BETWEEN = 4  # parts of a sample at whose ends the motion between samples is looked at
@@ -40,6 +41,11 @@ class Margin:
     bound: float
     distance: float
     share: float | None
+
+    @property
+    def reserve(self) -> float:
+        """What is kept of the device's own bound for what is not known exactly; the distance is what is left beside it."""
+        return abs(self.limit.described(self.bound) - self.bound)
 
 
 @dataclass(frozen=True)
@@ -96,6 +102,7 @@ def check_motion(
 
 
 def _check_invertible(scenario: Scenario, model: Model) -> None:
+    check_tightened(scenario, model)
     if model.clocks and scenario.closed:
         what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
         raise InputError(scenario.path, [Fault("path", what)])
@@ -105,8 +112,8 @@ def _check_invertible(scenario: Scenario, model: Model) -> None:
 
 def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
     """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where none are found, and
-    InputError for a device that cannot be inverted, a path that is not smooth enough for one with inertia, or a closed path of one
-    that changes with time.
+    InputError for a device that cannot be inverted, a path that is not smooth enough for one with inertia, a closed path of one
+    that changes with time, or limits that are to be tightened and are not (`ctrlgen.budget.robust.solve` tightens them).
 
     The inverse of the path says sample by sample what it takes. Where that breaks a limit the path cannot be followed; where it
     keeps all of them it is the solution, from which IPOPT begins, and the answer where IPOPT ends elsewhere. With inertia it is what
@@ -125,9 +132,7 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
     needed = inverse.needed(found, motion, scenario.closed)
     if (error := unreachable(scenario, inverse, motion, needed)) is not None:
         raise error
-    reached = simulate(model, u, inverse.sample_time, found.x[0], found.z[0])
-    n = len(motion)
-    samples = Trace(reached.time[:n], {k: v[:n] for k, v in reached.signals.items()}, reached.x[:n], reached.z[:n])
+    samples = _driven(model, found, u, inverse.sample_time)
     off = np.linalg.norm(
         (samples.signals[scenario.file.follow] - motion.position) / model.signals[scenario.file.follow].scale, axis=1
     )
@@ -141,6 +146,42 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
     )
     between = error_between_samples(scenario, model, samples, u)
     return Solution(scenario, model, motion.position, samples, u, margins, found.iterations, (), between)
+
+
+def _driven(model: Model, found: SampledTrajectory, u: np.ndarray, sample_time: float) -> Trace:
+    """The samples of the model under the drives u (n, n_u), by the shipped integrator."""
+    reached, n = simulate(model, u, sample_time, found.x[0], found.z[0]), len(u)
+    return Trace(reached.time[:n], {k: v[:n] for k, v in reached.signals.items()}, reached.x[:n], reached.z[:n])
+
+
+def unlimited(scenario: Scenario, model: Model) -> Solution:
+    """What the path of `scenario` takes, whether or not it keeps the limits: without margins. Raises as `solve` where the inverse of
+    the path alone does not give it."""
+    if model.inertial:
+        motion = scenario.motion(model)
+        moved = motion_inverse(model, scenario.file.follow, scenario.sample_time or 0.0)
+        found = moved.sampled(motion, scenario.closed)
+        return Solution(
+            scenario, model, motion.position, _driven(model, found, found.u, scenario.sample_time or 0.0), found.u, (),
+            found.iterations, (),
+        )  # fmt: skip
+    command = scenario.command(model)
+    needed = path_inverse(model, scenario.file.follow, scenario.sample_time).trajectory(command, scenario.closed)
+    if not needed.exact:
+        return solve(scenario, model)
+    free = replace(model, limits=())  # which would clip
+    result = TrajectoryProgramme(free, scenario.file.follow, command, scenario.sample_time, scenario.closed).exact(
+        needed
+    )
+    return Solution(scenario, model, command, result.trace, result.u, (), 0, ())
+
+
+def judged_by(solution: Solution, scenario: Scenario, model: Model) -> Solution:
+    """The same drives with the margins that the limits of `model` leave; those on rates stay."""
+    trace, rates = solution.trace, {limit.name for limit in model.rate_limits}
+    margins = _margins(model, trace.x, trace.z, solution.drive, None)
+    kept = [m for m in solution.margins if m.limit.name in rates]
+    return replace(solution, scenario=scenario, model=model, margins=(*margins, *kept))
 
 
 def error_between_samples(scenario: Scenario, model: Model, samples: Trace, u: np.ndarray) -> np.ndarray:

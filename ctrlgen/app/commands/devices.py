@@ -67,6 +67,12 @@ def check(
         command = scenario.command(model)
         out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
         try:
+            if scenario.file.robust is not None:
+                from ctrlgen.budget.robust import solve  # scipy takes a moment to import
+                from ctrlgen.reporting.report import robust_sentence
+
+                out.print(str(robust_sentence(solve(scenario, model))), markup=False, soft_wrap=True)
+                return
             if model.inertial:
                 *_, needed = check_motion(scenario, model)
             else:
