@@ -1,20 +1,22 @@
 """Paths whose limits hold for what is not known exactly: chance constraints with a back-off of each limit.
 
 A limit with the margin M = b - y at a sample holds for a device of which the numbers, surroundings and drives differ where M is
-larger than what they take of it. To first order that is normal; `lasting` is its sd by what is the same along the whole path, `scattered`
-by what is new at every sample. All of N limited quantities hold at all of n samples with the probability p where
+larger than what they take of it. To first order that is normal: u_l is its sd by what lasts along the path, u_s by what is new at
+every sample. With the share e of the risk 1 - p for what scatters, all N limited quantities hold at all n samples with probability p if
 
-    M >= z_l u_lasting + z_s u_scattered,   1 - Phi(z_l) = e_l/N,   1 - Phi(z_s) = e_s/(N n),   e_l + e_s + e_far = 1 - p,
+    sum_i Phi(-beta_i) <= (1 - e)(1 - p),   beta_i = min_k (M_ik - z_s u_s,ik)/u_l,ik,   1 - Phi(z_s) = e (1 - p)/(N n),
 
-Boole's inequality over quantities, and of what scatters over samples. What lasts breaks a limit at its worst sample or not at all. Sources:
-A. Nemirovski, A. Shapiro, SIAM J. Optim. 17 (2006) 969 (safe approximation of chance constraints); L. Blackmore, M. Ono, AIAA 2009-5876
-(allocation of the risk).
+Boole's inequality over quantities, and of what scatters over samples. What lasts breaks a limit at its worst sample or not at all.
+The back-off of a limit is z u_l + z_s u_s, z the quantile of (1 - e)(1 - p), or where the sum is larger the one to which the betas below
+it must be raised. Sources: A. Nemirovski, A. Shapiro, SIAM J. Optim. 17 (2006) 969 (safe approximation of chance constraints); M. Ono,
+B. C. Williams, Proc. 47th IEEE CDC (2008) 3427 (risk allocation).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -27,19 +29,22 @@ from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, Infeasibility, InputError, SolverError, Unreachable
 from ctrlgen.core.units import difference, show
+from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory import solution as described
+from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.infeasibility import instead
-from ctrlgen.trajectory.least_effort import motion_inverse, path_inverse
+from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
+from ctrlgen.trajectory.path_inverse import PathInverse
 from ctrlgen.trajectory.scenario import Robust, Scenario
 from ctrlgen.trajectory.solution import Solution, judged_by, unlimited
 
 SCATTER_RISK = 0.1  # of the risk, for what scatters: little of it is gained by more, as z grows with its logarithm
-FAR_RISK = 0.01  # for all quantities that are so far from their limits that they are not counted
 CUSHION = 0.01  # standard uncertainties that a moved path keeps more: its place is rounded
 STEP = 1e-3  # typical sizes by which a path is moved for a difference
 FARTHEST = 100.0  # typical sizes by which a path is moved where no displacement has limits
-ROUNDS = 4  # of the search, after each of which the quantities are counted anew
+MOST_STEPS = 20  # of the search
+ROUNDS = 4  # of it, each with a back-off for more limits at a time
 DIGITS = 4  # of the place of a moved path
 LEAST_WEIGHT = 1e-6  # of the largest: of a drive of which everything is known
 SHOWN = 6  # limits that an explanation lists
@@ -85,18 +90,19 @@ class _RobustPath:
 
     def solved(self) -> Solution:
         """The solution. Raises Unreachable where it keeps the limits of the device as described alone."""
-        home = {}
-        if self.robust.home:
-            home = self._home()
+        home = self._home() if self.robust.home else {}
         scenario = replace(self.scenario, home=home)
-        solution = described.solve(scenario, self.model, self.progress)
+        try:
+            solution = described.solve(scenario, self.model, self.progress)
+        except Unreachable as error:
+            raise Unreachable(f"{self._best(home)}{error}", error.infeasibility) from None
         self.progress("what is uncertain along the path")
         judged = self._judged(solution)
-        reserve = reserves(judged.found, self.robust.chance)
+        chance = ChanceConstraint(judged.found, self.robust.chance)
+        if not chance.holds:
+            raise self._not_kept(solution, judged, chance)
         asked = replace(self.asked, home=home, inputs={**self.asked.inputs, **self.stated.inputs})
-        if np.any(_short(judged.found, reserve) > 0):
-            raise self._not_kept(solution, judged, reserve)
-        kept = _reserved(judged, reserve, self.model, solution)
+        kept = _reserved(judged, chance.reserve, self.model)
         return judged_by(solution, asked, self.model.tightened(kept, self.robust.chance))
 
     def _judged(self, solution: Solution, like: _Judged | None = None) -> _Judged:
@@ -104,8 +110,8 @@ class _RobustPath:
         path = UncertainPath(solution, self.stated) if like is None else like.path.along(solution)
         try:
             linear = propagate(path)
-        except FloatingPointError as error:
-            raise SolverError(f"{error}; a law of the device has no slope along it") from None
+        except FloatingPointError as fault:
+            raise SolverError(f"{fault}; a law of the device has no slope along it") from None
         slopes = slopes_of_limits(path, linear) if like is None else like.slopes
         combined = linear.combined("pose", self.stated) / self.signal.scale
         error = float(np.sqrt(np.mean(np.sum(combined**2, axis=1))))
@@ -116,42 +122,45 @@ class _RobustPath:
         that where least is missing."""
         channels = [self.signal.channels.index(c) for c in self.robust.home]
         scale = np.array(self.signal.scale)[channels]
-        judged: dict[tuple[float, ...], _Judged] = {}
-        first: list[_Judged] = []
+        known: dict[tuple[float, ...], tuple[Margins, float]] = {}
 
-        def at(place: np.ndarray) -> _Judged:
+        def judged_at(place: np.ndarray, like: _Judged | None = None) -> _Judged:
+            self.progress("expected error, moved by " + self._shown(self._named(place * scale)))
+            return self._judged(unlimited(replace(self.scenario, home=self._named(place * scale)), self.model), like)
+
+        start = judged_at(np.zeros(len(channels)))
+
+        def at(place: np.ndarray) -> tuple[Margins, float]:
             key = tuple(float(v) for v in place)
-            if key not in judged:
-                self.progress("expected error, moved by " + self._shown(self._named(place * scale)))
-                moved = replace(self.scenario, home=self._named(place * scale))
-                judged[key] = self._judged(unlimited(moved, self.model), first[0] if first else None)
-                first.append(judged[key])
-            return judged[key]
+            if key not in known:
+                found = judged_at(place, start)
+                known[key] = found.found, found.error / start.error
+            return known[key]
 
-        start = at(np.zeros(len(channels)))
-        size = np.where(start.found.sd.max(axis=1) > 0, start.found.sd.max(axis=1), 1.0)
-        counted = np.isfinite(start.found.bounds) & (start.found.sd.max(axis=1) > 0)
         low, high = self._ends(start, channels, scale)
-        place = np.clip(np.zeros(len(channels)), low, high)
+
+        def error(p: np.ndarray) -> np.ndarray:
+            return np.array([at(p)[1]])
+
+        place, counted = np.zeros(len(channels)), np.isfinite(start.found.bounds) & (start.found.sd.max(axis=1) > 0)
+        size = start.found.sd.max(axis=1)[counted]
+        z = float(norm.isf(1 - self.robust.chance))
         for _ in range(ROUNDS):
-            near = int(_near(at(place).found, self.robust.chance).sum())
 
-            def left(p: np.ndarray, near: int = near) -> np.ndarray:
-                found = at(p).found
-                least = (found.margin - reserves(found, self.robust.chance, near)).min(axis=1)
-                return least[counted] / size[counted] - CUSHION
-
-            def error(p: np.ndarray) -> np.ndarray:
-                return np.array([at(p).error / start.error])
+            def left(p: np.ndarray, z: float = z) -> np.ndarray:  # nearly linear, which their probability is not
+                least = ChanceConstraint(at(p)[0], self.robust.chance).left(z).min(axis=1)
+                return np.asarray(least[counted] / size - CUSHION)
 
             answer = minimize(
                 lambda p: float(error(p)[0]), place, jac=lambda p: _slope(error, p, low, high)[0], method="SLSQP",
-                bounds=list(zip(low, high, strict=True)), options={"ftol": 1e-4, "maxiter": 20},
-                constraints={"type": "ineq", "fun": left, "jac": lambda p: _slope(left, p, low, high)},
+                bounds=list(zip(low, high, strict=True)), options={"ftol": 1e-4, "maxiter": MOST_STEPS},
+                constraints={"type": "ineq", "fun": left, "jac": lambda p, left=left: _slope(left, p, low, high)},
             )  # fmt: skip
             place = np.clip(answer.x, low, high)
-            if int(_near(at(place).found, self.robust.chance).sum()) <= near:
+            chance = ChanceConstraint(at(place)[0], self.robust.chance)
+            if chance.holds or chance.quantile <= z:
                 break
+            z = chance.quantile
         return self._named(
             np.array([_rounded(v, self.signal.units[i]) for v, i in zip(place * scale, channels, strict=True)])
         )
@@ -160,7 +169,8 @@ class _RobustPath:
         """How far each channel can be moved by itself before a displacement leaves its range, to first order [typical sizes]; zero is
         between both."""
         m, z = self.model, start.path.solution.trace.z
-        bounds, middle = m.z_bounds, samples_middle(start.path.solution.command)
+        bounds, command = m.z_bounds, start.path.solution.command
+        middle = (command.min(axis=0) + command.max(axis=0)) / 2
         slope = _inverse_of(self.scenario, m).slope(middle)[:, channels] * scale
         low, high = np.full(len(channels), -FARTHEST), np.full(len(channels), FARTHEST)
         room = (bounds[0] - z.max(axis=0), bounds[1] - z.min(axis=0))  # one end of the path still inside
@@ -174,138 +184,155 @@ class _RobustPath:
     def _named(self, moved: np.ndarray) -> dict[str, float]:
         return {channel: float(v) for channel, v in zip(self.robust.home, moved, strict=True)}
 
-    def _shown(self, home: dict[str, float]) -> str:
+    def _shown(self, home: Mapping[str, float]) -> str:
         """'delta_z = +3.2 um'."""
         units = dict(zip(self.signal.channels, self.signal.units, strict=True))
         return ", ".join(f"{c} = {'+' if v > 0 else ''}{show(v, units[c])}" for c, v in home.items())
 
-    def _not_kept(self, solution: Solution, judged: _Judged, reserve: np.ndarray) -> Unreachable:
+    def _best(self, home: Mapping[str, float]) -> str:
+        """How a message about a path begins that may be moved."""
+        return f"moved by {self._shown(home)}, the best place that was found: " if home else ""
+
+    def _not_kept(self, solution: Solution, judged: _Judged, chance: ChanceConstraint) -> Unreachable:
         """The error that names the limits, by how much each is short at which sample, and the probability that the path has."""
-        short, found, model = _short(judged.found, reserve), judged.found, self.model
-        rows: list[tuple[float, str, int]] = []
-        place = 0
-        for limit in judged.path.limits:
-            own = slice(place, place + limit.expr.numel())
-            place = own.stop
-            for side in (0, 1):
-                worst = short[side, :, own]
-                if not worst.max(initial=0.0) > 0:
-                    continue
-                k, i = np.unravel_index(int(np.argmax(worst)), worst.shape)
-                c, unit = own.start + int(i), limit.unit
-                step = "K" if unit == "degC" else unit
-                bound, sd = found.bounds[side, c], found.sd[side, k, c]
-                value = bound + (found.margin[side, k, c] if side == 0 else -found.margin[side, k, c])
-                away = "above" if side == 0 else "below"
-                text = (
-                    f"  {limit.label} at {limit.channels[i]}: {show(value, unit)} at sample {k}{self._moment(int(k))} is "
-                    f"{show(found.margin[side, k, c], step)} {away} {show(bound, unit)}, but what is uncertain takes "
-                    f"{show(reserve[side, k, c], step)} there: short by {show(worst[k, i], step)}"
-                )
-                rows.append((float(worst[k, i] / sd), text, int(k)))
-        rows.sort(key=lambda row: -row[0])
+        reserve, possible = chance.reserve, chance.possible
+        short = np.where(judged.found.sd > 0, np.maximum(reserve - judged.found.margin, 0.0), 0.0)
+        rows = sorted(self._missing(judged, reserve, short), key=lambda row: -row[0])
         samples = tuple(map(int, np.flatnonzero((short > 0).any(axis=(0, 2)))))
-        possible = _probability(found)
-        could = (
-            f"the path as it is keeps them with {100 * possible:.3g} %"
-            if possible
-            else "the path as it is keeps them with less than 50 %"
-        )
-        where = (
-            f"moved by {self._shown(dict(solution.scenario.home))}, where least is missing, it "
-            if self.robust.home
-            else ""
-        )
+        could = f"{100 * possible:.3g} %" if possible > 0 else "no probability that is known"
         lines = [
-            f"{where}cannot keep all limits with {self.robust.probability}, in {len(samples)} of {len(short[0])} samples; {could}",
+            f"{self._best(solution.scenario.home)}cannot keep all limits with {self.robust.probability}, in {len(samples)} of "
+            f"{short.shape[1]} samples; they are kept with {could}",
             *(text for _, text, _ in rows[:SHOWN]),
         ]
         if len(rows) > SHOWN:
             lines.append(f"  and {len(rows) - SHOWN} more limits")
-        strict = model.tightened(_largest(judged, reserve), self.robust.chance)
-        target = solution.scenario.target(model)
-        line, found_paths = instead(
-            solution.scenario, _inverse_of(self.scenario, strict), target, [k for *_, k in rows]
-        )
-        lines += [f"{line} with the same reserves"] * bool(found_paths)
-        return Unreachable("\n".join(lines), Infeasibility(samples, rows[0][2], solution.command, None, found_paths))
+        inverse = _inverse_of(self.scenario, self.model.tightened(_largest(judged, reserve), self.robust.chance))
+        target = solution.scenario.target(self.model)
+        line, found = instead(solution.scenario, inverse, target, [k for *_, k in rows])
+        lines += [f"{line}, with the same reserves"] * bool(found)
+        return Unreachable("\n".join(lines), Infeasibility(samples, rows[0][2], solution.command, None, found))
+
+    def _missing(self, judged: _Judged, reserve: np.ndarray, short: np.ndarray) -> Iterator[tuple[float, str, int]]:
+        """For each bound that is not kept: what is missing in standard uncertainties, a line of text, the worst sample."""
+        found = judged.found
+        for limit, own in judged.path.places:
+            for side, away in enumerate(("above", "below")):
+                k, i = np.unravel_index(int(np.argmax(short[side, :, own])), short[side, :, own].shape)
+                at, unit = (side, int(k), own.start + int(i)), "K" if limit.unit == "degC" else limit.unit
+                if not short[at]:
+                    continue
+                bound, margin = float(found.bounds[side, at[2]]), float(found.margin[at])
+                value = show(bound + (margin if side == 0 else -margin), limit.unit)
+                text = (
+                    f"  {limit.label} at {limit.channels[i]}: {value} at sample {k}{self._moment(at[1])} is {show(margin, unit)} {away} "
+                    f"{show(bound, limit.unit)}, but what is uncertain takes {show(reserve[at], unit)} there: short by "
+                    f"{show(short[at], unit)}"
+                )
+                yield float(short[at] / found.sd[at]), text, at[1]
 
     def _moment(self, k: int) -> str:
         h = self.scenario.sample_time
         return "" if h is None else f" at {show(k * h, 's')}"
 
 
-def reserves(found: Margins, probability: float, near: int | None = None) -> np.ndarray:
-    """(2, n, channels) what is kept of each margin so that all limits hold along the path with the `probability`; `near` is the number of
-    limited quantities that count, by default of those near their limits."""
-    count = max(int(_near(found, probability).sum()) if near is None else near, 1)
-    risk, n = 1 - probability, found.margin.shape[1]
-    of_scatter = SCATTER_RISK if found.scattered.any() else 0.0
-    z_lasting = norm.isf((1 - of_scatter - FAR_RISK) * risk / count)
-    z_scattered = norm.isf(of_scatter * risk / (count * n)) if of_scatter else 0.0
-    return np.asarray(z_lasting * found.lasting + z_scattered * found.scattered)
+@dataclass(frozen=True)
+class ChanceConstraint:
+    """All limits of a path with the margins `found` at the `probability`: the equations of the module's text."""
 
+    found: Margins
+    probability: float
 
-def _near(found: Margins, probability: float) -> np.ndarray:
-    """(2, channels) which limited quantities count: the others break their limits with `FAR_RISK` of the risk in all."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(found.sd > 0, found.margin / found.sd, np.inf).min(axis=1)
-    return np.asarray(ratio < norm.isf(FAR_RISK * (1 - probability) / (ratio.size * found.margin.shape[1])))
+    @property
+    def _share(self) -> float:
+        return SCATTER_RISK if self.found.scattered.any() else 0.0
 
+    @property
+    def _allowed(self) -> float:
+        return (1 - self._share) * (1 - self.probability)
 
-def _short(found: Margins, reserve: np.ndarray) -> np.ndarray:
-    """(2, n, channels) what is missing of each reserve."""
-    return np.asarray(np.where(found.sd > 0, np.maximum(reserve - found.margin, 0.0), 0.0))
+    @cached_property
+    def _scatter(self) -> np.ndarray:
+        """(n, channels) z_s u_s."""
+        f = self.found
+        if not self._share:
+            return f.scattered
+        count = np.sum(np.isfinite(f.bounds)) * f.margin.shape[1]
+        return np.asarray(norm.isf(self._share * (1 - self.probability) / count) * f.scattered)
 
-
-def _probability(found: Margins) -> float | None:
-    """The largest at which the limits hold along the path; None below 0.5."""
-
-    def missing(digits: float) -> float:
-        reserve = reserves(found, 1 - 10.0**-digits)
+    @cached_property
+    def _beta(self) -> np.ndarray:
+        """(2, channels)."""
+        left = self.found.margin - self._scatter
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(found.sd > 0, (reserve - found.margin) / found.sd, -np.inf)
-        return float(ratio.max())
+            beta = np.where(self.found.lasting > 0, left / self.found.lasting, np.where(left < 0, -np.inf, np.inf))
+        # that a limit without uncertainty holds is left to the solver
+        return np.asarray(np.where(self.found.sd > 0, beta, np.inf).min(axis=1))
 
-    least = -np.log10(0.5)
-    return None if missing(least) > 0 else 1 - 10.0 ** -brentq(missing, least, 15.0, xtol=1e-3)
+    @cached_property
+    def _risk(self) -> float:
+        return float(norm.sf(self._beta).sum())
+
+    @property
+    def holds(self) -> bool:
+        """Whether they do."""
+        return self._risk <= self._allowed
+
+    @property
+    def possible(self) -> float:
+        """The probability with which they hold; zero or less where Boole's inequality gives none."""
+        return 1 - self._risk / (1 - self._share)
+
+    @cached_property
+    def quantile(self) -> float:
+        """z of the back-off."""
+        z = float(norm.isf(self._allowed))
+
+        def risk(raised: float) -> float:
+            return float(norm.sf(np.maximum(self._beta, raised)).sum() - self._allowed)
+
+        if self.holds or risk(z) <= 0:  # of a single limit that is short, but for rounding
+            return z
+        return float(brentq(risk, z, norm.isf(self._allowed / self._beta.size) + 1))
+
+    @property
+    def reserve(self) -> np.ndarray:
+        """(2, n, channels) the back-off of each limit [SI]."""
+        return np.asarray(self.quantile * self.found.lasting + self._scatter)
+
+    def left(self, z: float) -> np.ndarray:
+        """(2, n, channels) what is left of the margins beside the back-off with a quantile z."""
+        return np.asarray(self.found.margin - z * self.found.lasting - self._scatter)
 
 
 def _largest(judged: _Judged, reserve: np.ndarray) -> dict[str, tuple[float, float]]:
     """Limit -> what is reserved of its lower and upper bound [SI] where it is least safe."""
-    left = judged.found.margin - reserve
-    found, place = dict[str, tuple[float, float]](), 0
-    for limit in judged.path.limits:
-        own = slice(place, place + limit.expr.numel())
-        place = own.stop
-        at = [np.unravel_index(int(np.argmin(left[s, :, own])), left[s, :, own].shape) for s in (0, 1)]
-        found[limit.name] = (float(reserve[0, :, own][at[0]]), float(reserve[1, :, own][at[1]]))
+    left, found = judged.found.margin - reserve, dict[str, tuple[float, float]]()
+    for limit, own in judged.path.places:
+        below, above = (float(reserve[s, :, own].flat[int(np.argmin(left[s, :, own]))]) for s in (0, 1))
+        found[limit.name] = (0.0 if limit.lower is None else below, 0.0 if limit.upper is None else above)
     return found
 
 
-def _reserved(judged: _Judged, reserve: np.ndarray, model: Model, solution: Solution) -> dict[str, tuple[float, float]]:
+def _reserved(judged: _Judged, reserve: np.ndarray, model: Model) -> dict[str, tuple[float, float]]:
     """The same, but no bound is moved past what the path itself needs, which holds with its own reserve at every sample, or past where
     the device rests: there is nothing uncertain of a device at rest, and its controller starts there."""
-    largest, y, place = _largest(judged, reserve), judged.linear.nominal["limits"], 0
-    rest = dict(zip((limit.name for limit in model.limits), _at_rest(model), strict=True))
-    found = {}
-    for limit in judged.path.limits:
-        own = np.concatenate([y[:, place : place + limit.expr.numel()].ravel(), rest[limit.name]])
-        place += limit.expr.numel()
+    largest, y = _largest(judged, reserve), judged.linear.nominal["limits"]
+    rest, found = _at_rest(model), dict[str, tuple[float, float]]()
+    for limit, own in judged.path.places:
+        values = np.concatenate([y[:, own].ravel(), rest[limit.name]])
         below, above = largest[limit.name]
-        if limit.lower is not None:
-            below = min(below, max(float(own.min()) - limit.lower, 0.0))
-        if limit.upper is not None:
-            above = min(above, max(limit.upper - float(own.max()), 0.0))
-        found[limit.name] = (below if limit.lower is not None else 0.0, above if limit.upper is not None else 0.0)
+        room_below = np.inf if limit.lower is None else max(float(values.min()) - limit.lower, 0.0)
+        room_above = np.inf if limit.upper is None else max(limit.upper - float(values.max()), 0.0)
+        found[limit.name] = (min(below, room_below), min(above, room_above))
     return found
 
 
-def _at_rest(model: Model) -> list[np.ndarray]:
+def _at_rest(model: Model) -> dict[str, np.ndarray]:
     """The limited quantities of each limit at rest at home."""
     home = model.rest, np.zeros(len(model.axes)), np.clip(0.0, *model.u_bounds), model.p_nominal
-    values = model.evaluate_limits(*home)
-    return [np.asarray(v.full()).ravel() for v in (values if len(model.limits) > 1 else [values])]
+    values = model.evaluate_limits.call(list(home))
+    return {limit.name: v.full().ravel() for limit, v in zip(model.limits, values, strict=True)}
 
 
 def _of_least_error(model: Model, stated: Uncertainties, scenario: Scenario) -> Model:
@@ -315,10 +342,8 @@ def _of_least_error(model: Model, stated: Uncertainties, scenario: Scenario) -> 
     compliance at home, in typical sizes of the signal. So their sum of squares is least with the weights w_i / r_i^2 = sum_q sd_q^2
     |C dB_i/dq|^2. What all drives share acts on the forces, whichever of them make these.
     """
-    from ctrlgen.model.assembly import build_model
-
-    able = [p for line in stated.lines if line.kind == "number" for p in line.paths]
-    free = tuple(p for p in able if p in _moving(model))
+    able = set(movable(model.device))
+    free = tuple(p for line in stated.lines if line.kind == "number" for p in line.paths if p in able)
     symbolic = build_model(model.device, free)
     signal, n_u = symbolic.signals[scenario.file.follow], model.u.numel()
     B = ca.jacobian(symbolic.balance, symbolic.u)
@@ -347,18 +372,8 @@ def _of_least_error(model: Model, stated: Uncertainties, scenario: Scenario) -> 
     return replace(model, drive_weights=np.maximum(weights / weights.max(), LEAST_WEIGHT))
 
 
-def _moving(model: Model) -> frozenset[str]:
-    from ctrlgen.model.assembly import movable
-
-    return frozenset(movable(model.device))
-
-
-def samples_middle(command: np.ndarray) -> np.ndarray:
-    """(channels,) the middle of a path."""
-    return np.asarray((command.min(axis=0) + command.max(axis=0)) / 2)
-
-
-def _inverse_of(scenario: Scenario, model: Model):
+def _inverse_of(scenario: Scenario, model: Model) -> PathInverse | InertialInverse | LeastEffortInverse:
+    """The inverse of a model along the path."""
     if model.inertial:
         return motion_inverse(model, scenario.file.follow, scenario.sample_time or 0.0)
     return path_inverse(model, scenario.file.follow, scenario.sample_time)

@@ -107,6 +107,12 @@ class UncertainPath:
         """Each limited quantity: its limit and its place there."""
         return [(limit, i) for limit in self.limits for i in range(limit.expr.numel())]
 
+    @property
+    def places(self) -> list[tuple[Limit, slice]]:
+        """Each limit with the places of its limited quantities."""
+        ends = np.cumsum([limit.expr.numel() for limit in self.limits]).tolist()
+        return [(limit, slice(end - limit.expr.numel(), end)) for limit, end in zip(self.limits, ends, strict=True)]
+
     def _drives(self) -> tuple[np.ndarray, int]:
         """v (before + n, n_u), and how many of them stand before the path.
 
