@@ -130,7 +130,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
 
 def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
-    check_online(plant.model)
+    check_online(scenario, plant.model)
     controller = controller_of(plant.model, scenario.file.follow, plant.sample_time)
     m, core = controller.nominal, f"{scenario.device.name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
