@@ -163,7 +163,7 @@ def _with_online(scenario: Scenario | Path | str) -> Scenario:
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     with warnings.catch_warnings():  # solving says them
         warnings.simplefilter("ignore")
-        check_online(model_of(scenario))
+        check_online(scenario, model_of(scenario))
     return scenario
 
 

@@ -134,7 +134,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3, limited: Model | Non
 
 def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
-    check_online(model)
+    check_online(scenario, model)
     controller = controller_of(model, scenario.file.follow, sample_time)
     m, core = controller.nominal, f"{scenario.device.name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)

@@ -67,7 +67,7 @@ def generate(
     `figures` (name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives) are put beside the README.
     """
     check_tightened(scenario, model)
-    check_online(model)
+    check_online(scenario, model)
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     played = solution if scenario.sample_time else None
     command = scenario.command(model) if solution is None else solution.command

@@ -29,7 +29,7 @@ class Law:
     documented: Sequence[Callable[..., Any]] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
     """The physics of one device, symbolic; made by `build_model`."""
 
