@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import AxisSignal, BalancedPhysics, Device, Limit, Section, Signal
+from ctrlgen.numerics.second_order import second_order
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 
 Length = Annotated[Quantity, In("um", positive=True)]
@@ -281,7 +282,7 @@ class MemsHexapod(Device):
                 "restoring_force": (xy_stage.force, xy_stage.linear_force, xy_stage.nonlinear_force),
             },
             tangent_compliance=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
-            loop_closure=lambda pose, d: hexapod.loop_closure(pose, d, h),
+            second_order_kinematics=lambda d: second_order(lambda pose, d: hexapod.loop_closure(pose, d, h), d),
         )
 
 
