@@ -4,7 +4,7 @@ that this makes where they are held."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ctrlgen.devices.mechanism_elements import TWIST, Beam, Placed
+from ctrlgen.devices.mechanism_elements import TWIST, Placed
 from ctrlgen.devices.mechanism_model import Condensed
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND
@@ -139,20 +139,21 @@ class SecondOrder:
     @cached_property
     def quartic(self) -> Matrix:
         """(m, m): V_4 = products' [quartic] products: half the load on the deformations of second order, T_2 included, and the work of
-        the loads of first order where T_2 turns them; of a beam that stiffens the square of its axial load, Awtar's third coefficient."""
+        the loads of first order on what both orders together make; of uniform beams the square of their axial load."""
         m, n = len(self.pairs), self.n
         found = ca.SX(m, m)
         columns = [(i, j, p) for p in range(m) for i in range(n) for j in range(n)]
         a, b = [i for i, _, _ in columns], [n + p for _, _, p in columns]
         turned = ca.SX(1, len(columns))
-        for k, placed in enumerate(self.c.device.placed_elements):
+        for k in range(len(self.places)):
             e = self._motions(k, self.twists)
             E = e.own[:, n:] + e.deformation(self.I, self.J)
-            load = self._local(k, ca.mtimes(self.c.elements[k].stiffness, self._global(k, E)))
+            load = self._local(k, ca.mtimes(plain(self.c.elements[k].stiffness), self._global(k, E)))
             for p, deformed in enumerate(ca.horzsplit(E)):
                 found[:, p] += dot(load, ca.repmat(deformed, 1, m)).T / 2
-            turned += 2 * dot(e.load[:, a], e.deformation([j for _, j, _ in columns], b))
-            if isinstance(placed.section, Beam) and placed.section.geometric_stiffening and len(self.segments[k]) == 1:
+            strained = replace(e, own=ca.horzcat(e.own[:, :n], E), load=ca.horzcat(e.load[:, :n], load))
+            turned += 2 * dot(e.load[:, a], strained.deformation([j for _, j, _ in columns], b))
+            if len(self.segments[k]) == 1:
                 found += self._beam_column(self.segments[k][0], e)
         if self.c.pushes:
             moved = self._travel([j for _, j, _ in columns], b, self.twists)
