@@ -13,7 +13,9 @@ from ctrlgen.physics.mechanism import GROUND
 from plants.frame import Equilibrium, Frame, Node, Pose
 
 UM = 1e6
-WORLD = Rotation.from_rotvec([0.3, -0.4, 0.5]).as_matrix()  # the drawing is turned by it: a beam along an axis may be singular
+WORLD = Rotation.from_rotvec(
+    [0.3, -0.4, 0.5]
+).as_matrix()  # the drawing is turned by it: a beam along an axis may be singular
 
 
 def rigidity(section, p, m) -> list[tuple[float, tuple[float, float, float, float]]]:
@@ -50,7 +52,11 @@ class ExactMechanism:
             bodies = [frame.ground if b == GROUND else self.bodies[b] for b in (e.first, e.second)]
             if e.section.kind in ("matrix", "spring"):
                 K = dm(e.section.stiffness(c.compliances[k], own))  # (F, M) per (theta, delta), in its frame, in m
-                K = K[:, [3, 4, 5, 0, 1, 2]] * np.array([1 / UM] * 3 + [1.0] * 3) * np.array([1.0] * 3 + [UM] * 3)[:, None]
+                K = (
+                    K[:, [3, 4, 5, 0, 1, 2]]
+                    * np.array([1 / UM] * 3 + [1.0] * 3)
+                    * np.array([1.0] * 3 + [UM] * 3)[:, None]
+                )
                 both, home = np.kron(np.eye(2), WORLD.T @ R), Pose(end, WORLD)
                 base = frame.node(home)
                 (frame.hold if e.name in moved else lambda node, to=bodies[0]: frame.fix(to, node))(base)
@@ -62,10 +68,12 @@ class ExactMechanism:
             for length, stiffness in pieces:
                 start = frame.beam(start, length, stiffness, parts)[-1].end
             frame.fix(bodies[1], start)
-        for a, n in zip(device.placed_actuators, c.directions, strict=True):
+        for a in device.placed_actuators:
             if a.section.kind == "force":  # its direction stays, while the body turns
                 marker = frame._marker(self.bodies[a.second], Pose(WORLD @ dm(c.point(a)).ravel() * UM, WORLD))
-                frame._loads.append(frame._mbs.AddLoad(eii.Force(markerNumber=marker, loadVector=[0.0] * 3, bodyFixed=False)))
+                frame._loads.append(
+                    frame._mbs.AddLoad(eii.Force(markerNumber=marker, loadVector=[0.0] * 3, bodyFixed=False))
+                )
         self.directions = [WORLD @ dm(n).ravel() for n in c.directions]
         self.points = [dm(c.point(a)).ravel() for a in device.placed_actuators if a.section.kind == "force"]
         frame.assemble(tolerance=1e-3)  # N um: rounding in the stiff directions of a blade leaves 1e-4

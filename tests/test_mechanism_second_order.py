@@ -29,7 +29,9 @@ def skewed() -> str:
     right = blade("right", 10)
     other = right.replace('["10 mm", "0 mm", "0 mm"]', '["10 mm", "2 mm", "1 mm"]').replace("20 mm", "14 mm")
     other = other.replace("[0, 1, 0]", "[0.2, 1, 0.1]").replace("[-1, 0, 0]", "[-1, 0, 0.3]")
-    return PARALLELOGRAM.replace(right, other).replace(blade("left", -10), blade("left", -10).replace("[0, 1, 0]", "[-0.1, 1, 0.2]"))
+    return PARALLELOGRAM.replace(right, other).replace(
+        blade("left", -10), blade("left", -10).replace("[0, 1, 0]", "[-0.1, 1, 0.2]")
+    )
 
 
 class Expanded:
@@ -114,8 +116,8 @@ def struts(tmp_path_factory):
 
 
 def test_the_hexapod_as_a_mechanism_turns_its_struts_as_its_special_loop_closure_nearly_says(struts):
-    """Ideal pivots in the middle of the wires are near to the wires themselves: within 7 %, as the plant of exact beams shows in docs/loop.md
-    (a share of 0.95)."""
+    """Ideal pivots in the middle of the wires are near to the wires themselves: within 7 %, as the plant of exact beams shows in
+    docs/loop.md (a share of 0.95)."""
     h, d = load_device(DEVICE).values().hexapod, np.array([12, 3, 18, 7, 1, 15]) * 1e-6
     loop = ca.DM(second_order(lambda pose, x: hexapod.loop_closure(pose, x, h), ca.DM(d))).full().ravel()
     mine = Expanded(struts).pose(d)
@@ -149,12 +151,16 @@ def test_the_effect_of_finite_rotation_adds_what_the_file_states_always(tmp_path
     always = build_model(loaded(tmp_path, ALWAYS + text))
     added = build_model(loaded(tmp_path, text + SHARE))
     d = [90e-6, -50e-6, 20e-6]
-    poses = [ca.Function("p", [m.z], [m.signals["pose"].expr])(d).full() for m in (always, added, build_model(load_device(TRIPOD)))]
+    poses = [
+        ca.Function("p", [m.z], [m.signals["pose"].expr])(d).full()
+        for m in (always, added, build_model(load_device(TRIPOD)))
+    ]
     assert poses[0] == pytest.approx(poses[1], rel=1e-12)
     assert np.abs(poses[0] - poses[2]).max() > 1e-10
     assert set(always.force_parts) == {"linear", "geometric"}
 
 
+@pytest.mark.long
 def test_a_path_of_a_mechanism_of_second_order_is_solved_and_its_c_is_the_model(tmp_path):
     """The rotation of skewed blades is quadratic, and so is their force; drive and C follow both."""
     (tmp_path / "device.toml").write_text(ALWAYS + skewed().replace('channels = ["delta_x"]', 'channels = ["theta_z"]'))

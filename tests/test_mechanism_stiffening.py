@@ -32,8 +32,8 @@ def force_law(device) -> ca.Function:
 
 
 def guided(p: float) -> float:
-    """F l^3/(E I y) of a beam whose ends do not turn, with the axial load P = p E I/l^2: tension above zero, p < 0 softens it until it buckles
-    at -pi^2. Source: S. Timoshenko, J. M. Gere, Theory of Elastic Stability (1961), chapter 1."""
+    """F l^3/(E I y) of a beam whose ends do not turn, with the axial load P = p E I/l^2: tension above zero, p < 0 softens it until
+    it buckles at -pi^2. Source: S. Timoshenko, J. M. Gere, Theory of Elastic Stability (1961), chapter 1."""
     z = np.sqrt(complex(p))
     return float((p * z / (z - 2 * np.tanh(z / 2))).real)
 
@@ -45,7 +45,7 @@ def free(p: float) -> float:
 
 
 def stretched(y: float) -> float:
-    """Force on a clamped beam whose other end is guided and held lengthways: P l/EA = y^2 k'(p)/2l, k the `guided` stiffness, solved for p."""
+    """Force on a clamped beam whose other end is guided and held lengthways: P l/EA = y^2 k'(p)/2l, k the `guided` stiffness."""
     slope = lambda p: (guided(p + 1e-3) - guided(p - 1e-3)) / 2e-3  # noqa: E731
     p = brentq(lambda p: p * EI / (L * EA) - slope(p) * y**2 / (2 * L), 1e-2, 100, xtol=1e-12)
     return EI / L**3 * guided(p) * y
@@ -93,7 +93,8 @@ def column(wires: int) -> str:
     text = HEAD + SILICON + '[[body]]\nname = "stage"\n'
     for k in range(wires):
         text += (
-            f'[[element]]\nkind = "wire"\nname = "wire{k}"\nfrom = "ground"\nto = "stage"\nat = ["{20 * k - 10 * (wires - 1)} mm", "0 mm", "0 mm"]\n'
+            f'[[element]]\nkind = "wire"\nname = "wire{k}"\nfrom = "ground"\nto = "stage"\n'
+            f'at = ["{20 * k - 10 * (wires - 1)} mm", "0 mm", "0 mm"]\n'
             f'along = [0, 1, 0]\nacross = [1, 0, 0]\nlength = "20 mm"\ndiameter = "0.2 mm"\nmaterial = "silicon"\n{STIFFENS}'
         )
     at = f'["0 mm", "{-10 * (wires - 1)} mm", "0 mm"]'
@@ -105,10 +106,11 @@ def column(wires: int) -> str:
     return text + '[output]\nbody = "stage"\nat = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x", "delta_y"]\n'
 
 
-@pytest.mark.parametrize(("wires", "exact", "series"), [(1, free, (3, 1.2, -1 / 175)), (2, guided, (12, 1.2, -1 / 700))])
+@pytest.mark.parametrize(
+    ("wires", "exact", "series"), [(1, free, (3, 1.2, -1 / 175)), (2, guided, (12, 1.2, -1 / 700))]
+)
 def test_an_axial_load_stiffens_and_softens_as_a_beam_column(tmp_path, wires, exact, series):
-    """12 + 6 p/5 - p^2/700 of Awtar's beams, and of a free end 3 + 6 p/5 - p^2/175: within their third order of the beam-column. The stiffness
-    that pushes along is E A/l."""
+    """12 + 6 p/5 - p^2/700 of Awtar's beams, and of a free end 3 + 6 p/5 - p^2/175: within their third order of the beam-column."""
     bending, area = E * np.pi * 0.2e-3**4 / 64, E * np.pi * 0.2e-3**2 / 4
     device, d = loaded(tmp_path, column(wires)), ca.SX.sym("d", 2)
     K = ca.Function("K", [d], [ca.jacobian(force_law(device)(d), d)])
@@ -126,6 +128,7 @@ def test_force_and_pose_of_a_held_stage_come_from_one_energy(tmp_path):
     assert abs(K[0, 1]) > 0.1 * K[0, 0] and K[0, 1] == pytest.approx(K[1, 0], rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_held_stage_is_solved_and_its_c_is_the_model(tmp_path):
     """The drive at the end of a line is that of the cubic, at twice the linear force."""
     (tmp_path / "device.toml").write_text(held())
@@ -151,10 +154,12 @@ def test_a_thickness_may_be_free(tmp_path):
 
 
 def test_stiffening_beside_prescribed_displacements_is_refused(tmp_path):
-    text = held().replace('kind = "force"\non = "stage"\nat = ["0 mm", "0 mm", "0 mm"]', 'kind = "displacement"\non = "left"')
+    text = held().replace(
+        'kind = "force"\non = "stage"\nat = ["0 mm", "0 mm", "0 mm"]', 'kind = "displacement"\non = "left"'
+    )
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, text.replace('gain = "2 N/A"', 'gain = "2 um/A"'))
-    assert 'geometric_stiffening: of right has no effect where actuators prescribe displacements' in str(caught.value)
+    assert "geometric_stiffening: of right has no effect where actuators prescribe displacements" in str(caught.value)
 
 
 def test_the_energy_of_fourth_order_has_no_negative_stretching(tmp_path):

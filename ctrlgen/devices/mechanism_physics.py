@@ -43,6 +43,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     def pose(d: ca.SX) -> ca.SX:
         linear = ca.mtimes(J, c.loads(d))
         return linear + second.pose(d) if bent else linear
+
     common: dict[str, Any] = dict(
         axes=axes, components=channels, pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
         pose_scale=device.channel_scale, drive=acting.drive, state=acting.state, rest=acting.rest,
@@ -74,7 +75,6 @@ def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
         return None
     units = tuple("um" if r.section.about is None else "urad" for r in readings)
     names = tuple(r.name for r in readings)
-
 
     def at(d: ca.SX) -> ca.SX:
         linear = ca.mtimes(rows, c.loads(d))

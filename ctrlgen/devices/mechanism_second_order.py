@@ -54,7 +54,9 @@ class Motions:
         local = ca.vertcat(ca.mtimes(self.R.T, seen[:3, :]), ca.mtimes(self.R.T, seen[3:, :]))
         if self.shape is None:
             return local + point_flexure(self.own, a, b)
-        return local + ca.mtimes(self.shape, ca.vertcat(*(ca.repmat(self.load[x, a], 6, 1) * self.load[:, b] for x in range(6))))
+        return local + ca.mtimes(
+            self.shape, ca.vertcat(*(ca.repmat(self.load[x, a], 6, 1) * self.load[:, b] for x in range(6)))
+        )
 
 
 class SecondOrder:
@@ -75,16 +77,20 @@ class SecondOrder:
         self.I, self.J = [i for i, _ in self.pairs], [j for _, j in self.pairs]
         self.weight = ca.DM([1.0 if i == j else 2.0 for i, j in self.pairs])
         self.first_order = [plain(T[:, : self.n]) for T in c.twists]
+
+    @cached_property
+    def parts(self) -> list[tuple[Matrix, tuple[Segment, ...], Matrix | None]]:
+        """Of every element where it is looked at, its segments, and what its `beam` makes of products of its loads (6, 36)."""
+        c, found = self.c, []
         materials = {m.name: q for m, q in zip(c.device.material, c.p.material, strict=True)}
-        self.segments, self.places, self.shapes = [], [], []
         a, b = [x for x in range(6) for _ in range(6)], [y for _ in range(6) for y in range(6)]
         for k, e in enumerate(c.device.placed_elements):
             own = c.p.element[e.index]
-            found = e.section.segments(own, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
-            self.segments.append(found)
-            self.shapes.append(plain(ca.sparsify(ca.SX(beam(found, ca.DM.eye(6), a, b)))) if found else None)
-            back = 0.0 if found else e.section.pivot(own)
-            self.places.append(plain(c.ends[k] - back * c.frames[k][:, 0]))
+            segments = e.section.segments(own, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
+            back = 0.0 if segments else e.section.pivot(own)
+            shape = plain(ca.sparsify(ca.SX(beam(segments, ca.DM.eye(6), a, b)))) if segments else None
+            found.append((plain(c.ends[k] - back * c.frames[k][:, 0]), segments, shape))
+        return found
 
     def products(self, d: Matrix) -> Matrix:
         """(m,): d_i d_j, twice where i and j differ."""
@@ -129,8 +135,12 @@ class SecondOrder:
     @cached_property
     def cubic(self) -> Matrix:
         """(n, m): V_3 = d' [cubic] products, the work of the loads of first order on the deformations of second."""
-        found = -ca.mtimes(self.c.stiffness.T, self._travel(self.I, self.J)) if self.c.pushes else ca.SX(self.n, len(self.pairs))
-        for k in range(len(self.places)):
+        found = (
+            -ca.mtimes(self.c.stiffness.T, self._travel(self.I, self.J))
+            if self.c.pushes
+            else ca.SX(self.n, len(self.pairs))
+        )
+        for k in range(len(self.parts)):
             e = self._motions(k)
             for p, deformed in enumerate(ca.horzsplit(e.deformation(self.I, self.J))):
                 found[:, p] += dot(e.load, ca.repmat(deformed, 1, self.n)).T
@@ -145,7 +155,7 @@ class SecondOrder:
         columns = [(i, j, p) for p in range(m) for i in range(n) for j in range(n)]
         a, b = [i for i, _, _ in columns], [n + p for _, _, p in columns]
         turned = ca.SX(1, len(columns))
-        for k in range(len(self.places)):
+        for k in range(len(self.parts)):
             e = self._motions(k, self.twists)
             E = e.own[:, n:] + e.deformation(self.I, self.J)
             load = self._local(k, ca.mtimes(plain(self.c.elements[k].stiffness), self._global(k, E)))
@@ -153,8 +163,8 @@ class SecondOrder:
                 found[:, p] += dot(load, ca.repmat(deformed, 1, m)).T / 2
             strained = replace(e, own=ca.horzcat(e.own[:, :n], E), load=ca.horzcat(e.load[:, :n], load))
             turned += 2 * dot(e.load[:, a], strained.deformation([j for _, j, _ in columns], b))
-            if len(self.segments[k]) == 1:
-                found += self._beam_column(self.segments[k][0], e)
+            if len(segments := self.parts[k][1]) == 1:
+                found += self._beam_column(segments[0], e)
         if self.c.pushes:
             moved = self._travel([j for _, j, _ in columns], b, self.twists)
             turned -= 2 * ca.sum1(self.c.stiffness[:, a] * moved)
@@ -212,15 +222,15 @@ class SecondOrder:
         if added is not None:
             bodies = [ca.horzcat(T, T_2) for T, T_2 in zip(bodies, added, strict=True)]
             deformed = ca.horzcat(deformed, added[1] - added[0])
-        load = ca.mtimes(plain(e.stiffness), plain(deformed))
-        return Motions(c.frames[k], self.places[k], self.shapes[k], *bodies, self._local(k, plain(deformed)), self._local(k, load))
+        load, (place, _, shape) = ca.mtimes(plain(e.stiffness), plain(deformed)), self.parts[k]
+        return Motions(c.frames[k], place, shape, *bodies, self._local(k, plain(deformed)), self._local(k, load))
 
     def _local(self, k: int, twist: Matrix) -> Matrix:
         """A twist or wrench at the global origin as it is at element k, in its frame."""
-        return ca.mtimes(inverse_adjoint(self.c.frames[k], self.places[k]), twist)
+        return ca.mtimes(inverse_adjoint(self.c.frames[k], self.parts[k][0]), twist)
 
     def _global(self, k: int, twist: Matrix) -> Matrix:
-        return ca.mtimes(adjoint(self.c.frames[k], self.places[k]), twist)
+        return ca.mtimes(adjoint(self.c.frames[k], self.parts[k][0]), twist)
 
     def _seen(self, first: int, second: int, point: Matrix) -> Matrix:
         """(6, m): second order of the rotation of a body and the displacement of its point, seen from another one."""
