@@ -128,7 +128,8 @@ class DevicePhysics:
     `documented`: for a map, the functions whose docstrings state its equation and source; the generated C repeats them.
     `bipolar` says whether the drive has both signs. `rate_limits` are on the change of drives by time (`rate_limit`).
     `drive_weights` say how much each drive counts where there are more of them than axes, all the same where it is empty.
-    The readings are the pose, and behind it those of the `sensed` points.
+    The readings are the pose, and behind it those of the `sensed` points. `second_order_kinematics` (d) is what finite
+    rotations add to the pose of a mechanism whose `pose` is of first order, None where nothing states it.
     """
 
     axes: tuple[str, ...]
@@ -151,6 +152,7 @@ class DevicePhysics:
     bipolar: bool = True
     documented: Mapping[str, Sequence[Callable[..., Any]]] = field(default_factory=dict)
     sensed: SensedPoints | None = None
+    second_order_kinematics: Callable[[ca.SX], ca.SX] | None = None
 
     @property
     def readings(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
@@ -166,15 +168,13 @@ class BalancedPhysics(DevicePhysics):
     The states follow x' = rates(x, w), w = heating_power(u); `power` shows w where it is a heater's power, and is None
     where the device has no heaters. `force_unit` is that of the balance: a length where the drive commands the
     displacement itself.
-    `loop_closure` (pose, d) is zero (n_pose,) where the links of a mechanism whose `pose` is linear keep their lengths, to
-    second order; `tangent_compliance` (d) by how much less the stages yield to the links' load at d than at home.
+    `tangent_compliance` (d) is by how much less the stages yield to the links' load at d than at home.
     """
 
     force: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     rates: Callable[[ca.SX, ca.SX], ca.SX] = lambda x, heat: ca.SX(0, 1)
     heating_power: Callable[[ca.SX], ca.SX] = lambda u: u
     power: AxisSignal | None = None
-    loop_closure: Callable[[ca.SX, ca.SX], ca.SX] | None = None
     tangent_compliance: Callable[[ca.SX], ca.SX] | None = None
 
 

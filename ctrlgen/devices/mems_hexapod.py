@@ -22,6 +22,7 @@ from ctrlgen.devices.base import (
     Section,
     Signal,
 )
+from ctrlgen.numerics.second_order import second_order
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics.damping import modal_damping
 
@@ -319,7 +320,7 @@ class MemsHexapod(Device):
                 tangent_compliance=lambda d: (
                     xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d)
                 ),
-                loop_closure=lambda pose, d: hexapod.loop_closure(pose, d, h),
+                second_order_kinematics=lambda d: second_order(lambda pose, d: hexapod.loop_closure(pose, d, h), d),
             )
         M = hexapod.mass(h, p.dynamics, J)
         D = modal_damping(M, home_stiffness(lambda d: xy_stage.force(d, s, a)), p.dynamics.damping_ratio)
