@@ -113,7 +113,7 @@ class BalancedPath:
     """Equilibria along a smooth piece of a path, as splines in its share."""
 
     def __init__(self, law: BalancedLaw, share: np.ndarray, values: np.ndarray, closed: bool) -> None:
-        self.law, self.closed, self.ends = law, closed, (float(share[0]), float(share[-1]))
+        self.law, self.closed, self.share, self.ends = law, closed, share, (float(share[0]), float(share[-1]))
         if closed:
             values = np.vstack([values[:-1], values[:1]])
         self._spline = make_interp_spline(share, values, DEGREE, bc_type="periodic" if closed else None)
@@ -167,10 +167,17 @@ Law = BalancedLaw | InertialLaw
 
 
 def distances_at(law: Law, sides: list[Side]) -> ca.Function:
-    """(place, speed) -> (sides,) how far each limit is from its bound, in its unit; negative where it is broken."""
+    """(place, speed) -> (sides,) how far each limit is from its bound, in its unit, negative where it is broken; and the drives (n_u,)."""
     m = law.model
     place, speed = ca.SX.sym("place", law.place_size), ca.SX.sym("speed", law.order)
     x, z, u = law.at(place, speed)
     rows = [(-1 if s.upper else 1) * (s.limit.expr[s.channel] - s.bound) / s.unit for s in sides]
     values = ca.substitute(ca.vertcat(*rows), ca.vertcat(m.x, m.z, m.u, m.p), ca.vertcat(x, z, u, ca.DM(m.p_nominal)))
     return ca.Function("distances", [place, speed], [values, u], {"cse": True})
+
+
+def depends_on_speed(distances: ca.Function) -> list[bool]:
+    """Which of the distances change with the speed, whatever the place."""
+    pattern = distances.jac_sparsity(0, 1)
+    rows = set(pattern.row())
+    return [i in rows for i in range(distances.size1_out(0))]

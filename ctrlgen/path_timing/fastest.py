@@ -17,10 +17,11 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import Quantity, read_quantity, show
 from ctrlgen.model.model import Model
+from ctrlgen.path_timing.between import error_between
 from ctrlgen.path_timing.binding import Binding, bindings
 from ctrlgen.path_timing.confirmed import Followed, fewest
 from ctrlgen.path_timing.curve import Curve
-from ctrlgen.path_timing.optimum import Optimum, optimum_of
+from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.path_timing.repetition import Repetition, at_frequency
 from ctrlgen.trajectory.path_inverse import count_faults
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
@@ -36,7 +37,8 @@ class FastestPath:
 
     `optimum` in continuous time; `share` (N + 1,) of the path behind at each sample, of a closed one at its end too; `solution` of the
     set-points at the sample rate. `even` and `stated` [s]: the shortest times at even speed along the path and by the scenario's own
-    law of time, under held drives; None where there is none. `repetition` where a frequency was asked for. SI.
+    law of time, under held drives; None where there is none. `between` (channels,) [SI] is the largest distance from the curve between
+    set-points. `repetition` where a frequency was asked for. SI.
     """
 
     scenario: Scenario
@@ -46,6 +48,7 @@ class FastestPath:
     solution: Solution
     even: float | None
     stated: float | None
+    between: np.ndarray
     repetition: Repetition | None
     notes: tuple[str, ...]
 
@@ -98,9 +101,9 @@ def fastest(
     if not model.inertial:
         _check_held(scenario, model)
     followed = Followed.of(curve, model, rate)
-    plain = followed.inverse.without_memories.model
+    optimiser = Optimiser(followed.inverse.without_memories.model, scenario.file.follow, followed.sample_time)
     progress("fastest law of time")
-    optimum = optimum_of(plain, curve, followed.sample_time, progress)
+    optimum = optimiser.along(curve, progress)
     progress("set-points")
     share = _sampled(optimum, followed)
     progress("even speed")
@@ -112,8 +115,9 @@ def fastest(
     repetition = None
     if wanted is not None:
         progress(f"largest path at {wanted.text}")
-        repetition = at_frequency(followed, plain, wanted, optimum)
-    return FastestPath(scenario, curve, optimum, share, solution, even, stated, repetition, _notes(followed, share))
+        repetition = at_frequency(followed, optimiser, wanted, optimum)
+    between = error_between(curve, solution, share)
+    return FastestPath(scenario, curve, optimum, share, solution, even, stated, between, repetition, _notes(followed, share))
 
 
 def _rate(scenario: Scenario, given: str | None) -> Quantity:

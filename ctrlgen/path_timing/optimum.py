@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import factorial
+from functools import partial
 
 import numpy as np
 
@@ -12,16 +12,16 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.devices.base import Limit
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.curve import Curve
-from ctrlgen.path_timing.drive_law import BalancedLaw, BalancedPath, InertialLaw, Side, distances_at, sides_of
+from ctrlgen.path_timing.drive_law import BalancedLaw, BalancedPath, InertialLaw, Law, Side, depends_on_speed, distances_at, sides_of
 from ctrlgen.path_timing.programme import RateBound, SpeedProgramme
-from ctrlgen.path_timing.speed_bound import landed, largest_speeds, largest_steps
+from ctrlgen.path_timing.speed_bound import landed, largest_speeds, largest_steps, steps_in_time
 from ctrlgen.path_timing.timing_law import TimingLaw
 from ctrlgen.trajectory.path_inverse import PathInverse
 from ctrlgen.trajectory.paths import smooth_step
 
 NODES = 1200  # of all pieces together, at which the speed is bounded
 FEWEST_NODES = 60  # of a piece
-SWING = 6  # samples that a drive with inertia takes at least for its whole range: what the next samples can still show
+SWING = 4  # samples that a drive with inertia takes at least for its whole range: what the next samples can still show
 BEGIN_NODES = 200  # of the law with which IPOPT begins
 SLOWER = 1.5  # times the duration, again and again, until a law keeps all limits
 TRIES = 60
@@ -30,17 +30,26 @@ PACE_SAMPLES = 64  # of the duration with which that begins
 
 @dataclass(frozen=True)
 class Piece:
-    """The fastest law of a piece: `time` (n,) [s], `share`, `speed` [1/s], the `distances` (n, sides) of the limits in their units, and
-    of the rates of drives after each node. `places` (N + 1,) are those of the samples, where a sample's longest step decides them;
+    """The fastest law of a piece: `time` (n,) [s], `share`, `speed` [1/s], and the `distances` (n, sides) of the limits in their units,
+    of the rates of drives after each node. `steps` (n,) are the longest of a sample from each of the shares, where these decide;
     else `law` is to be sampled. `bound` (n,) the largest speed at each place alone, where that is known."""
 
     time: np.ndarray
     share: np.ndarray
     speed: np.ndarray
     distances: np.ndarray
-    places: np.ndarray | None
+    steps: np.ndarray | None
     law: TimingLaw | None
     bound: np.ndarray | None
+
+    def sampled(self, sample_time: float, more: int) -> np.ndarray:
+        """The shares of the samples, both ends among them, `more` than needed."""
+        if self.steps is not None:
+            return landed(self.share, self.steps, more)
+        assert self.law is not None
+        n = int(np.ceil(self.law.duration / sample_time * (1 - 1e-9))) + more
+        share = self.law.at(np.linspace(0, self.law.duration, n + 1))
+        return np.concatenate([self.share[:1], share[1:-1], self.share[-1:]])
 
 
 @dataclass(frozen=True)
@@ -59,101 +68,91 @@ class Optimum:
         """The shares of the samples, `more` of them than needed at least spread over the pieces in proportion."""
         found = [np.zeros(1)]
         for piece in self.pieces:
-            if piece.places is not None and not more:
-                found.append(piece.places[1:])
-                continue
-            own = piece.time[-1] / self.duration * more
-            if piece.places is not None:
-                n = len(piece.places) - 1
-                at = np.linspace(0, n, n + int(np.ceil(own)) + 1)
-                found.append(np.interp(at, np.arange(n + 1), piece.places)[1:])
-                continue
-            assert piece.law is not None
-            n = int(np.ceil(piece.law.duration / sample_time * (1 - 1e-9)) + np.ceil(own))
-            share = piece.law.at(np.linspace(0, piece.law.duration, n + 1))
-            found.append(np.append(share[1:-1], piece.share[-1]))
+            own = int(np.ceil(piece.time[-1] / self.duration * more))
+            found.append(piece.sampled(sample_time, own)[1:])
         return np.concatenate(found)
 
 
-def optimum_of(
-    model: Model, curve: Curve, sample_time: float, progress: Callable[[str], None] = lambda _: None, sampled: bool = True
-) -> Optimum:
-    """The fastest law along `curve`; without memories of effects. Raises SolverError where none is found, and InputError for a device
-    of which nothing bounds the speed. Where not `sampled`, the samples' places are left out."""
-    follow = curve.scenario.file.follow
-    if model.inertial:
-        return _programmed(model, InertialLaw(model, follow), curve, sample_time, progress)
-    inverse = PathInverse(model, follow, sample_time)
-    law = BalancedLaw(model, follow, inverse)
-    if model.rate_limits:
-        return _programmed(model, law, curve, sample_time, progress)
-    sides = sides_of(model.limits, model)
-    assert inverse.moving is not None
-    pieces = []
-    for a, b in curve.pieces:
-        share = _nodes(a, b, len(curve.pieces))
-        path = law.along(curve.derivatives(share, 0, (a, b))[0], share, curve.closed)
-        typical = 1 / (PACE_SAMPLES * sample_time)
-        speeds = largest_speeds(law, path, share, sides, typical)
+class Optimiser:
+    """Finds the fastest laws of a `model` without memories along curves of its signal `follow`, sampled every `sample_time` [s].
+
+    Raises InputError for a device of which nothing bounds the speed.
+    """
+
+    def __init__(self, model: Model, follow: str, sample_time: float) -> None:
+        self.model, self.sample_time = model, sample_time
+        self.inverse = None if model.inertial else PathInverse(model, follow, sample_time)
+        self.law: Law = InertialLaw(model, follow) if self.inverse is None else BalancedLaw(model, follow, self.inverse)
+        self.sides = sides_of(model.limits, model)
+        self.distances = distances_at(self.law, self.sides)
+        by_speed = [s for s, own in zip(self.sides, depends_on_speed(self.distances), strict=True) if own]
+        self.speed_distances = distances_at(self.law, by_speed)
+
+    @property
+    def by_place(self) -> bool:
+        """Whether each place alone bounds the speed."""
+        return not self.model.inertial and not self.model.rate_limits
+
+    def along(self, curve: Curve, progress: Callable[[str], None] = lambda _: None, sampled: bool = True) -> Optimum:
+        """The fastest law along `curve`. Raises SolverError where none is found. Where not `sampled`, the samples' places are left out."""
+        if not self.by_place:
+            return self._programmed(curve, progress)
+        pieces = tuple(self._bounded(curve, ends, sampled) for ends in curve.pieces)
+        return Optimum(pieces, tuple(self.sides))
+
+    def _path(self, curve: Curve, ends: tuple[float, float]) -> BalancedPath | None:
+        """The equilibria along a piece; None with inertia."""
+        if not isinstance(self.law, BalancedLaw):
+            return None
+        share = np.linspace(*ends, max(NODES // len(curve.pieces), FEWEST_NODES) + 1)
+        return self.law.along(curve.derivatives(share, 0, ends)[0], share, curve.closed)
+
+    def _bounded(self, curve: Curve, ends: tuple[float, float], sampled: bool) -> Piece:
+        """By the largest speed at each place."""
+        path, law, inverse = self._path(curve, ends), self.law, self.inverse
+        assert path is not None and isinstance(law, BalancedLaw) and inverse is not None and inverse.moving is not None
+        share = path.share
+        speeds = largest_speeds(self.distances, self.speed_distances, path, share, 1 / (PACE_SAMPLES * self.sample_time))
         if not speeds.all():
-            raise SolverError(
-                f"at {100 * share[int(np.argmin(speeds))]:.3g} % of the path no speed keeps the limits; make the path smaller, or shift it"
-            )
-        time = np.concatenate([[0.0], np.cumsum(_times(share, speeds))])
+            at = 100 * share[int(np.argmin(speeds))]
+            raise SolverError(f"at {at:.3g} % of the path no speed keeps the limits; make the path smaller, or shift it")
+        slowness = 1 / speeds
+        time = np.concatenate([[0.0], np.cumsum(np.diff(share) * (slowness[1:] + slowness[:-1]) / 2)])
         speed = np.where(np.isfinite(speeds), speeds, np.max(speeds[np.isfinite(speeds)], initial=0.0))
-        distances = distances_at(law, sides).map(len(share))(path.places(share).T, speed[None])[0].full().T
-        places = None
+        distances = self.distances.map(len(share))(path.places(share).T, speed[None])[0].full().T
+        steps = None
         if sampled:
-            steps = largest_steps(path, share, speeds, sample_time, inverse.moving.drive)
-            places = landed(lambda at, s=share, d=steps: float(np.interp(at, s, d)), (a, b))
-        pieces.append(Piece(time, share, speeds, distances, places, None, speeds))
-    return Optimum(tuple(pieces), tuple(sides))
+            steps = np.minimum(
+                largest_steps(path, share, speeds, self.sample_time, inverse.moving.drive),
+                steps_in_time(share, time, speed, self.sample_time, curve.closed),
+            )
+        return Piece(time, share, speeds, distances, steps, None, speeds)
 
+    def _programmed(self, curve: Curve, progress: Callable[[str], None]) -> Optimum:
+        """By IPOPT, piece by piece; an open piece from rest to rest."""
+        rates, rate_sides = _rates(self.model, self.sample_time)
+        pieces = []
+        for ends in curve.pieces:
+            path = self._path(curve, ends)
+            places = partial(self._places, curve, ends) if path is None else path.places
+            programme = SpeedProgramme(self.law, places, ends, curve.closed, self.distances, rates)
+            found = programme.fastest(_begin(programme, PACE_SAMPLES * self.sample_time), progress)
+            distances, u = (
+                v.full().T for v in self.distances.map(len(found.share))(places(found.share).T, found.derivatives.T)
+            )
+            changes = np.diff(u, axis=0) / np.diff(found.time)[:, None]
+            changes = np.vstack([changes, changes[:1] if curve.closed else changes[-1:]])
+            near = [(-1 if s.upper else 1) * (changes[:, i] - s.bound) / s.unit for i, s in rate_sides]
+            bound = None
+            if path is not None and self.model.n_states:
+                bound = largest_speeds(self.distances, self.speed_distances, path, found.share, 1 / found.duration)
+            table = np.column_stack([distances, *near])
+            pieces.append(Piece(found.time, found.share, found.derivatives[:, 0], table, None, found, bound))
+        return Optimum(tuple(pieces), (*self.sides, *(s for _, s in rate_sides)))
 
-def _nodes(a: float, b: float, pieces: int) -> np.ndarray:
-    return np.linspace(a, b, max(NODES // pieces, FEWEST_NODES) + 1)
-
-
-def _times(share: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """(n - 1,) the time between places by the trapezoidal rule of the slowness."""
-    slowness = 1 / speeds
-    return np.diff(share) * (slowness[1:] + slowness[:-1]) / 2
-
-
-def _programmed(
-    model: Model, law: BalancedLaw | InertialLaw, curve: Curve, sample_time: float, progress: Callable[[str], None]
-) -> Optimum:
-    """By IPOPT, piece by piece; an open piece from rest to rest."""
-    sides = sides_of(model.limits, model)
-    rates, rate_sides = _rates(model, sample_time)
-    pieces = []
-    for a, b in curve.pieces:
-        path: BalancedPath | None = None
-        if isinstance(law, BalancedLaw):
-            share = _nodes(a, b, len(curve.pieces))
-            path = law.along(curve.derivatives(share, 0, (a, b))[0], share, curve.closed)
-
-        def places(at: np.ndarray, ends: tuple[float, float] = (a, b), path: BalancedPath | None = path) -> np.ndarray:
-            if path is not None:
-                return path.places(at)
-            tables = curve.derivatives(at, law.order, ends)
-            return np.hstack(list(tables))
-
-        programme = SpeedProgramme(law, places, (a, b), curve.closed, sides, rates)
-        begin = _begin(programme, curve.closed, (a, b), PACE_SAMPLES * sample_time)
-        found = programme.fastest(begin, progress)
-        distances, u = (v.full().T for v in programme.distances.map(len(found.share))(places(found.share).T, found.derivatives.T))
-        changes = np.diff(u, axis=0) / np.diff(found.time)[:, None]
-        changes = np.vstack([changes, changes[:1] if curve.closed else changes[-1:]])
-        near = [
-            ((s.bound - changes[:, i]) if s.upper else (changes[:, i] - s.bound)) / s.unit for i, s in rate_sides
-        ]  # fmt: skip
-        bound = None
-        if path is not None and model.n_states:
-            bound = largest_speeds(law, path, found.share, sides, 1 / found.duration)  # type: ignore[arg-type]
-        distances = np.column_stack([distances, *near])
-        pieces.append(Piece(found.time, found.share, found.derivatives[:, 0], distances, None, found, bound))
-    return Optimum(tuple(pieces), (*sides, *(s for _, s in rate_sides)))
+    def _places(self, curve: Curve, ends: tuple[float, float], share: np.ndarray) -> np.ndarray:
+        """(n, place_size) the target with its derivatives by the share."""
+        return np.hstack(list(curve.derivatives(share, self.law.order, ends)))
 
 
 def _rates(model: Model, sample_time: float) -> tuple[RateBound, list[tuple[int, Side]]]:
@@ -180,9 +179,9 @@ def _rates(model: Model, sample_time: float) -> tuple[RateBound, list[tuple[int,
     return RateBound(low, high), sides
 
 
-def _begin(programme: SpeedProgramme, closed: bool, ends: tuple[float, float], duration: float) -> TimingLaw:
+def _begin(programme: SpeedProgramme, duration: float) -> TimingLaw:
     """A law that keeps all limits: even speed, or from rest to rest by a polynomial, as slowly as that takes. Raises SolverError."""
-    order = programme.law.order
+    order, closed, ends = programme.law.order, programme.closed, programme.ends
     t = np.linspace(0, 1, BEGIN_NODES)
     if closed:
         tables = np.stack([t, np.ones_like(t), *[np.zeros_like(t)] * (order - 1)])

@@ -28,7 +28,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import SolverError
-from ctrlgen.path_timing.drive_law import Law, Side, distances_at
+from ctrlgen.path_timing.drive_law import Law
 from ctrlgen.path_timing.timing_law import TimingLaw
 
 INTERVALS = ((24, 1e-4), (72, 1e-6), (216, 1e-8))  # of the path, and the weight of the smoothing term in each pass
@@ -47,14 +47,15 @@ class RateBound:
 
 class SpeedProgramme:
     """The programme of a smooth piece of a path. `places` (shares) -> (n, place_size) what the law needs there; `closed`: periodic,
-    otherwise from rest to rest."""
+    otherwise from rest to
+    rest; `distances` (place, speed) -> how far each limit is from its bound, and the drives."""
 
     def __init__(
-        self, law: Law, places: Callable[[np.ndarray], np.ndarray], ends: tuple[float, float], closed: bool, sides: list[Side],
-        rates: RateBound,
+        self, law: Law, places: Callable[[np.ndarray], np.ndarray], ends: tuple[float, float], closed: bool,
+        distances: ca.Function, rates: RateBound,
     ) -> None:  # fmt: skip
-        self.law, self.places, self.ends, self.closed, self.sides, self.rates = law, places, ends, closed, sides, rates
-        self.distances = distances_at(law, sides)
+        self.law, self.places, self.ends, self.closed, self.rates = law, places, ends, closed, rates
+        self.distances = distances
 
     def fastest(self, begin: TimingLaw, progress: Callable[[str], None] = lambda _: None) -> TimingLaw:
         """The fastest law, begun at one that keeps the limits. Raises SolverError where IPOPT finds none."""

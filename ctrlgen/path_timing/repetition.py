@@ -9,9 +9,8 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import Quantity, from_si, written_unit
-from ctrlgen.model.model import Model
 from ctrlgen.path_timing.confirmed import Followed
-from ctrlgen.path_timing.optimum import Optimum, optimum_of
+from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.trajectory.paths import Circle
 
 SMALLEST = 1e-3  # of the path: below, it is no longer the same
@@ -36,8 +35,8 @@ class Repetition:
         return float(from_si((self.diameter or 0.0) * scale, self.unit))
 
 
-def at_frequency(followed: Followed, plain: Model, frequency: Quantity, known: Optimum) -> Repetition:
-    """The largest scales at a `frequency`; `plain` is the device without memories. Raises InputError for one that samples cannot show."""
+def at_frequency(followed: Followed, optimiser: Optimiser, frequency: Quantity, known: Optimum) -> Repetition:
+    """The largest scales at a `frequency`. Raises InputError for one that samples cannot show."""
     period, h = 1 / frequency.si, followed.sample_time
     if period < FEWEST * h:
         what = f"leaves {period / h:.3g} samples for a period at {followed.rate.text}; give a higher --sample-rate or a lower frequency"
@@ -46,7 +45,7 @@ def at_frequency(followed: Followed, plain: Model, frequency: Quantity, known: O
 
     def by_best_law(scale: float) -> bool:
         try:
-            return optimum_of(plain, followed.curve.scaled(scale), h, sampled=False).duration <= period
+            return optimiser.along(followed.curve.scaled(scale), sampled=False).duration <= period
         except SolverError:
             return False
 
@@ -57,7 +56,7 @@ def at_frequency(followed: Followed, plain: Model, frequency: Quantity, known: O
 
     begin = 1.0 if known.duration <= period else None
     best = _largest(by_best_law, begin)
-    even = None if plain.inertial and not followed.curve.closed else _largest(at_even_speed, None)
+    even = None if followed.model.inertial and not followed.curve.closed else _largest(at_even_speed, None)
     path = followed.curve.scenario.file.path
     diameter = path.diameter if isinstance(path, Circle) else None
     unit = written_unit(diameter.text) if diameter else ""

@@ -13,39 +13,41 @@ further on the further on one is, the largest step is the best one. Source: Bobr
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import casadi as ca
 import numpy as np
 
-from ctrlgen.path_timing.drive_law import BalancedLaw, BalancedPath, Side, distances_at
+from ctrlgen.path_timing.drive_law import BalancedPath
+from ctrlgen.trajectory.scenario import MOST_SAMPLES
 from ctrlgen.trajectory.violations import NEGLIGIBLE, limited_values
 
-DOUBLINGS = 60  # of a speed, from a billionth of what is typical, beyond which nothing bounds it
+GROWING = 16.0  # by which a speed is enlarged until it breaks a limit
+GROWN = 15  # times, from a billionth of what is typical, beyond which nothing bounds it
 HALVINGS = 46  # to rounding
 SLOWEST = 1e-9  # of the typical speed: a path that is followed no faster cannot be followed
 GROWTH = 1.05  # of a step, by which the first that breaks a limit is looked for
 FIRST_STEP = 0.2  # of the step that the continuous speed makes
 
 
-def largest_speeds(law: BalancedLaw, path: BalancedPath, share: np.ndarray, sides: list[Side], typical: float) -> np.ndarray:
-    """(n,) the largest speed s' [1/s] at each of the shares, infinite where nothing changes; zero where none keeps the limits."""
+def largest_speeds(
+    distances: ca.Function, by_speed: ca.Function, path: BalancedPath, share: np.ndarray, typical: float
+) -> np.ndarray:
+    """(n,) the largest speed s' [1/s] at each of the shares, infinite where nothing changes; zero where none keeps the limits.
+    `distances` (place, speed) of all limits, `by_speed` of those that change with it; `typical` a speed to begin with."""
     places = path.places(share)
-    distances = distances_at(law, sides).map(len(share))
 
-    def kept(speed: np.ndarray) -> np.ndarray:
-        found = distances(places.T, speed[None])[0].full()
+    def kept(speed: np.ndarray, of: ca.Function = by_speed) -> np.ndarray:
+        found = of.map(len(share))(places.T, speed[None])[0].full()
         return np.all(np.where(np.isfinite(found), found, -1.0) >= -NEGLIGIBLE, axis=0)
 
     low = np.full(len(share), SLOWEST * typical)
-    low[~kept(low)] = 0.0
-    high = np.maximum(low, SLOWEST * typical) * 2
-    for _ in range(DOUBLINGS):
+    low[~kept(low, distances)] = 0.0
+    high = np.maximum(low, SLOWEST * typical) * GROWING
+    for _ in range(GROWN):
         grows = (low > 0) & kept(high)
         if not grows.any():
             break
         low = np.where(grows, high, low)
-        high = np.where(grows, 2 * high, high)
+        high = np.where(grows, GROWING * high, high)
     free = (low > 0) & kept(high)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -93,24 +95,30 @@ def largest_steps(
     return np.where(reaches, np.maximum(left, np.append(0.0, low[~reaches])[-1]), low) if reaches.any() else low
 
 
-def landed(step: Callable[[float], float], ends: tuple[float, float]) -> np.ndarray:
-    """The places (N + 1,) from the first to the last end in as few samples as the largest `step` (place) allows, all of them shortened
-    by one factor so that the last one ends there."""
+def steps_in_time(share: np.ndarray, time: np.ndarray, speed: np.ndarray, sample_time: float, closed: bool) -> np.ndarray:
+    """(n,) by how much of a piece the continuous law leads in one sample from each of the shares; beyond an open end at its speed."""
+    then = time + sample_time
+    beyond = np.maximum(then - time[-1], 0.0)
+    if closed:
+        turns = np.floor(then / time[-1])
+        return np.interp(then - turns * time[-1], time, share) + turns * (share[-1] - share[0]) - share
+    return np.interp(then, time, share) + beyond * speed[-1] - share
+
+
+def landed(share: np.ndarray, steps: np.ndarray, more: int = 0) -> np.ndarray:
+    """The places (N + 1,) from the first to the last share in as few samples as the largest `steps` (n,) from there allow, and in some
+    `more`: all steps are shortened by one factor so that the last one ends there."""
+
     def walk(factor: float, most: int) -> np.ndarray:
-        places = [ends[0]]
-        while places[-1] < ends[1] and len(places) <= most:
-            places.append(places[-1] + factor * step(places[-1]))
+        places = [float(share[0])]
+        while places[-1] < share[-1] and len(places) <= most:
+            places.append(places[-1] + factor * float(np.interp(places[-1], share, steps)))
         return np.array(places)
 
-    most = 2_000_000
-    full = walk(1.0, most)
-    count = len(full) - 1
+    count = len(walk(1.0, MOST_SAMPLES)) - 1 + more
     low, high = 0.0, 1.0  # the factor: too small, enough
-    for _ in range(50):
+    for _ in range(HALVINGS):
         middle = (low + high) / 2
-        reached = walk(middle, count)
-        enough = len(reached) == count + 1 and reached[-1] >= ends[1] or len(reached) < count + 1
-        low, high = (low, middle) if enough else (middle, high)
-    places = walk(high, count)[: count + 1]
-    places[-1] = ends[1]
-    return places
+        low, high = (low, middle) if walk(middle, count)[-1] >= share[-1] else (middle, high)
+    places = walk(high, count)
+    return np.append(places[: count], share[-1]) if len(places) == count + 1 else np.append(places[:-1], share[-1])
