@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ctrlgen.model.model import Model
     from ctrlgen.model.simulation import Trace, simulate
     from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
+    from ctrlgen.path_timing.fastest import FastestPath, fastest
     from ctrlgen.recordings.reader import load_recordings
     from ctrlgen.recordings.recording import Record, Recording
     from ctrlgen.reporting.build_record import Build
@@ -85,6 +86,10 @@ _EXPORTS = {
         "SensorReadings",
         "simulate_sensors",
     ),
+    "path_timing.fastest": (
+        "FastestPath",
+        "fastest",
+    ),
     "recordings.reader": ("load_recordings",),
     "recordings.recording": (
         "Record",
@@ -128,6 +133,7 @@ __all__ = [
     "Diagnosis",
     "ErrorBudget",
     "Estimate",
+    "FastestPath",
     "Fault",
     "Finding",
     "Infeasibility",
@@ -150,6 +156,7 @@ __all__ = [
     "compare",
     "diagnose",
     "error_budget",
+    "fastest",
     "generate",
     "load_batch",
     "load_device",

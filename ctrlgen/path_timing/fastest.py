@@ -63,10 +63,12 @@ class FastestPath:
         return (len(self.share) - 1) * self.sample_time
 
     @property
-    def given(self) -> float:
-        """[s] as the scenario states it."""
-        n, h = self.scenario.file, self.scenario.sample_time or 0.0
-        return (n.duration.si if n.duration else 0.0) - (0.0 if self.curve.closed else h)
+    def given(self) -> float | None:
+        """[s] as the scenario states it, from its first sample to its last, or one period; None where it states none."""
+        file = self.scenario.file
+        if file.duration is None or file.sample_rate is None:
+            return None
+        return file.duration.si - (0.0 if self.curve.closed else 1 / file.sample_rate.si)
 
     @cached_property
     def bindings(self) -> tuple[Binding, ...]:

@@ -64,6 +64,16 @@ class Optimum:
         """[s]"""
         return sum(float(p.time[-1]) for p in self.pieces)
 
+    def law(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Time [s], share, speed and the bound of each place [1/s] at the nodes of all pieces; not finite where there is no bound."""
+        starts = np.cumsum([0.0, *(p.time[-1] for p in self.pieces[:-1])])
+        rows = [
+            (p.time + t, p.share, p.speed, np.full(len(p.time), np.nan) if p.bound is None else p.bound)
+            for p, t in zip(self.pieces, starts, strict=True)
+        ]
+        time, share, speed, bound = (np.concatenate(column) for column in zip(*rows, strict=True))
+        return time, share, speed, bound
+
     def samples(self, sample_time: float, more: int = 0) -> np.ndarray:
         """The shares of the samples, `more` of them than needed at least spread over the pieces in proportion."""
         found = [np.zeros(1)]

@@ -30,9 +30,9 @@ class Repetition:
     diameter: float | None
     unit: str
 
-    def size(self, scale: float) -> float:
-        """The diameter in its unit at a scale."""
-        return float(from_si((self.diameter or 0.0) * scale, self.unit))
+    def size(self, scale: float | None) -> float | None:
+        """The diameter in its unit at a scale; None where there is none."""
+        return None if scale is None or self.diameter is None else float(from_si(self.diameter * scale, self.unit))
 
 
 def at_frequency(followed: Followed, optimiser: Optimiser, frequency: Quantity, known: Optimum) -> Repetition:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,11 +39,3 @@ class TimingLaw:
         dense = np.interp(np.linspace(0, len(self.time) - 1, n), np.arange(len(self.time)), self.time)
         return np.interp(share, np.maximum.accumulate(self.at(dense)), dense)
 
-
-def joined(laws: Sequence[TimingLaw]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time, share and speed of laws that follow one another."""
-    start, parts = 0.0, []
-    for law in laws:
-        parts.append((law.time - law.time[0] + start, law.share, law.derivatives[:, 0]))
-        start = parts[-1][0][-1]
-    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))  # type: ignore[return-value]
