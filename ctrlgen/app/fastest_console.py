@@ -25,9 +25,17 @@ def print_fastest(found: FastestPath) -> None:
     for k, row in enumerate(motions(found)):
         table.add_row(*row, style="bold" if k == 3 else None)
     show_table(table)
-    table = table_of(("limit that binds", "left"), ("at", "left"), ("bound", "right"), ("of the time", "right"), ("along the path", "left"))
+    table = table_of(
+        ("limit that binds", "left"),
+        ("at", "left"),
+        ("bound", "right"),
+        ("of the time", "right"),
+        ("along the path", "left"),
+    )
     for b in found.bindings[:SHOWN]:
-        table.add_row(escape(b.side.limit.label), b.side.name, bound_text(b), f"{100 * b.share_of_time:.1f} %", runs_text(b))
+        table.add_row(
+            escape(b.side.limit.label), b.side.name, bound_text(b), f"{100 * b.share_of_time:.1f} %", runs_text(b)
+        )
     if found.bindings:
         show_table(table)
     if len(found.bindings) > SHOWN:

@@ -27,6 +27,7 @@ def error_between(curve: Curve, solution: Solution, share: np.ndarray) -> np.nda
     for k in range(1, LOOKED_AT_BETWEEN):
         after = one_step_map(model, k / LOOKED_AT_BETWEEN * h)
         reached = ca.substitute(signal.expr, ca.vertcat(model.x, model.z), ca.vertcat(after.x, after.z))
+        reached = ca.substitute(reached, after.u_next, model.u)  # where it acts without delay: the drive that is held
         function = ca.Function("between", [model.x, model.z, model.u, model.p], [reached])
         at = function.map(n)(x, z, u, p).full().T / scale
         off = at[:, None] - points[:, :-1]

@@ -74,7 +74,7 @@ class Curve:
         step = length[-1] / intervals
         found = [np.zeros(1)]
         for a, b in self.pieces:
-            ends = np.interp([a, b], share, length)
-            n = max(1, int(np.ceil((ends[1] - ends[0]) / step * (1 - 1e-9))))
-            found.append(np.append(np.interp(np.linspace(*ends, n + 1)[1:-1], length, share), b))
+            first, last = (float(np.interp(end, share, length)) for end in (a, b))
+            n = max(1, int(np.ceil((last - first) / step * (1 - 1e-9))))
+            found.append(np.append(np.interp(np.linspace(first, last, n + 1)[1:-1], length, share), b))
         return np.concatenate(found)

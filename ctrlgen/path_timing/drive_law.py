@@ -143,7 +143,9 @@ class InertialLaw:
     def at(self, place: ca.SX, speed: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
         """x, z, u at a `place` (the target and its derivatives by s) under the derivatives `speed` (order,) of s by time, symbolic."""
         by_share = ca.reshape(place, self._channels, self.order + 1)
-        target = ca.horzcat(by_share[:, 0], *(ca.mtimes(by_share[:, 1 : k + 1], _bell(k, speed)) for k in range(1, self.order + 1)))
+        target = ca.horzcat(
+            by_share[:, 0], *(ca.mtimes(by_share[:, 1 : k + 1], _bell(k, speed)) for k in range(1, self.order + 1))
+        )
         x, z, u = self.dynamics.kernel(target)
         return x, z, u
 

@@ -27,7 +27,8 @@ from ctrlgen.trajectory.path_inverse import count_faults
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, check_feasibility, solve
 
-COARSE = 16  # samples of a path, below which its set-points are few
+FEWEST = 8  # samples of the fastest motion: of fewer, nothing says where between them a limit is kept
+COARSE = 32  # samples of a path, below which its set-points are few
 HELD_POINTS = 400  # at which it is looked at whether a path can be held
 
 
@@ -119,7 +120,9 @@ def fastest(
         progress(f"largest path at {wanted.text}")
         repetition = at_frequency(followed, optimiser, wanted, optimum)
     between = error_between(curve, solution, share)
-    return FastestPath(scenario, curve, optimum, share, solution, even, stated, between, repetition, _notes(followed, share))
+    return FastestPath(
+        scenario, curve, optimum, share, solution, even, stated, between, repetition, _notes(followed, share)
+    )
 
 
 def _rate(scenario: Scenario, given: str | None) -> Quantity:
@@ -152,6 +155,10 @@ def _check_held(scenario: Scenario, model: Model) -> None:
 def _sampled(optimum: Optimum, followed: Followed) -> np.ndarray:
     """The shares of the set-points, in as few samples as the exact inverse confirms. Raises SolverError."""
     begin = len(optimum.samples(followed.sample_time)) - 1
+    if begin < FEWEST:
+        enough = f"{np.ceil(COARSE / optimum.duration / 1e3):g} kHz"
+        what = f'is too low: the fastest motion lasts {show(optimum.duration, "s")}, which is {begin} samples; give --sample-rate "{enough}"'
+        raise InputError(followed.curve.scenario.path, [Fault("sample_rate", what)])
     n = fewest(lambda n: followed.keeps(optimum.samples(followed.sample_time, n - begin)), begin)
     if n is None:
         raise SolverError(
@@ -186,10 +193,12 @@ def _stated(scenario: Scenario, followed: Followed, least: int) -> float | None:
 
 def _notes(followed: Followed, share: np.ndarray) -> tuple[str, ...]:
     notes = []
-    if len(share) - 1 < COARSE:
+    if len(share) - followed.curve.closed < COARSE:
         notes.append(
-            f"{len(share) - 1} set-points are few for a path, which is left between them; give a higher --sample-rate"
+            f"{len(share) - followed.curve.closed} set-points are few for the path, which is left between them; give a higher --sample-rate"
         )
     if followed.inverse.without_memories is not followed.inverse:
-        notes.append("the law of time is the fastest without the memories of effects, slowed until limits are kept with them")
+        notes.append(
+            "the law of time is the fastest without the memories of effects, slowed until limits are kept with them"
+        )
     return tuple(notes)

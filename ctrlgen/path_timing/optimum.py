@@ -12,14 +12,23 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.devices.base import Limit
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.curve import Curve
-from ctrlgen.path_timing.drive_law import BalancedLaw, BalancedPath, InertialLaw, Law, Side, depends_on_speed, distances_at, sides_of
+from ctrlgen.path_timing.drive_law import (
+    BalancedLaw,
+    BalancedPath,
+    InertialLaw,
+    Law,
+    Side,
+    depends_on_speed,
+    distances_at,
+    sides_of,
+)
 from ctrlgen.path_timing.programme import RateBound, SpeedProgramme
 from ctrlgen.path_timing.speed_bound import landed, largest_speeds, largest_steps, steps_in_time
 from ctrlgen.path_timing.timing_law import TimingLaw
 from ctrlgen.trajectory.path_inverse import PathInverse
 from ctrlgen.trajectory.paths import smooth_step
 
-NODES = 1200  # of all pieces together, at which the speed is bounded
+NODES = 800  # of all pieces together, at which the speed is bounded
 FEWEST_NODES = 60  # of a piece
 SWING = 4  # samples that a drive with inertia takes at least for its whole range: what the next samples can still show
 BEGIN_NODES = 200  # of the law with which IPOPT begins
@@ -122,10 +131,14 @@ class Optimiser:
         path, law, inverse = self._path(curve, ends), self.law, self.inverse
         assert path is not None and isinstance(law, BalancedLaw) and inverse is not None and inverse.moving is not None
         share = path.share
-        speeds = largest_speeds(self.distances, self.speed_distances, path, share, 1 / (PACE_SAMPLES * self.sample_time))
+        speeds = largest_speeds(
+            self.distances, self.speed_distances, path, share, 1 / (PACE_SAMPLES * self.sample_time)
+        )
         if not speeds.all():
             at = 100 * share[int(np.argmin(speeds))]
-            raise SolverError(f"at {at:.3g} % of the path no speed keeps the limits; make the path smaller, or shift it")
+            raise SolverError(
+                f"at {at:.3g} % of the path no speed keeps the limits; make the path smaller, or shift it"
+            )
         slowness = 1 / speeds
         time = np.concatenate([[0.0], np.cumsum(np.diff(share) * (slowness[1:] + slowness[:-1]) / 2)])
         speed = np.where(np.isfinite(speeds), speeds, np.max(speeds[np.isfinite(speeds)], initial=0.0))
@@ -176,16 +189,18 @@ def _rates(model: Model, sample_time: float) -> tuple[RateBound, list[tuple[int,
                 sides.append((i, Side(limit, 0, upper, bound, (limit.upper or 0.0) - (limit.lower or 0.0))))
     if model.inertial:
         span = np.ptp(np.array(model.u_bounds), axis=0)
-        for i in np.flatnonzero(np.isfinite(span)):
+        for i in map(int, np.flatnonzero(np.isfinite(span))):
             fastest = span[i] / (SWING * sample_time)
             label = f"change of drive {signal.channels[i]} by its range in {SWING} samples"
-            own = Limit("sampled_drive", label, (signal.channels[i],), f"{signal.units[i]}/s", model.u[int(i)], -fastest, fastest)
+            own = Limit(
+                "sampled_drive", label, (signal.channels[i],), f"{signal.units[i]}/s", model.u[i], -fastest, fastest
+            )
             if fastest < high[i]:
                 high[i] = fastest
-                sides.append((int(i), Side(own, 0, True, fastest, 2 * fastest)))
+                sides.append((i, Side(own, 0, True, fastest, 2 * fastest)))
             if -fastest > low[i]:
                 low[i] = -fastest
-                sides.append((int(i), Side(own, 0, False, -fastest, 2 * fastest)))
+                sides.append((i, Side(own, 0, False, -fastest, 2 * fastest)))
     return RateBound(low, high), sides
 
 
@@ -201,7 +216,11 @@ def _begin(programme: SpeedProgramme, duration: float) -> TimingLaw:
         tables[1:, [0, -1]] = 0.0
     size = ends[1] - ends[0]
     for _ in range(TRIES):
-        law = TimingLaw(t * duration, ends[0] + size * tables[0], (size * tables[1:] / duration ** np.arange(1.0, order + 1)[:, None]).T)
+        law = TimingLaw(
+            t * duration,
+            ends[0] + size * tables[0],
+            (size * tables[1:] / duration ** np.arange(1.0, order + 1)[:, None]).T,
+        )
         distances, u = (
             v.full() for v in programme.distances.map(BEGIN_NODES)(programme.places(law.share).T, law.derivatives.T)
         )

@@ -31,7 +31,7 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.path_timing.drive_law import Law
 from ctrlgen.path_timing.timing_law import TimingLaw
 
-INTERVALS = ((24, 1e-4), (72, 1e-6), (216, 1e-8))  # of the path, and the weight of the smoothing term in each pass
+INTERVALS = ((32, 1e-4), (128, 1e-6), (512, 1e-8))  # of the path, and the weight of the smoothing term in each pass
 TOLERANCE = 1e-8
 MOST_ITERATIONS = 400
 SHORTEST = 1e-6  # of the mean time of an interval
@@ -143,7 +143,9 @@ class SpeedProgramme:
         low, high = self.law.model.u_bounds
         return np.where(np.isfinite(high - low), high - low, self.law.model.u_scale)
 
-    def _start(self, begin: TimingLaw, share: np.ndarray, unit: np.ndarray, T: float, size: float, n: int) -> np.ndarray:
+    def _start(
+        self, begin: TimingLaw, share: np.ndarray, unit: np.ndarray, T: float, size: float, n: int
+    ) -> np.ndarray:
         time = begin.when(share)
         time[0], time[-1] = begin.time[0], begin.time[-1]
         m = self.law.order

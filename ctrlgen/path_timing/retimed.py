@@ -32,7 +32,9 @@ def retimed(scenario: Scenario, model: Model, samples: np.ndarray, rate: Quantit
         f'sample_rate = "{rate.text}"', "", "[path]", 'kind = "poses"', f'file = "{name}.csv"',
         *(["periodic = true"] if closed else []),
     ]  # fmt: skip
-    poses = Poses(kind="poses", file=f"{name}.csv", periodic=closed, folder=folder, listed=tuple(map(tuple, samples.tolist())))
+    poses = Poses(
+        kind="poses", file=f"{name}.csv", periodic=closed, folder=folder, listed=tuple(map(tuple, samples.tolist()))
+    )
     changed = {
         "title": title, "device": device.path.name, "sample_rate": rate, "duration": None, "points": None, "path": poses,
         "outcome": "solved", "expect": (),
@@ -42,7 +44,9 @@ def retimed(scenario: Scenario, model: Model, samples: np.ndarray, rate: Quantit
         "scenario": Input(folder / f"{name}.toml", "\n".join(lines) + "\n"),
         "poses": Input(folder / f"{name}.csv", table),
     }
-    return replace(scenario, name=name, path=inputs["scenario"].path, file=file.model_copy(update=changed), inputs=inputs)
+    return replace(
+        scenario, name=name, path=inputs["scenario"].path, file=file.model_copy(update=changed), inputs=inputs
+    )
 
 
 def write_inputs(folder: Path, scenario: Scenario) -> None:

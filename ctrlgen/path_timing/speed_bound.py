@@ -95,7 +95,9 @@ def largest_steps(
     return np.where(reaches, np.maximum(left, np.append(0.0, low[~reaches])[-1]), low) if reaches.any() else low
 
 
-def steps_in_time(share: np.ndarray, time: np.ndarray, speed: np.ndarray, sample_time: float, closed: bool) -> np.ndarray:
+def steps_in_time(
+    share: np.ndarray, time: np.ndarray, speed: np.ndarray, sample_time: float, closed: bool
+) -> np.ndarray:
     """(n,) by how much of a piece the continuous law leads in one sample from each of the shares; beyond an open end at its speed."""
     then = time + sample_time
     beyond = np.maximum(then - time[-1], 0.0)
@@ -121,4 +123,4 @@ def landed(share: np.ndarray, steps: np.ndarray, more: int = 0) -> np.ndarray:
         middle = (low + high) / 2
         low, high = (low, middle) if walk(middle, count)[-1] >= share[-1] else (middle, high)
     places = walk(high, count)
-    return np.append(places[: count], share[-1]) if len(places) == count + 1 else np.append(places[:-1], share[-1])
+    return np.append(places[:count], share[-1]) if len(places) == count + 1 else np.append(places[:-1], share[-1])

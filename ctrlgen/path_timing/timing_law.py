@@ -38,4 +38,3 @@ class TimingLaw:
         n = DENSE * (len(self.time) - 1) + 1
         dense = np.interp(np.linspace(0, len(self.time) - 1, n), np.arange(len(self.time)), self.time)
         return np.interp(share, np.maximum.accumulate(self.at(dense)), dense)
-

@@ -63,7 +63,7 @@ def fastest_record(found: FastestPath) -> dict[str, Any]:
             for b in found.bindings
         ],
         "between_set_points": {
-            f"{c} [{u}]": float(difference(v, u)) for c, u, v in zip(signal.channels, signal.units, found.between, strict=True)
+            f"{c} [{_small(u)}]": float(difference(v, _small(u))) for c, u, v in zip(signal.channels, signal.units, found.between, strict=True)
         },
         "law": {"time_s": time.tolist(), "share": share.tolist(), "speed": _numbers(speed), "bound": _numbers(bound)},
         "set_point_shares": found.share.tolist(),
@@ -120,7 +120,12 @@ def between_text(found: FastestPath) -> str:
     """The largest distances from the path between set-points, of channels that have one."""
     signal = found.solution.model.signals[found.scenario.file.follow]
     rows = zip(signal.channels, signal.units, found.between, signal.scale, strict=True)
-    return ", ".join(f"{c} {show(v, u, 3)}" for c, u, v, size in rows if v > 1e-9 * size) or "none"
+    return ", ".join(f"{c} {show(v, _small(u), 3)}" for c, u, v, size in rows if v > 1e-9 * size) or "none"
+
+
+def _small(unit: str) -> str:
+    """nm and urad, in which errors are told."""
+    return next((small for small in ("nm", "urad") if same_dimension(unit, small)), unit)
 
 
 def repetition_sentence(found: FastestPath) -> str:
@@ -214,7 +219,14 @@ def _draw_speed(axes: Axes, found: FastestPath, alike: list[int], unit: str) -> 
         even = found.curve.evenly(len(share))
         slope_even = np.linalg.norm(found.curve.derivatives(even, 1)[1][:, alike], axis=1)
         rate = np.gradient(even, np.linspace(0, found.even, len(even)))
-        axes.plot(100 * even, difference(rate * slope_even, unit), color="#888888", lw=1, ls=":", label="even speed, no faster")
+        axes.plot(
+            100 * even,
+            difference(rate * slope_even, unit),
+            color="#888888",
+            lw=1,
+            ls=":",
+            label="even speed, no faster",
+        )
     axes.set_xlabel("share of the path [%]")
     axes.set_ylabel(f"speed along the path [{unit}/s]")
     axes.set_ylim(bottom=0)
@@ -241,7 +253,14 @@ def _draw_drives(found: FastestPath) -> Figure:
     figure, axes = plt.subplots(figsize=(8.2, 2.8))
     edges = np.append(solution.trace.time, solution.trace.time[-1] + found.sample_time) * 1e3
     for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
-        axes.stairs(from_si(solution.drive[:, i], unit), edges, baseline=None, color=COLOURS[i % len(COLOURS)], lw=1, label=channel)
+        axes.stairs(
+            from_si(solution.drive[:, i], unit),
+            edges,
+            baseline=None,
+            color=COLOURS[i % len(COLOURS)],
+            lw=1,
+            label=channel,
+        )
     low, high = solution.model.u_bounds
     for bound in {float(b) for b in (*low, *high) if np.isfinite(b)}:
         axes.axhline(from_si(bound, signal.units[0]), color="#666666", lw=0.8, ls="--")

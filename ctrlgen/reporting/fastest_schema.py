@@ -39,7 +39,9 @@ class LawEntry(Keys):
     time_s: list[float] = Field(description="Time [s].")
     share: list[float] = Field(description="Share of the path that is behind.")
     speed: list[Number] = Field(description="Its change by time [1/s]; null where nothing bounds it.")
-    bound: list[Number] = Field(description="Largest speed that each place alone allows [1/s]; null where it is not known.")
+    bound: list[Number] = Field(
+        description="Largest speed that each place alone allows [1/s]; null where it is not known."
+    )
 
 
 class RepetitionEntry(Keys):
