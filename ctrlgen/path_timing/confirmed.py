@@ -14,6 +14,7 @@ from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.retimed import retimed
 from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
+from ctrlgen.trajectory.motion import Motion
 from ctrlgen.trajectory.path_inverse import PathInverse
 from ctrlgen.trajectory.scenario import Scenario
 
@@ -59,14 +60,28 @@ class Followed:
         if not self.model.inertial:
             needed = self.inverse.trajectory(samples, closed)
             return needed.exact and not needed.violations(self.model, self.sample_time, closed)
+        try:
+            return self._moves(self.scenario(share, "").motion(self.model))
+        except InputError:  # not smooth enough
+            return False
+
+    def keeps_timed(self, scenario: Scenario) -> bool:
+        """Whether a scenario with a law of time of its own keeps every limit at this rate."""
+        target = scenario.target(self.model)
+        if isinstance(target, Motion):
+            return self._moves(target)
+        needed = self.inverse.trajectory(target, self.curve.closed)
+        return needed.exact and not needed.violations(self.model, self.sample_time, self.curve.closed)
+
+    def _moves(self, motion: Motion) -> bool:
+        """Whether held drives lead a device with inertia along a motion within all limits."""
         assert not isinstance(self.inverse, PathInverse)
         try:
-            motion = self.scenario(share, "").motion(self.model)
-            found = self.inverse.sampled(motion, closed)
-            needed = self.inverse.needed(found, motion, closed)
-        except (InputError, SolverError):
+            found = self.inverse.sampled(motion, self.curve.closed)
+        except SolverError:
             return False
-        return not needed.violations(self.model, self.sample_time, closed)
+        needed = self.inverse.needed(found, motion, self.curve.closed)
+        return not needed.violations(self.model, self.sample_time, self.curve.closed)
 
 
 def fewest(follows: Callable[[int], bool], least: int) -> int | None:

@@ -157,7 +157,8 @@ def _sampled(optimum: Optimum, followed: Followed) -> np.ndarray:
     begin = len(optimum.samples(followed.sample_time)) - 1
     if begin < FEWEST:
         enough = f"{np.ceil(COARSE / optimum.duration / 1e3):g} kHz"
-        what = f'is too low: the fastest motion lasts {show(optimum.duration, "s")}, which is {begin} samples; give --sample-rate "{enough}"'
+        lasts = show(optimum.duration, "s")
+        what = f'is too low: the fastest motion lasts {lasts}, which is {begin} samples; give --sample-rate "{enough}"'
         raise InputError(followed.curve.scenario.path, [Fault("sample_rate", what)])
     n = fewest(lambda n: followed.keeps(optimum.samples(followed.sample_time, n - begin)), begin)
     if n is None:
@@ -175,16 +176,13 @@ def _even(followed: Followed, least: int) -> float | None:
 
 def _stated(scenario: Scenario, followed: Followed, least: int) -> float | None:
     """The shortest time [s] by the scenario's own law of time."""
-    model, closed = followed.model, scenario.file.path.closed
 
     def follows(n: int) -> bool:
-        samples = n if closed else n + 1
-        duration = read_quantity("s", f"{samples / followed.rate.si!r} s")
+        duration = read_quantity("s", f"{(n + (not followed.curve.closed)) / followed.rate.si!r} s")
         update = {"duration": duration, "sample_rate": followed.rate, "points": None}
-        timed = replace(scenario, file=scenario.file.model_copy(update=update))
         try:
-            return followed.inverse.keeps_limits(timed.target(model), closed)  # type: ignore[arg-type]
-        except (InputError, SolverError):
+            return followed.keeps_timed(replace(scenario, file=scenario.file.model_copy(update=update)))
+        except InputError:  # too few samples, or not smooth enough
             return False
 
     n = fewest(follows, least)

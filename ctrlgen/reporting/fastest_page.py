@@ -22,6 +22,8 @@ from ctrlgen.reporting.result_schemas import origin
 SHOWN = 12  # limits in the figures
 SHOWN_RUNS = 4  # runs of a limit in a table
 UNBOUND = "#bbbbbb"
+FLAT = 1e-9  # of the largest extent, below which a channel does not move
+ROOM = 1.15  # of the largest speed, up to which speeds are shown
 
 
 def write_fastest(out: Path, found: FastestPath) -> None:
@@ -43,8 +45,7 @@ def write_fastest(out: Path, found: FastestPath) -> None:
 
 def fastest_record(found: FastestPath) -> dict[str, Any]:
     """What fastest.json holds."""
-    scenario, signal = found.scenario, found.solution.model.signals[found.scenario.file.follow]
-    optimum, r = found.optimum, found.repetition
+    scenario, optimum, r = found.scenario, found.optimum, found.repetition
     time, share, speed, bound = found.optimum.law()
     return {
         **origin(scenario.digest, None, found.notes),
@@ -62,9 +63,7 @@ def fastest_record(found: FastestPath) -> dict[str, Any]:
             }
             for b in found.bindings
         ],
-        "between_set_points": {
-            f"{c} [{_small(u)}]": float(difference(v, _small(u))) for c, u, v in zip(signal.channels, signal.units, found.between, strict=True)
-        },
+        "between_set_points": _between(found),
         "law": {"time_s": time.tolist(), "share": share.tolist(), "speed": _numbers(speed), "bound": _numbers(bound)},
         "set_point_shares": found.share.tolist(),
         "repetition": None if r is None else {
@@ -72,6 +71,12 @@ def fastest_record(found: FastestPath) -> dict[str, Any]:
             "diameter": r.size(r.scale), "diameter_even_speed": r.size(r.even), "diameter_unit": r.unit,
         },
     }  # fmt: skip
+
+
+def _between(found: FastestPath) -> dict[str, float]:
+    signal = found.solution.model.signals[found.scenario.file.follow]
+    rows = zip(signal.channels, map(_small, signal.units), found.between, strict=True)
+    return {f"{c} [{u}]": float(difference(v, u)) for c, u, v in rows}
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:
@@ -164,72 +169,59 @@ def _colours(found: FastestPath) -> list[tuple[Binding, str]]:
 def _draw_path(found: FastestPath) -> Figure:
     """Left the path with its set-points, right the speed along it; coloured by the limit that binds."""
     signal = found.solution.model.signals[found.scenario.file.follow]
-    time, share, speed, bound = found.optimum.law()
-    curve = found.curve
     spread = np.ptp(found.solution.command, axis=0) / np.array(signal.scale)
     main = int(spread.argmax())
     alike = [i for i, u in enumerate(signal.units) if same_dimension(u, signal.units[main])]
-    shown = sorted(sorted(alike, key=lambda i: -spread[i])[:2])
+    columns = sorted(sorted(alike, key=lambda i: -spread[i])[:2])
+    if len(columns) == 1 or spread[columns].min() < FLAT * spread[main]:
+        columns = [main]
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.9), width_ratios=(1, 1.25))
-    dense = np.linspace(0, 1, 2001)
-    points, flat = curve.samples(dense), len(shown) == 1 or spread[shown].min() < 1e-9
-    columns = [main] if flat else shown
 
-    def xy(at: np.ndarray) -> list[np.ndarray]:
-        values = curve.samples(at)
-        shown_values = [np.asarray(from_si(values[:, i], signal.units[i])) for i in columns]
-        return [100 * at, *shown_values] if flat else shown_values
+    def at(share: np.ndarray) -> list[np.ndarray]:
+        values = found.curve.samples(share)
+        shown = [np.asarray(from_si(values[:, i], signal.units[i])) for i in columns]
+        return [100 * share, *shown] if len(shown) == 1 else shown
 
-    left.plot(*xy(dense), color=UNBOUND, lw=1)
-    del points
+    left.plot(*at(np.linspace(0, 1, 2001)), color=UNBOUND, lw=1)
     for binding, colour in reversed(_colours(found)):
         for a, b in binding.runs:
-            left.plot(*xy(np.linspace(a, b, 200)), color=colour, lw=2.2, solid_capstyle="butt")
-    left.plot(*xy(found.share), ".", ms=3, color="#333333")
-    if flat:
-        left.set_xlabel("share of the path [%]")
-        left.set_ylabel(f"{signal.channels[main]} [{signal.units[main]}]")
+            left.plot(*at(np.linspace(a, b, 200)), color=colour, lw=2.2, solid_capstyle="butt")
+    left.plot(*at(found.share), ".", ms=3, color="#333333")
+    names = [f"{signal.channels[i]} [{signal.units[i]}]" for i in columns]
+    if len(names) == 1:
+        names = ["share of the path [%]", *names]
     else:
         left.set_aspect("equal", adjustable="datalim")
-        for set_label, i in zip((left.set_xlabel, left.set_ylabel), columns, strict=True):
-            set_label(f"{signal.channels[i]} [{signal.units[i]}]")
+    left.set_xlabel(names[0])
+    left.set_ylabel(names[1])
     left.set_title("set-points, and which limit binds", fontsize=8)
     _draw_speed(right, found, alike, signal.units[main])
     return figure
 
 
 def _draw_speed(axes: Axes, found: FastestPath, alike: list[int], unit: str) -> None:
+    """Over the share of the path, in the channels `alike`: the fastest law, the bound of each place, even speed."""
     _, share, speed, bound = found.optimum.law()
-    inside = np.clip(share, 0, 1)
-    slope = np.linalg.norm(found.curve.derivatives(inside, 1)[1][:, alike], axis=1)
 
-    def shown(values: np.ndarray) -> np.ndarray:
-        return np.asarray(difference(np.where(np.isfinite(values), values, np.nan) * slope, unit))
+    def shown(at: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        slope = np.linalg.norm(found.curve.derivatives(at, 1)[1][:, alike], axis=1)
+        return np.asarray(difference(np.where(np.isfinite(rate), rate, np.nan) * slope, unit))
 
-    if not np.allclose(np.nan_to_num(bound), np.nan_to_num(speed)):
-        axes.plot(100 * share, shown(bound), color=UNBOUND, lw=1, ls="--", label="bound of each place alone")
-    axes.plot(100 * share, shown(speed), color="#333333", lw=1, label="fastest law of time")
-    drawn: set[str] = set()
+    if np.isfinite(bound).any() and not np.allclose(bound, speed):
+        axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls="--", label="bound of each place alone")
+    axes.plot(100 * share, shown(share, speed), color="#333333", lw=1, label="fastest law of time")
+    top = np.nanmax(shown(share, speed))
     for binding, colour in reversed(_colours(found)):
         for a, b in binding.runs:
             own = (share >= a) & (share <= b)
-            axes.plot(100 * share[own], shown(speed)[own], color=colour, lw=2.2, solid_capstyle="butt")
-        drawn.add(colour)
+            axes.plot(100 * share[own], shown(share[own], speed[own]), color=colour, lw=2.2, solid_capstyle="butt")
     if found.even is not None:
         even = found.curve.evenly(len(share))
-        slope_even = np.linalg.norm(found.curve.derivatives(even, 1)[1][:, alike], axis=1)
         rate = np.gradient(even, np.linspace(0, found.even, len(even)))
-        axes.plot(
-            100 * even,
-            difference(rate * slope_even, unit),
-            color="#888888",
-            lw=1,
-            ls=":",
-            label="even speed, no faster",
-        )
+        axes.plot(100 * even, shown(even, rate), color="#888888", lw=1, ls=":", label="even speed, no faster")
     axes.set_xlabel("share of the path [%]")
     axes.set_ylabel(f"speed along the path [{unit}/s]")
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(0, ROOM * top)
     axes.legend(fontsize=8)
 
 
