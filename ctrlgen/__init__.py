@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ctrlgen.model.model import Model
     from ctrlgen.model.simulation import Trace, simulate
     from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
+    from ctrlgen.path_timing.fastest import FastestPath, fastest
     from ctrlgen.recordings.reader import load_recordings
     from ctrlgen.recordings.recording import Record, Recording
     from ctrlgen.reporting.build_record import Build
@@ -87,6 +88,10 @@ _EXPORTS = {
         "SensorReadings",
         "simulate_sensors",
     ),
+    "path_timing.fastest": (
+        "FastestPath",
+        "fastest",
+    ),
     "recordings.reader": ("load_recordings",),
     "recordings.recording": (
         "Record",
@@ -129,6 +134,7 @@ __all__ = [
     "Diagnosis",
     "ErrorBudget",
     "Estimate",
+    "FastestPath",
     "Fault",
     "Finding",
     "Infeasibility",
@@ -151,6 +157,7 @@ __all__ = [
     "compare",
     "diagnose",
     "error_budget",
+    "fastest",
     "generate",
     "load_batch",
     "load_device",

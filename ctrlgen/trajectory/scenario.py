@@ -211,6 +211,15 @@ class Scenario:
             raise InputError(self.path, [Fault("path", what)])
         return samples
 
+    def geometry(self, model: Model, order: int, share: np.ndarray) -> np.ndarray:
+        """(order + 1, len(share), channels) [SI, per share^k]: the curve of the path alone, where the `share` of it, 0 ... 1, is behind.
+        Raises InputError."""
+        return self._on_path(model, lambda path, frame, n: path.geometry(frame, order, share))
+
+    def corners(self, model: Model) -> np.ndarray:
+        """The shares of the path at which it begins, has corners, and ends; a closed one has none. Raises InputError."""
+        return self._on_path(model, lambda path, frame, n: path.corners_at(frame))
+
     def target(self, model: Model) -> Command:
         """What is to be followed: the samples, with their derivatives where the model has inertia. Raises InputError."""
         return self.motion(model) if model.inertial else self.command(model)
@@ -296,7 +305,9 @@ class Scenario:
         """Refuses a path whose derivative of this order jumps, so that the drive would."""
         path = self._path(model)
         if isinstance(path, Poses):
-            still = np.vstack([samples[:1].repeat(order + 1, axis=0), samples, samples[-1:].repeat(order + 1, axis=0)])
+            rest = (samples[:1].repeat(order + 1, axis=0), samples[-1:].repeat(order + 1, axis=0))
+            before, after = (samples, samples) if self.closed else rest
+            still = np.vstack([before[-order - 1 :], samples, after[: order + 1]])
             largest, change = (np.abs(np.diff(still, k, axis=0)).max(axis=0) for k in (order, order + 1))
             if np.any(change > RESOLVED * largest):
                 what = (
