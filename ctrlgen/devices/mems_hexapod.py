@@ -213,6 +213,7 @@ class MemsHexapod(Device):
         voltage = self.actuator.drive == "voltage"
         power_limit, resistance = self.actuator.power_limit.si, self.actuator.heater_resistance.si
         drive_limit = (power_limit * resistance) ** 0.5 if voltage else power_limit
+        most = (a.power_limit * a.heater_resistance) ** 0.5 if voltage else a.power_limit
         drive = Signal(
             "voltage" if voltage else "power",
             "heater voltage" if voltage else "heater power",
@@ -237,11 +238,8 @@ class MemsHexapod(Device):
             wire_stress = hexapod.wire_stress(signal.mechanism_displacement, loads, h)
             outermost = [4 * i + end for i in range(6) for end in (0, 3)]
             return [
-                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, drive_limit),
-                Limit(
-                    "temperature", state.label, self.axes, "degC", signal.state,
-                    self.actuator.ambient.si, self.actuator.temperature_limit.si,
-                ),
+                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, most),
+                Limit("temperature", state.label, self.axes, "degC", signal.state, a.ambient, a.temperature_limit),
                 Limit("force", "actuator force", self.axes, "N", signal.force, 0.0, None),
                 Limit("stroke", "stage displacement", self.axes, "um", d, 0.0, self.stage.stroke.si),
                 Limit(
