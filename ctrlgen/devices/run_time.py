@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from ctrlgen.core.units import Quantity, base_unit, parse, show, written_unit
+from ctrlgen.core.units import Quantity, base_unit, parse, show, to_si, written_unit
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Effect
 
@@ -54,8 +54,9 @@ class RunTimeConstant:
 
     @property
     def base_unit(self) -> str:
-        """Its unit in SI, as the C has it."""
-        return base_unit(self.unit)
+        """Its unit in SI, as the C has it: the file's own where that is one."""
+        own = to_si(0.0, self.unit) == 0.0 and to_si(1.0, self.unit) == 1.0
+        return self.unit if own else base_unit(self.unit)
 
     @property
     def range_text(self) -> str:

@@ -266,7 +266,6 @@ def _limits_in_c(controller: Controller, printer: Printer, real: Real, u_slack: 
     arrays = {
         "U_LOW": tables.array("U_LOW", lambda m: _u_bounds(m)[0], u_low),
         "U_HIGH": tables.array("U_HIGH", lambda m: _u_bounds(m)[1], u_high),
-        "X_REST": tables.array("X_REST", lambda m: m.rest_formula, model.rest),
         "U_LEAST": "U_LEAST", "U_MOST": "U_MOST",
     }  # fmt: skip
     if limited:
@@ -284,7 +283,8 @@ def _limits_in_c(controller: Controller, printer: Printer, real: Real, u_slack: 
             "S_HIGH": tables.array("S_HIGH", lambda m: _s_bounds(m)[1], s_high),
         }
         middles["s_middle"] = _middle_texts(tables, _s_bounds, s_low, s_high, real)
-    return {"arrays": arrays, **middles}
+    rest = tables.each("X_REST", lambda m: m.rest_formula, model.rest)
+    return {"arrays": arrays, "rest_given": rest, **middles}
 
 
 def _middle_texts(

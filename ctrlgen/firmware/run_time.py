@@ -45,10 +45,19 @@ class Tables:
             return [self._real.literal(v) if v != 0.0 else "" for v in values]
         return [self._printer.member(node) for node in nodes]
 
+    def each(self, static: str, formula: Callable[[Any], ca.SX], values: np.ndarray) -> list[str]:
+        """Each row as a member of the state; empty where the table is the `static` one."""
+        nodes = self.rows(formula, values)
+        return [] if nodes is None else [_of_state(self._printer.member(node)) for node in nodes]
+
     def array(self, static: str, formula: Callable[[Any], ca.SX], values: np.ndarray) -> str:
         """The whole table: the name of a `static` one, or the member of the same name of the state."""
         nodes = self.rows(formula, values)
-        return static if nodes is None else f"state->{self._printer.array(nodes, static.lower()).replace('->', '.')}"
+        return static if nodes is None else _of_state(self._printer.array(nodes, static.lower()))
+
+
+def _of_state(text: str) -> str:
+    return text.replace("derived->", "state->derived.")
 
 
 def given_ranges(controller: Controller) -> dict[str, Interval]:

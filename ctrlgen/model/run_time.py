@@ -15,7 +15,7 @@ from ctrlgen.devices import Device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
 
-CORNERS = 4  # drawn at random, beside those with all constants low and all high
+CORNERS = 2  # drawn at random, beside those with all constants low and all high
 
 
 def choices(constants: Sequence[RunTimeConstant]) -> Iterator[dict[str, float]]:
