@@ -8,9 +8,10 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import casadi as ca
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ctrlgen.core.units import Quantity
+from ctrlgen.devices.run_time import RunTime, RunTimeConstant, run_time_constants
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.effects import Effect, EffectTable
@@ -43,7 +44,8 @@ class Limit:
     """lower <= expr <= upper for each channel, SI; None where there is no bound.
 
     A limit on an expression that is not a variable of the model itself must be convex in the displacement, never negative,
-    and zero at home: the controller keeps it by scaling the displacement toward home.
+    and zero at home: the controller keeps it by scaling the displacement toward home. A device may state a bound in terms of its
+    numbers, so that it follows one that is free; a model has the number.
 
     `reserve` [SI]: by how much the lower and the upper bound of the device have been tightened for what is not known exactly.
     """
@@ -231,12 +233,26 @@ class Device(Section):
     """`[[sensor]]` tables: what reads the channels of the pose. They do not enter the model; `ctrlgen check` gives
     their resolution and range, `ctrlgen.simulate_sensors` their recordings.
     """
+    run_time: RunTime | None = None
+    """`[run_time]`: which of these numbers the generated controller is given when it starts, because they differ between specimens or
+    drift. Without it every number is compiled in.
+    """
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         kinds = getattr(cls.model_fields["kind"].annotation, "__args__", ())
         if kinds:  # a device that is not read from a file has no name for its kind
             Device.library[kinds[0]] = cls
+
+    @model_validator(mode="after")
+    def _run_time_numbers(self) -> Device:
+        run_time_constants(self)
+        return self
+
+    @property
+    def given_at_start(self) -> tuple[RunTimeConstant, ...]:
+        """The numbers that the generated controller is given when it starts."""
+        return run_time_constants(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The device's physics with the values `p` (SI numbers, or symbols where they are free)."""

@@ -246,6 +246,7 @@ class MemsHexapod(Device):
         voltage = self.actuator.drive == "voltage"
         power_limit, resistance = self.actuator.power_limit.si, self.actuator.heater_resistance.si
         drive_limit = (power_limit * resistance) ** 0.5 if voltage else power_limit
+        most = (a.power_limit * a.heater_resistance) ** 0.5 if voltage else a.power_limit
         drive = Signal(
             "voltage" if voltage else "power",
             "heater voltage" if voltage else "heater power",
@@ -270,11 +271,8 @@ class MemsHexapod(Device):
             wire_stress = hexapod.wire_stress(signal.mechanism_displacement, loads, h)
             outermost = [4 * i + end for i in range(6) for end in (0, 3)]
             return [
-                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, drive_limit),
-                Limit(
-                    "temperature", state.label, self.axes, "degC", signal.state,
-                    self.actuator.ambient.si, self.actuator.temperature_limit.si,
-                ),
+                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, most),
+                Limit("temperature", state.label, self.axes, "degC", signal.state, a.ambient, a.temperature_limit),
                 Limit("force", "actuator force", self.axes, "N", signal.force, 0.0, None),
                 Limit("stroke", "stage displacement", self.axes, "um", d, 0.0, self.stage.stroke.si),
                 Limit(
@@ -303,6 +301,7 @@ class MemsHexapod(Device):
                 "nonlinear": xy_stage.nonlinear_force(d, s),
             },
             pose=lambda d: ca.mtimes(J, d),
+            second_order_kinematics=lambda d: second_order(lambda pose, d: hexapod.loop_closure(pose, d, h), d),
             limits=limits,
             bipolar=False,
             documented={
@@ -320,7 +319,6 @@ class MemsHexapod(Device):
                 tangent_compliance=lambda d: (
                     xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d)
                 ),
-                second_order_kinematics=lambda d: second_order(lambda pose, d: hexapod.loop_closure(pose, d, h), d),
             )
         M = hexapod.mass(h, p.dynamics, J)
         D = modal_damping(M, home_stiffness(lambda d: xy_stage.force(d, s, a)), p.dynamics.damping_ratio)

@@ -72,6 +72,7 @@ class Model:
     ]  # drive, power, state where there are some, force, displacement, pose, reading; in this order
     force_parts: dict[str, ca.SX]  # parts of the restoring force by name
     limits: tuple[Limit, ...]
+    bounds_formulas: tuple[tuple[float | ca.SX | None, float | ca.SX | None], ...]  # of each limit, in terms of p
     laws: tuple[Law, ...]  # parts of the equations that have a name
     rate_limits: tuple[Limit, ...]  # on the change by time of a drive, which is their `expr`
     drive_weights: (
@@ -196,6 +197,17 @@ class Model:
                 if limit.upper is not None:
                     high[i] = min(high[i], limit.upper)
         return low, high
+
+    def bounds_formula(self, symbol: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Lower and upper bounds (n,) of x, z or u as formulas of p."""
+        low, high = ([ca.SX(side)] * symbol.numel() for side in (-np.inf, np.inf))
+        for limit, (lower, upper) in zip(self.limits, self.bounds_formulas, strict=True):
+            for _, i in _positions(limit, symbol):
+                if lower is not None:
+                    low[i] = lower if low[i].is_inf() or low[i].is_minus_inf() else ca.fmax(low[i], lower)
+                if upper is not None:
+                    high[i] = upper if high[i].is_inf() else ca.fmin(high[i], upper)
+        return ca.vertcat(ca.SX(0, 1), *low), ca.vertcat(ca.SX(0, 1), *high)
 
     def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u", "rate"] | None:
         """Whether a limit is on one of the states, displacements or drives itself, or on the rate of a drive; None where it is on an
