@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ctrlgen.app.batch import load_batch, run_batch
     from ctrlgen.app.pipeline import Outcome, run, verify
     from ctrlgen.budget.error_budget import ErrorBudget, error_budget
+    from ctrlgen.budget.robust import solve
     from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user import user_device
@@ -24,11 +25,12 @@ if TYPE_CHECKING:
     from ctrlgen.model.model import Model
     from ctrlgen.model.simulation import Trace, simulate
     from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
+    from ctrlgen.path_timing.fastest import FastestPath, fastest
     from ctrlgen.recordings.reader import load_recordings
     from ctrlgen.recordings.recording import Record, Recording
     from ctrlgen.reporting.build_record import Build
     from ctrlgen.trajectory.scenario import Scenario, load_scenario
-    from ctrlgen.trajectory.solution import Margin, Solution, solve
+    from ctrlgen.trajectory.solution import Margin, Solution
     from ctrlgen.trajectory.workspace import Workspace
     from ctrlgen.verification.comparison import Comparison, compare
 
@@ -46,6 +48,7 @@ _EXPORTS = {
         "ErrorBudget",
         "error_budget",
     ),
+    "budget.robust": ("solve",),
     "core.errors": (
         "CtrlgenError",
         "Fault",
@@ -85,6 +88,10 @@ _EXPORTS = {
         "SensorReadings",
         "simulate_sensors",
     ),
+    "path_timing.fastest": (
+        "FastestPath",
+        "fastest",
+    ),
     "recordings.reader": ("load_recordings",),
     "recordings.recording": (
         "Record",
@@ -98,7 +105,6 @@ _EXPORTS = {
     "trajectory.solution": (
         "Margin",
         "Solution",
-        "solve",
     ),
     "trajectory.workspace": ("Workspace",),
     "verification.comparison": (
@@ -128,6 +134,7 @@ __all__ = [
     "Diagnosis",
     "ErrorBudget",
     "Estimate",
+    "FastestPath",
     "Fault",
     "Finding",
     "Infeasibility",
@@ -150,6 +157,7 @@ __all__ = [
     "compare",
     "diagnose",
     "error_budget",
+    "fastest",
     "generate",
     "load_batch",
     "load_device",

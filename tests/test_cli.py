@@ -27,6 +27,7 @@ COMMANDS = (
     "workspace",
     "reproduce",
     "budget",
+    "fastest",
     "example",
     "diagnose",
     "batch",

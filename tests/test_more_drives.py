@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.optimize import linprog, minimize, nnls
 
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
 from ctrlgen.model.feedforward import Controller, ControllerStatus
+from ctrlgen.trajectory.least_effort import path_inverse
 
 B = 0.2 * np.array([[1.0, 0.5, 0.0], [0.0, -0.5, 1.0]])  # N/V
 LOW, HIGH = np.array([-100.0, 0.0, -20.0]), np.array([100.0, 150.0, 130.0])  # V
@@ -172,6 +174,36 @@ def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):
     _, left = nnls(np.vstack(acting).T, 2 * s)
     assert left < 1e-5 * np.linalg.norm(2 * s)
     assert np.linalg.norm(2 * s) > 0.1
+
+
+@pytest.mark.parametrize(
+    "path", [circle(20, 4, 0), 'kind = "line"\nstart = { x = "-9 um" }\nend = { x = "12 um", y = "4 um" }\n']
+)
+def test_what_few_samples_show_of_a_rate_is_what_a_linear_programme_over_all_says(tmp_path, path):
+    """Near the lowest rate that is possible; a search may take what is nearest to it as beyond it, never the other way round."""
+    timing = 'sample_rate = "1 kHz"\nduration = "0.3 s"\n'
+    n, h = 300, 1e-3
+    scenario, model = loaded(tmp_path, stage(), path, timing)
+    command, closed = scenario.command(model), scenario.closed
+    begin = [] if closed else [command[:1]]  # the drive that holds the start comes before the first
+    wanted = forces(np.vstack([*begin, command[1:], command[:1] if closed else command[-1:]]))
+    n = len(wanted)
+    step = sp.eye(n) - (sp.eye(n, k=-1) + (sp.eye(n, k=n - 1) if closed else 0))
+    D = sp.kron(step.tocsr()[0 if closed else 1 :], [[1.0, 0.0, 0.0]])
+    one = np.ones((D.shape[0], 1))
+    slowest = linprog(
+        np.append(np.zeros(3 * n), 1.0), A_eq=sp.hstack([sp.kron(sp.eye(n), B), np.zeros((2 * n, 1))]), b_eq=wanted.ravel(),
+        A_ub=sp.vstack([sp.hstack([D, -one]), sp.hstack([-D, -one])]), b_ub=np.zeros(2 * len(one)),
+        bounds=[*list(zip(LOW, HIGH, strict=True)) * n, (0, None)],
+    ).fun / h  # fmt: skip
+    inverse = [
+        path_inverse(build_model(stage(drive_rate={"a": f"{share * slowest} V/s"})), "pose", h)
+        for share in (0.5, 0.99, 0.9999, 1.0001, 1.002, 1.5)
+    ]
+    every = np.arange(len(command))
+    assert [i.keeps_limits(command, closed) for i in inverse] == [False] * 3 + [True] * 3
+    searched = [i.keeps_limits(command, closed, every) for i in inverse]
+    assert searched[:3] + searched[4:] == [False] * 3 + [True] * 2
 
 
 def test_a_rate_is_kept_where_the_closed_form_breaks_only_another_limit(tmp_path):

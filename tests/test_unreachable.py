@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import DEVICE
+from scipy.optimize import linprog
 
+import ctrlgen
 from ctrlgen import Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
@@ -94,6 +96,104 @@ def test_a_path_that_cannot_be_followed_is_explained(tmp_path, name):
         else:  # too long for IPOPT from afar, here: every pose alone
             static = TrajectoryProgramme(model, "pose", few)
             assert np.linalg.norm(static.optimum()[0].unreachable_by, axis=1).max() < FEASIBILITY_TOLERANCE, what
+
+
+STAGE = {"x": "80 um", "y": "80 um"}
+SQUARE_B = 0.2 * np.array([[1.0, 0.5, 0.0], [0.0, -0.5, 1.0]])  # N/V
+VOLTS = [(-100.0, 100.0), (0.0, 150.0), (-20.0, 130.0)]
+IN_PLANE = 'plane = ["x", "y"]\n'
+LINE = 'kind = "line"\nstart = {{ {0} = "{1}" }}\nend = {{ {0} = "{2}" }}\n'
+
+
+def stacks(rate=None):
+    """Three stacks on two axes of 1 N/um."""
+    return ctrlgen.user_device(
+        "stacks", parameters={"g": "0.2 N/V", "k": "1 N/um"}, axes=STAGE, drive_rate=None if rate is None else {"a": rate},
+        drive={"a": "100 V", "b": ("0 V", "150 V"), "c": ("-20 V", "130 V")}, restoring_force=lambda d, p: p.k * d.vector,
+        force=lambda u, p: [p.g * (u.a + 0.5 * u.b), p.g * (u.c - 0.5 * u.b)],
+    )  # fmt: skip
+
+
+def pushed(path, rate, h, closed):
+    """By a linear programme over all samples and drives of `stacks`."""
+    n = len(path)
+    held = np.roll(path, -1, axis=0) if closed else np.vstack([path[1:], path[-1:]])
+    step = np.eye(n) - np.roll(np.eye(n), 1, axis=0)
+    change = np.kron(step if closed else step[1:], [[1.0, 0.0, 0.0]])
+    allowed = np.full(len(change), np.inf if rate is None else rate * h * (1 + 1e-6))
+    return linprog(
+        np.zeros(3 * n), A_eq=np.kron(np.eye(n), SQUARE_B), b_eq=1e6 * held.ravel(), bounds=VOLTS * n,
+        A_ub=np.vstack([change, -change]) if rate else None, b_ub=np.tile(allowed, 2) if rate else None,
+    ).status == 0  # fmt: skip
+
+
+def moved(path, h, mass, damping, stiffness, force, limit):
+    """Whether the inverse dynamics of one axis, by differences, stay below the drive's limit."""
+    d = path[:, 0]
+    v = np.gradient(d, h)
+    drive = (mass * np.gradient(v, h) + damping * v + stiffness * d) / force
+    return np.abs(drive).max() <= 1.01 * limit  # the differences' error
+
+
+AXIS = (0.5, 30.0, 0.2e6, 10.0, 4.0)  # of flexure_axis.toml: kg, N*s/m, N/m, N/V, V
+OTHERS = {  # device, what of its file is written anew, rate, duration, path, what is said, whether an alternative can be followed
+    "lever stage, 150 V do not reach": (
+        "xy_lever_stage", (), 2000, 0.1, CIRCLE.format("90 um") + 'centre = { delta_x = "-40 um", delta_y = "-40 um" }', "drive of", None,
+    ),
+    "lever stage, rate of its amplifiers": (
+        "xy_lever_stage", ('low = "0 V"\n', 'low = "0 V"\nrate = "0.5 V/ms"\n'), 2000, 0.1,
+        CIRCLE.format("40 um") + 'centre = { delta_x = "-40 um", delta_y = "-40 um" }', "the path is too fast", None,
+    ),
+    "mirror without bias": ("tip_tilt_mirror", (), 1000, 0.2, CIRCLE.format("0.6 mrad") + 'plane = ["theta_x", "theta_y"]\n', "leg_", None),
+    "mirror, 100 V do not reach": (
+        "tip_tilt_mirror", (), 1000, 0.2, LINE.format("delta_z", "2 um", "25 um"), "amplifier output of leg", None,
+    ),
+    "axis with inertia, beyond its drive": ("flexure_axis", (), 5000, 0.1, LINE.format("axis", "0 um", "500 um"), "axis", AXIS),
+    "axis with inertia, too fast": ("flexure_axis", (), 20000, 0.0016, LINE.format("axis", "0 um", "90 um"), "drive of axis", AXIS),
+    "more drives than axes, too large": (stacks(), (), 1000, 0.2, CIRCLE.format("60 um") + IN_PLANE, "drive of", None),
+    "more drives than axes, rate": (stacks("0.3 V/ms"), (), 1000, 0.3, CIRCLE.format("22 um") + IN_PLANE, "the path is too fast", 300.0),
+    "more drives than axes, rate on a line": (
+        stacks("0.2 V/ms"), (), 1000, 0.25, 'kind = "line"\nend = { x = "26 um", y = "6 um" }\n', "the path is too fast", 200.0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_one_of_another_device_is_explained_too(tmp_path, name):
+    device, (*changed,), rate, duration, path, says, reference = OTHERS[name]
+    file = "device.toml" if isinstance(device, str) else device.name
+    (tmp_path / "scenario.toml").write_text(
+        f'title = "t"\ndevice = "{file}"\nsample_rate = "{rate} Hz"\nduration = "{duration} s"\n[path]\n{path}\n'
+    )
+    if isinstance(device, str):
+        text = (DEVICES / f"{device}.toml").read_text()
+        assert not changed or changed[0] in text
+        (tmp_path / "device.toml").write_text(text.replace(*changed) if changed else text)
+        scenario = load_scenario(tmp_path)
+    else:
+        scenario = load_scenario(tmp_path, device)
+    model, h = build_model(scenario.device), 1 / rate
+    with pytest.raises(Unreachable) as caught:
+        solve(scenario, model)
+    message, found = str(caught.value), caught.value.infeasibility
+    assert says in message and f"sample {found.worst} at" in message
+    assert found.alternatives
+    for what, command in found.alternatives.items():
+        assert what in message
+        if model.redundant:
+            assert pushed(command, reference, h, scenario.closed), what
+        elif isinstance(reference, tuple):
+            assert moved(command, h, *reference), what
+        else:
+            assert followed_by_ipopt(model, scenario, command), what
+    if model.redundant:
+        assert not pushed(scenario.command(model), reference, h, scenario.closed)
+    if isinstance(reference, tuple):
+        assert not moved(scenario.command(model), h, *reference)
+
+
+def test_thirty_are_named():
+    assert len(CASES) + len(OTHERS) == 30
 
 
 def drawn(rng: np.random.Generator, folder):

@@ -49,5 +49,8 @@ def print_budget(budget: ErrorBudget) -> None:
         )
         style = None if a.passed else "yellow"
         out.print(f"{budget.draws} draws: {both}; they {verdict}: {off}", markup=False, soft_wrap=True, style=style)
+    if budget.broken is not None:
+        share = f"{100 * budget.broken:.3g} % of them break a limit somewhere along the path"
+        out.print(share, markup=False, soft_wrap=True, style="red" if budget.broken > 1 - budget.probability else None)
     for reason in (*budget.reasons, *budget.notes):
         out.print(reason, markup=False, soft_wrap=True, style="yellow")

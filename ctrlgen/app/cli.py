@@ -9,7 +9,14 @@ from collections.abc import Callable
 
 import typer
 
-from ctrlgen.app.commands import budgets, controllers, devices, examples, recordings  # noqa: F401, they register their commands
+from ctrlgen.app.commands import (  # noqa: F401, they register their commands
+    budgets,
+    controllers,
+    devices,
+    examples,
+    fastest_paths,
+    recordings,
+)
 from ctrlgen.app.commands.app import app
 from ctrlgen.app.console import CHECK, complain, err, shows_warnings
 from ctrlgen.core.errors import CtrlgenError, Unreachable

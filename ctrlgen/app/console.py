@@ -26,14 +26,23 @@ if TYPE_CHECKING:
     from ctrlgen.app.batch import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
     from ctrlgen.diagnosis.selection.result import Diagnosis
+    from ctrlgen.model.model import Model
     from ctrlgen.reporting.build_record import Build
     from ctrlgen.reproduce.row import PrintedNumber
+    from ctrlgen.trajectory.scenario import Scenario
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
 Column = tuple[str, Literal["left", "right"]]  # of a table: its heading and how it is aligned
 SHOWN_COSTS = ("scenario", "worst", "player")
 CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
+
+
+def print_shaper(scenario: Scenario, model: Model) -> None:
+    """The mode that a shaped path leaves at rest, and by how much longer it lasts; nothing where it is not shaped."""
+    if (used := scenario.shaper(model)) is not None:
+        mode = f"{show(used.frequency, 'Hz')}, damping ratio {used.damping_ratio:.3g}"
+        out.print(f"shaped by {used.kind} for a mode of {mode}: {show(used.times[-1], 's')} longer", soft_wrap=True)
 
 
 def print_solution(outcome: pipeline.Outcome) -> None:
@@ -46,6 +55,7 @@ def print_solution(outcome: pipeline.Outcome) -> None:
     out.print(
         f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, {solved}", soft_wrap=True
     )
+    print_shaper(scenario, solution.model)
     if solution.between_samples is not None:
         signal = solution.model.signals[scenario.file.follow]
         error = np.abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)
@@ -53,8 +63,16 @@ def print_solution(outcome: pipeline.Outcome) -> None:
             signal.channels, signal.units, error, solution.between_samples, strict=True
         ):
             out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
+    if (sentence := report.robust_sentence(solution)) is not None:
+        out.print(sentence, markup=False, soft_wrap=True)
+    robust: tuple[Column, ...] = (("reserved", "right"),) if sentence is not None else ()
     table = table_of(
-        ("limit", "left"), ("closest at", "left"), ("value", "right"), ("bound", "right"), ("range left", "right")
+        ("limit", "left"),
+        ("closest at", "left"),
+        ("value", "right"),
+        ("bound", "right"),
+        *robust,
+        ("range left", "right"),
     )
     for margin in solution.margins:
         unit, tightest = margin.limit.unit, margin is solution.tightest
@@ -62,7 +80,9 @@ def print_solution(outcome: pipeline.Outcome) -> None:
         where = f"{margin.channel}, " + (
             f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
         )
-        row = (margin.limit.label, where, show(margin.value, unit), show(margin.bound, unit), share)
+        reserved = (show(margin.reserve, "K" if unit == "degC" else unit, 3) if margin.reserve else "",) * len(robust)
+        bound = show(margin.limit.described(margin.bound), unit)
+        row = (margin.limit.label, where, show(margin.value, unit), bound, *reserved, share)
         table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
     show_table(table)
     if outcome.expected:

@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
+from ctrlgen.firmware.fmu import Fmus, write_fmus
 from ctrlgen.firmware.folder import CFolder, generate
 from ctrlgen.firmware.player_only import check_online, generate_player
 from ctrlgen.firmware.toolchains import find_compilers
@@ -26,7 +28,7 @@ from ctrlgen.reporting.build_record import Build
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.metrics import ExpectationResult, expectations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
-from ctrlgen.trajectory.solution import Solution, solve
+from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.workspace import Ball, Workspace
 from ctrlgen.verification.comparison import Comparison, compare
 from ctrlgen.verification.hostile import check_hostile
@@ -149,12 +151,19 @@ def player_into(scenario: Scenario | Path | str, out: Path | str, progress: Prog
     return [Path(out) / path.name for path in written]
 
 
+def fmus_into(scenario: Scenario, out: Path, fmi: int) -> Fmus:
+    """Writes controller and plant as FMI units; only of a robust scenario is the path solved, for the controller's limits. Raises as
+    `write_fmus` and `solve_scenario`."""
+    limited = None if scenario.file.robust is None else solve_scenario(scenario).model
+    return write_fmus(scenario, out, fmi, limited)
+
+
 def _with_online(scenario: Scenario | Path | str) -> Scenario:
     """The scenario, of a device whose drives the online C can compute. Raises InputError before anything is solved."""
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     with warnings.catch_warnings():  # solving says them
         warnings.simplefilter("ignore")
-        check_online(model_of(scenario))
+        check_online(scenario, model_of(scenario))
     return scenario
 
 

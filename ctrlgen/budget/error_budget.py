@@ -14,15 +14,16 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import norm
 
-from ctrlgen.budget.limits import Safety, critical_samples, margins, safeties, slopes_of_limits
+from ctrlgen.budget.limits import DrawnLimits, Safety, critical_samples, margins, safeties, slopes_of_limits
 from ctrlgen.budget.linear import Propagated, propagate
 from ctrlgen.budget.monte_carlo import Drawn, draw
+from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import difference, same_dimension
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
-from ctrlgen.trajectory.solution import Solution, solve
+from ctrlgen.trajectory.solution import Solution
 
 DRAWS = 10_000  # of JCGM 101 7.2.1 the smallest that gives a 95 % interval to two digits
 FEWEST_DRAWS = 200  # the sd of as many draws is itself known to 5 %
@@ -123,6 +124,11 @@ class ErrorBudget:
         return _rms(self.combined[:, group.channels])
 
     @property
+    def broken(self) -> float | None:
+        """The share of the draws that break a limit anywhere on the path; None without draws."""
+        return None if self.drawn is None else float(self.drawn.broken.mean())
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What a reader should know of how the budget was made."""
         lost = 0 if self.drawn is None else self.drawn.lost
@@ -211,7 +217,7 @@ def budget_of(
     drawn = None
     if draws:
         progress(f"{draws} draws")
-        drawn = draw(path, linear, _kept(combined, groups), critical, draws, seed)
+        drawn = draw(path, linear, DrawnLimits(found, slopes), _kept(combined, groups), critical, draws, seed)
         if drawn.lost > MOST_LOST * draws:
             raise SolverError(
                 f"{drawn.lost} of {draws} draws ended in no number: some sds are so large that a draw is no device any more; lower them"

@@ -22,6 +22,7 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.model.model import Model
 
 LEAST_TAIL = 5  # draws beyond a quantile, below which it is not estimated
+FAR = 6.0  # standard uncertainties from a limit: no draw of a million breaks it
 SAME = 1e-12  # relative change of a bound that is rounding
 
 
@@ -65,7 +66,7 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
     values = {path_: number.si for path_, number in path.model.device.quantities()}
     channels = len(path.channels)
     slopes = Slopes(np.zeros((channels, n)), np.zeros((channels, n)), np.zeros((path.n, channels, n)))
-    before = _bounds(path, path.solution.model)
+    before = _bounds(path, path.model)
     trace = path.solution.trace
 
     def model_with(columns: Sequence[int]) -> Model:
@@ -132,11 +133,18 @@ def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) ->
 @dataclass(frozen=True)
 class Margins:
     """Of the lower and the upper bound of each limited quantity: the margin (2, n, channels), infinite without a bound, its sd, and the
-    `bounds` (2, channels)."""
+    `bounds` (2, channels). Of the sd `lasting` (2, n, channels) is what lasts along the path, `scattered` (n, channels) what is
+    independent from sample to sample."""
 
     margin: np.ndarray
-    sd: np.ndarray
+    lasting: np.ndarray
+    scattered: np.ndarray
     bounds: np.ndarray
+
+    @property
+    def sd(self) -> np.ndarray:
+        """(2, n, channels) both together."""
+        return np.hypot(self.lasting, self.scattered)
 
     def least(self, z: float) -> np.ndarray:
         """(2, n, channels) what is left of the margins at the quantile z."""
@@ -145,15 +153,35 @@ class Margins:
 
 def margins(path: UncertainPath, linear: Propagated, slopes: Slopes) -> Margins:
     """Both sides' margins with their standard uncertainties, to first order."""
-    y, bounds = linear.nominal["limits"], _bounds(path, path.solution.model)
+    y, bounds = linear.nominal["limits"], _bounds(path, path.model)
     margin = np.stack([y - bounds[0], bounds[1] - y])
     by_numbers = linear.sensitivity["limits"] + slopes.direct
     scattered = sum((sd**2 for sd in linear.scatter["limits"].values()), np.zeros(y.shape))
     sds = []
     for bound in (slopes.lower, slopes.upper):
         G = by_numbers - bound
-        sds.append(np.sqrt(np.maximum(np.sum((G @ path.uncertainties.covariance) * G, axis=2), 0.0) + scattered))
-    return Margins(margin, np.stack(sds), bounds)
+        sds.append(np.sqrt(np.maximum(np.sum((G @ path.uncertainties.covariance) * G, axis=2), 0.0)))
+    return Margins(margin, np.stack(sds), np.sqrt(scattered), bounds)
+
+
+@dataclass(frozen=True)
+class DrawnLimits:
+    """The limits of draws along the path."""
+
+    found: Margins
+    slopes: Slopes
+
+    def near(self, sample: int) -> np.ndarray:
+        """(2, channels) which bounds some draws may break at a sample."""
+        return np.asarray(self.found.margin[:, sample] < FAR * self.found.sd[:, sample])
+
+    def broken(self, sample: int, values: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """(draws,) which draws, with the limited quantities (draws, channels) and deviations (draws, m), break one of those."""
+        y = values + columns @ self.slopes.direct[sample].T
+        (lower, upper), near = self.found.bounds, self.near(sample)
+        below = (y < lower + columns @ self.slopes.lower.T) & near[0]
+        above = (y > upper + columns @ self.slopes.upper.T) & near[1]
+        return np.asarray((below | above).any(axis=1))
 
 
 def safeties(

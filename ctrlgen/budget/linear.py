@@ -129,6 +129,12 @@ def _with_gains(by_q: np.ndarray, by_drive: np.ndarray, v: np.ndarray) -> np.nda
 
 def _slopes(path: UncertainPath, name: str) -> ca.Function:
     """(S, v) -> derivatives of a part of the path by S, v and q, at the described numbers."""
+    if name not in path.slopes:
+        path.slopes[name] = _made_slopes(path, name)
+    return path.slopes[name]
+
+
+def _made_slopes(path: UncertainPath, name: str) -> ca.Function:
     constants = path.constants[name]
     S, u = path.state, path.model.u
     c = ca.SX.sym("c", constants.numel_out(0))

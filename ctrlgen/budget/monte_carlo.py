@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -20,11 +21,21 @@ from ctrlgen.numerics.compiled import Compilable
 STEP_ERROR = 1e-3  # of the combined uncertainty: what a step of a draw may leave
 
 
+class Limited(Protocol):
+    """What is asked of the limits along the path."""
+
+    def near(self, sample: int) -> np.ndarray:
+        """(2, channels) which bounds some draws may break at a sample."""
+
+    def broken(self, sample: int, values: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """(draws,) which draws, with the limited quantities (draws, channels) and deviations (draws, m), break one of those."""
+
+
 @dataclass(frozen=True)
 class Drawn:
     """What the draws gave, SI: deviations of the followed signal `pose` (draws, kept, n_y) at the samples `kept`; limited quantities
     `limits` (draws, 2, channels), each at its own sample for the lower and the upper bound; `columns` (draws, m) the deviations that
-    were drawn; `lost`, how many further draws ended in no number.
+    were drawn; `lost`, how many further draws ended in no number; `broken` (draws,), which of them break a limit anywhere on the path.
 
     `alone` (2, m, kept, n_y): the pose's deviations with each column alone at plus and minus its standard deviation, nothing scattering.
     """
@@ -35,14 +46,22 @@ class Drawn:
     columns: np.ndarray
     alone: np.ndarray
     lost: int
+    broken: np.ndarray
 
 
 def draw(
-    path: UncertainPath, linear: Propagated, kept: np.ndarray, critical: np.ndarray, draws: int, seed: int
+    path: UncertainPath,
+    linear: Propagated,
+    limited: Limited,
+    kept: np.ndarray,
+    critical: np.ndarray,
+    draws: int,
+    seed: int,
 ) -> Drawn:
     """`draws` devices led along the path, compared with its nominal pose in `linear` at the samples `kept`.
 
-    `critical` (2, channels): the sample at which each limited quantity is kept, for its lower and its upper bound.
+    `critical` (2, channels): the sample at which each limited quantity is kept, for its lower and its upper bound; `limited` says
+    where the draws may break a limit.
     """
     rng, stated, pose = np.random.default_rng(seed), path.uncertainties, linear.nominal["pose"]
     m = len(stated.sds)
@@ -59,6 +78,7 @@ def draw(
     S = np.tile(path.start, (len(q), 1))
     found = np.empty((len(q), len(kept), pose.shape[1]))
     limits = np.empty((len(q), *critical.shape))
+    broken = np.zeros(draws, bool)
     place = {int(k): i for i, k in enumerate(kept)}
     for k, v in enumerate(path.drive):
         drive = v * gain + scatter.at(k)
@@ -66,12 +86,15 @@ def draw(
         sample = k - path.before
         if sample in place:
             found[:, place[sample]] = outputs["pose"](S, drive) - pose[sample]
-        if np.any(here := critical == sample):
-            limits[:, here] = np.stack([outputs["limits"](S, drive)] * 2, axis=1)[:, here]
+        here = critical == sample
+        if sample >= 0 and (np.any(here) or limited.near(sample).any()):
+            values = outputs["limits"](S, drive)
+            limits[:, here] = np.stack([values] * 2, axis=1)[:, here]
+            broken |= limited.broken(sample, values[:draws], deviations)
     good = np.isfinite(found[:draws]).all(axis=(1, 2)) & np.isfinite(limits[:draws]).all(axis=(1, 2))
     return Drawn(
         kept, found[:draws][good], limits[:draws][good], deviations[good],
-        (found[draws:-1] - found[-1]).reshape(2, m, *found.shape[1:]), int((~good).sum()),
+        (found[draws:-1] - found[-1]).reshape(2, m, *found.shape[1:]), int((~good).sum()), broken[good],
     )  # fmt: skip
 
 

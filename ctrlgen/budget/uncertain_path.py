@@ -9,6 +9,7 @@ limited quantities:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from math import ceil, inf
 
@@ -57,8 +58,17 @@ class UncertainPath:
         self._add("step", self._following(NEWTON_STEPS))
         self._add("pose", self.signal.expr)
         self._add("limits", ca.vertcat(ca.SX(0, 1), *(limit.expr for limit in self.limits)))
+        self.slopes: dict[str, ca.Function] = {}  # of the parts, by name, once they are needed
         self.drive, self.before = self._drives()
         self.start = self._start()
+
+    def along(self, solution: Solution) -> UncertainPath:
+        """The same device along another path."""
+        other = copy(self)
+        other.solution = solution
+        other.drive, other.before = other._drives()
+        other.start = other._start()
+        return other
 
     def _following(self, newton_steps: int) -> ca.SX:
         sample = one_step_map(self.model, self.sample_time, newton_steps=newton_steps)
@@ -96,6 +106,12 @@ class UncertainPath:
     def channels(self) -> list[tuple[Limit, int]]:
         """Each limited quantity: its limit and its place there."""
         return [(limit, i) for limit in self.limits for i in range(limit.expr.numel())]
+
+    @property
+    def places(self) -> list[tuple[Limit, slice]]:
+        """Each limit with the places of its limited quantities."""
+        ends = np.cumsum([limit.expr.numel() for limit in self.limits]).tolist()
+        return [(limit, slice(end - limit.expr.numel(), end)) for limit, end in zip(self.limits, ends, strict=True)]
 
     def _drives(self) -> tuple[np.ndarray, int]:
         """v (before + n, n_u), and how many of them stand before the path.

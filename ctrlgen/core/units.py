@@ -240,6 +240,15 @@ class In(GroupedMetadata):
         yield WithJsonSchema(schema)
 
 
+def read_probability(text: str) -> float:
+    """0.999 for '99.9 %' and for '0.999'. Raises ValueError that says what to write instead."""
+    body = text.strip()
+    try:
+        return float(body.removesuffix("%")) / (100 if body.endswith("%") else 1)
+    except ValueError:
+        raise ValueError(f'{text!r} is not a probability; write "99.9 %" or 0.999') from None
+
+
 def show(si: float, unit: str, digits: int = 4) -> str:
     """The text of an SI number in `unit`, such as '31.53 um'."""
     return f"{from_si(si, unit):.{digits}g} {unit if unit != '1' else ''}".strip()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import casadi as ca
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ctrlgen.core.units import Quantity
+from ctrlgen.devices.run_time import RunTime, RunTimeConstant, run_time_constants
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.effects import Effect, EffectTable
@@ -43,7 +44,10 @@ class Limit:
     """lower <= expr <= upper for each channel, SI; None where there is no bound.
 
     A limit on an expression that is not a variable of the model itself must be convex in the displacement, never negative,
-    and zero at home: the controller keeps it by scaling the displacement toward home.
+    and zero at home: the controller keeps it by scaling the displacement toward home. A device may state a bound in terms of its
+    numbers, so that it follows one that is free; a model has the number.
+
+    `reserve` [SI]: by how much the lower and the upper bound of the device have been tightened for what is not known exactly.
     """
 
     name: str
@@ -53,6 +57,17 @@ class Limit:
     expr: ca.SX
     lower: float | None = None
     upper: float | None = None
+    reserve: tuple[float, float] = (0.0, 0.0)
+
+    def tightened(self, below: float, above: float) -> Limit:
+        """The same with its bounds moved inward by `below` and `above`, which are added to what has been reserved."""
+        lower = None if self.lower is None else self.lower + below
+        upper = None if self.upper is None else self.upper - above
+        return replace(self, lower=lower, upper=upper, reserve=(self.reserve[0] + below, self.reserve[1] + above))
+
+    def described(self, bound: float) -> float:
+        """The device's own bound, of which `bound` is the tightened one."""
+        return bound - self.reserve[0] if bound == self.lower else bound + self.reserve[1]
 
 
 def rate_limit(drive: Signal, i: int, low: float, high: float, unit: str) -> Limit:
@@ -115,7 +130,8 @@ class DevicePhysics:
     `documented`: for a map, the functions whose docstrings state its equation and source; the generated C repeats them.
     `bipolar` says whether the drive has both signs. `rate_limits` are on the change of drives by time (`rate_limit`).
     `drive_weights` say how much each drive counts where there are more of them than axes, all the same where it is empty.
-    The readings are the pose, and behind it those of the `sensed` points.
+    The readings are the pose, and behind it those of the `sensed` points. `second_order_kinematics` (d) is what finite
+    rotations add to the pose of a mechanism whose `pose` is of first order, None where nothing states it.
     """
 
     axes: tuple[str, ...]
@@ -138,6 +154,7 @@ class DevicePhysics:
     bipolar: bool = True
     documented: Mapping[str, Sequence[Callable[..., Any]]] = field(default_factory=dict)
     sensed: SensedPoints | None = None
+    second_order_kinematics: Callable[[ca.SX], ca.SX] | None = None
 
     @property
     def readings(self) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
@@ -153,15 +170,13 @@ class BalancedPhysics(DevicePhysics):
     The states follow x' = rates(x, w), w = heating_power(u); `power` shows w where it is a heater's power, and is None
     where the device has no heaters. `force_unit` is that of the balance: a length where the drive commands the
     displacement itself.
-    `loop_closure` (pose, d) is zero (n_pose,) where the links of a mechanism whose `pose` is linear keep their lengths, to
-    second order; `tangent_compliance` (d) by how much less the stages yield to the links' load at d than at home.
+    `tangent_compliance` (d) is by how much less the stages yield to the links' load at d than at home.
     """
 
     force: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     rates: Callable[[ca.SX, ca.SX], ca.SX] = lambda x, heat: ca.SX(0, 1)
     heating_power: Callable[[ca.SX], ca.SX] = lambda u: u
     power: AxisSignal | None = None
-    loop_closure: Callable[[ca.SX, ca.SX], ca.SX] | None = None
     tangent_compliance: Callable[[ca.SX], ca.SX] | None = None
 
 
@@ -218,12 +233,26 @@ class Device(Section):
     """`[[sensor]]` tables: what reads the channels of the pose. They do not enter the model; `ctrlgen check` gives
     their resolution and range, `ctrlgen.simulate_sensors` their recordings.
     """
+    run_time: RunTime | None = None
+    """`[run_time]`: which of these numbers the generated controller is given when it starts, because they differ between specimens or
+    drift. Without it every number is compiled in.
+    """
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         kinds = getattr(cls.model_fields["kind"].annotation, "__args__", ())
         if kinds:  # a device that is not read from a file has no name for its kind
             Device.library[kinds[0]] = cls
+
+    @model_validator(mode="after")
+    def _run_time_numbers(self) -> Device:
+        run_time_constants(self)
+        return self
+
+    @property
+    def given_at_start(self) -> tuple[RunTimeConstant, ...]:
+        """The numbers that the generated controller is given when it starts."""
+        return run_time_constants(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The device's physics with the values `p` (SI numbers, or symbols where they are free)."""

@@ -7,6 +7,7 @@ from typing import Any
 from ctrlgen.core.units import Quantity, from_si, written_unit
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.section import Section
+from ctrlgen.effects import Effect
 
 
 def written(si: float, unit: str, source: str | None = None) -> Quantity:
@@ -23,11 +24,12 @@ def changed(device: Device, values: dict[str, float]) -> Device:
             return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
         if isinstance(node, Section):
             fields = {
-                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key)
-                for key in type(node).model_fields
-                if key != "effect"
+                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key) for key in type(node).model_fields
             }
             return node.model_copy(update=fields)
+        if isinstance(node, Effect):
+            own = {key: walk(value, f"{prefix}.{key}") for key, value in node.values.items()}
+            return node if own == node.values else type(node)(node.at, own, node.of)
         if isinstance(node, tuple):
             return tuple(walk(member, f"{prefix}[{i}]") for i, member in enumerate(node))
         return node

@@ -67,6 +67,8 @@ class Mechanism(Device):
     """`[[reading]]` tables: what is read beside the output."""
     dynamics: Dynamics | None = None
     """`[dynamics]`: where inertia counts."""
+    kinematics: Literal["first_order", "second_order"] = "first_order"
+    """Pose and force to first order in the displacements, or with finite rotations and with flexures that shorten as they bend."""
 
     @model_validator(mode="after")
     def _refers_to_what_there_is(self) -> Mechanism:
@@ -118,6 +120,7 @@ class Mechanism(Device):
                 "element: at the largest travel the cubic springs push harder than the flexures beside them can hold (or soften "
                 "until nothing holds them); lower their k_3, or the travel"
             )
+        faults += self._beyond_second_order()
         if not faults:
             faults += self._unmoved()
         if not faults and self.dynamics is not None:
@@ -146,6 +149,19 @@ class Mechanism(Device):
                 "dynamics: the actuators move no mass in some direction; give mass and inertia to the bodies that they move"
             ]
         return []
+
+    def _beyond_second_order(self) -> list[str]:
+        """What the expansion of the equilibrium does not hold."""
+        stiffens = [e.name for e in self.element if getattr(e, "geometric_stiffening", False)]
+        faults, asked = [], "geometric_stiffening" if stiffens else "kinematics" if self.second_order else ""
+        if asked and any(isinstance(e, Spring) and e.cubic for e in self.element):
+            faults.append(f"{asked}: the second order is that of linear flexures; leave it out, or the springs' k_3")
+        if stiffens and self.actuator and self.actuator[0].kind == "displacement":
+            faults.append(
+                f"geometric_stiffening: of {', '.join(stiffens)} has no effect where actuators prescribe displacements; leave it out, "
+                'and write kinematics = "second_order"'
+            )
+        return faults
 
     def _unmoved(self) -> list[str]:
         """Channels that no actuator moves, or that move only together."""
@@ -209,6 +225,16 @@ class Mechanism(Device):
         if self.output.body not in self.bodies:
             faults.append(f"output.body: {self.output.body!r} is no body; there are {', '.join(self.bodies)}")
         return faults
+
+    @property
+    def second_order(self) -> bool:
+        """Whether pose and force are of second order at least."""
+        return self.kinematics == "second_order" or self.geometric_stiffening
+
+    @property
+    def geometric_stiffening(self) -> bool:
+        """Whether the energy is of fourth order, as an element states."""
+        return any(getattr(e, "geometric_stiffening", False) for e in self.element)
 
     @cached_property
     def bodies(self) -> tuple[str, ...]:

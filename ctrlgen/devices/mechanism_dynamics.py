@@ -10,6 +10,7 @@ from scipy.linalg import eigh
 
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism_model import Condensed, Drawing
+from ctrlgen.devices.mechanism_second_order import SecondOrder
 from ctrlgen.physics.mechanism import GROUND
 from ctrlgen.physics.screw import inverse_adjoint
 
@@ -172,7 +173,19 @@ def summary(device: Drawing) -> list[str]:
             f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )
         lines.append(f"{channel}: {parts or 'not moved'}")
-    return lines
+    return lines + (_second_order_lines(c) if device.second_order else [])
+
+
+def _second_order_lines(c: Condensed) -> list[str]:
+    """What the second order adds to the channels that are followed, at the largest travels, whatever their signs."""
+    found = np.abs(ca.DM(ca.evalf(ca.SX(SecondOrder(c).output))).full())
+    travel = np.array([a.section.travel.si for a in c.device.placed_actuators])
+    reach = np.abs(ca.DM(SecondOrder(c).products(ca.DM(travel))).full()).ravel()
+    shown = (
+        f"{name} {show(value, 'urad' if name.startswith('theta') else 'um')}"
+        for name, value in zip(c.device.output.channels, found @ reach, strict=True)
+    )
+    return [f"second order at the largest travels, at most: {', '.join(shown)}"]
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from ctrlgen.devices.hinge import Hinge
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import circular_hinge, flexure, mechanism
 from ctrlgen.physics.screw import Matrix, inverse, move, series
+from ctrlgen.physics.second_order_flexure import Segment
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 Length = Annotated[Quantity, In("mm", positive=True)]
@@ -87,6 +88,10 @@ class Joining(Section):
         """Distance between its ends [m]; None where it says none."""
         return None
 
+    def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
+        """The uniform pieces that it consists of, from its fixed end; none of one that yields at one point, its pivot."""
+        return ()
+
     def pivot(self, p: SimpleNamespace) -> Any:
         """How far from its free end toward the fixed one the point lies at which it holds its ideal directions [m]."""
         return 0.0
@@ -134,6 +139,8 @@ class Beam(Flexible):
 
     length: Length
     """Length between its ends."""
+    geometric_stiffening: bool = False
+    """Whether it stretches where its ends are held as it bends, and an axial load makes it stiffer or softer across."""
 
     def reach(self, p: SimpleNamespace) -> Any:
         """Its length."""
@@ -174,6 +181,10 @@ class Blade(Beam):
         """[C] about the free end (6, 6). Source: S1 eq. (21)-(23)."""
         return flexure.blade_compliance(p.length, p.thickness, p.width, m.young, m.poisson)
 
+    def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
+        """One."""
+        return (Segment(p.length, *flexure.blade_rigidity(p.thickness, p.width, m.young, m.poisson)),)
+
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Of the rectangle."""
         return flexure.rectangular_section(p.thickness, p.width)
@@ -193,6 +204,10 @@ class Wire(Beam):
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6). Source: S1 eq. (24)."""
         return flexure.wire_compliance(p.length, p.diameter, m.young, m.poisson)
+
+    def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
+        """One."""
+        return (Segment(p.length, *flexure.wire_rigidity(p.diameter, m.young, m.poisson)),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Of the wire."""
@@ -227,6 +242,12 @@ class Strut(Beam):
         rod = flexure.wire_compliance(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson)
         lower = move(wire, None, (p.wire_length - p.length, 0, 0))
         return series((lower, move(rod, None, (-p.wire_length, 0, 0)), wire))
+
+    def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
+        """Wire, rod, wire."""
+        wire = Segment(p.wire_length, *flexure.wire_rigidity(p.wire_diameter, m.young, m.poisson))
+        rod = flexure.wire_rigidity(p.rod_diameter, m.young, m.poisson)
+        return wire, Segment(p.length - 2 * p.wire_length, *rod), wire
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Of its wires."""

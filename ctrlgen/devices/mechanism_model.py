@@ -33,6 +33,16 @@ class Drawing(Protocol):
     dynamics: Any
 
     @property
+    def second_order(self) -> bool:
+        """Whether pose and force are of second order at least."""
+        ...
+
+    @property
+    def geometric_stiffening(self) -> bool:
+        """Whether the energy is of fourth order, as an element states."""
+        ...
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """The names of all bodies, copies with their number."""
         ...
@@ -155,7 +165,7 @@ class Condensed:
         self.stiffness, self.beside = ca.DM.eye(n), ca.DM.zeros(n, columns - n)
         self.twists = per_input
         if self.pushes:
-            travel = ca.vertcat(*(self._travel(i, per_input) for i in range(n)))
+            travel = ca.vertcat(*(self.travel(i, per_input) for i in range(n)))
             self.stiffness = ca.solve(travel[:, :n], ca.DM.eye(n))  # [N/m] force per displacement of the axes
             self.beside = -ca.mtimes(self.stiffness, travel[:, n:])  # (n, m) force on the axes per g, the axes held
             self.twists = [
@@ -247,8 +257,8 @@ class Condensed:
         name = f"{a.section.on}_{a.copy}" if a.copy else a.section.on
         return next(k for k, e in enumerate(self.device.placed_elements) if e.name == name)
 
-    def _travel(self, i: int, twists: list[Matrix]) -> Matrix:
-        """(1, n) travel of actuator i."""
+    def travel(self, i: int, twists: list[Matrix]) -> Matrix:
+        """(1, m) travel of actuator i in the motions `twists` (6, m) of all bodies."""
         a = self.device.placed_actuators[i]
         row = mechanism.point_motion(self.point(a), self.directions[i])
         ends = [ca.mtimes(row, twists[b]) if b != GROUND else 0 for b in (a.second, a.first)]
@@ -271,9 +281,9 @@ class Condensed:
         return self.output_motion[[TWIST.index(c) for c in self.device.output.channels], :]
 
     @property
-    def reading_motion(self) -> Matrix:
-        """(readings, n + m): what the readings beside those of the output see per q [m, rad]."""
-        rows = [ca.SX(0, self.twists[0].shape[1])]
+    def reading_rows(self) -> list[Matrix]:
+        """(1, 6) of each reading beside those of the output: what it sees of a body's twist [m, rad]."""
+        rows = []
         for r in self.device.placed_readings:
             direction, at = ca.mtimes(r.turn, _unit(r.section.direction)), self.p.reading[r.index].at
             row = ca.horzcat(direction.T, ca.DM.zeros(1, 3))
@@ -281,6 +291,14 @@ class Condensed:
                 row = mechanism.point_motion(ca.mtimes(r.turn, ca.vertcat(*at)), direction)
             elif float(ca.det(r.turn)) < 0:
                 row = -row  # the mirror image of a turn is one about the image of its axis, the other way round
+            rows.append(row)
+        return rows
+
+    @property
+    def reading_motion(self) -> Matrix:
+        """(readings, n + m): what the readings beside those of the output see per q [m, rad]."""
+        rows = [ca.SX(0, self.twists[0].shape[1])]
+        for r, row in zip(self.device.placed_readings, self.reading_rows, strict=True):
             ends = [ca.mtimes(row, self.twists[b]) if b != GROUND else 0 for b in (r.second, r.first)]
             rows.append(ends[0] - ends[1])
         return ca.vertcat(*rows)

@@ -11,6 +11,7 @@ from ctrlgen.core.units import written_unit
 from ctrlgen.devices.base import BalancedPhysics, DevicePhysics, InertialPhysics, Limit, SensedPoints, rate_limit
 from ctrlgen.devices.mechanism_drives import transduction
 from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism_second_order import SecondOrder
 from ctrlgen.physics.damping import modal_damping
 
 
@@ -20,8 +21,10 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     axes, sections = acting.drive.channels, [a.section for a in device.placed_actuators]
 
     def restoring_force_parts(d: ca.SX) -> dict[str, ca.SX]:
-        linear = ca.mtimes(c.held_stiffness, d)
-        return {"linear": linear, "cubic": c.restoring_force(d) - linear} if c.cubics else {}
+        linear, springs = ca.mtimes(c.held_stiffness, d), c.restoring_force(d)
+        if bent and c.pushes:
+            return {"linear": linear, "geometric": restoring_force(d) - springs}
+        return {"linear": linear, "cubic": springs - linear} if c.cubics else {}
 
     def limits(signal: SimpleNamespace) -> list[Limit]:
         found = acting.limits(signal)
@@ -30,14 +33,25 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
             found.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
         return found + _flexure_limits(c, signal.mechanism_displacement)
 
-    J, channels = c.jacobian, device.output.channels
+    J, channels, second = c.jacobian, device.output.channels, SecondOrder(c)
+    bent = device.second_order
+
+    def restoring_force(d: ca.SX) -> ca.SX:
+        force = c.restoring_force(d)
+        return force + second.restoring_force(d, device.geometric_stiffening) if bent and c.pushes else force
+
+    def pose(d: ca.SX) -> ca.SX:
+        linear = ca.mtimes(J, c.loads(d))
+        return linear + second.pose(d) if bent else linear
+
     common: dict[str, Any] = dict(
         axes=axes, components=channels, pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
         pose_scale=device.channel_scale, drive=acting.drive, state=acting.state, rest=acting.rest,
         displacement_scale=max(s.travel.si for s in sections), bipolar=any(low < 0 for low, _ in acting.drive_range),
         force_scale=acting.force_scale, force_unit="N" if c.pushes else "um",
-        restoring_force=c.restoring_force, restoring_force_parts=restoring_force_parts,
-        pose=lambda d: ca.mtimes(J, c.loads(d)), limits=limits, sensed=_sensed(c),
+        restoring_force=restoring_force, restoring_force_parts=restoring_force_parts,
+        pose=pose, limits=limits, sensed=_sensed(c, second if bent else None),
+        second_order_kinematics=None if bent or c.cubics else second.pose,
         rate_limits=tuple(
             rate_limit(acting.drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
             for i, s in enumerate(sections) if getattr(s, "rate", None) is not None
@@ -54,14 +68,19 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     )  # fmt: skip
 
 
-def _sensed(c: Condensed) -> SensedPoints | None:
-    """The readings beside those of the output."""
+def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
+    """The readings beside those of the output, to first order or to second."""
     readings, rows = c.device.placed_readings, c.reading_motion
     if not readings:
         return None
     units = tuple("um" if r.section.about is None else "urad" for r in readings)
     names = tuple(r.name for r in readings)
-    return SensedPoints(names, units, c.device.reading_scale, lambda d: ca.mtimes(rows, c.loads(d)))
+
+    def at(d: ca.SX) -> ca.SX:
+        linear = ca.mtimes(rows, c.loads(d))
+        return linear if second is None else linear + second.sensed(d)
+
+    return SensedPoints(names, units, c.device.reading_scale, at)
 
 
 def _flexure_limits(c: Condensed, d: ca.SX) -> list[Limit]:

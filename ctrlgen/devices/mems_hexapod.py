@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.linalg import eigh
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import AxisSignal, BalancedPhysics, Device, Limit, Section, Signal
+from ctrlgen.devices.base import (
+    AxisSignal,
+    BalancedPhysics,
+    Device,
+    DevicePhysics,
+    InertialPhysics,
+    Limit,
+    Section,
+    Signal,
+)
+from ctrlgen.numerics.second_order import second_order
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
+from ctrlgen.physics.damping import modal_damping
 
 Length = Annotated[Quantity, In("um", positive=True)]
 Angle = Annotated[Quantity, In("deg")]
 Count = Annotated[Quantity, In("1", positive=True, whole=True)]
+Inertia = Annotated[Quantity, In("mg*mm^2", positive=True)]
 Axis = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
 
 
@@ -153,8 +167,25 @@ class Hexapod(Section):
     """Largest stress at the ends of the wires; a limit."""
 
 
+class HexapodDynamics(Section):
+    """`[dynamics]`: the model has the inertia of stages, struts and platform, which move as they do at rest. Left out: it is in balance at
+    every moment."""
+
+    stage_mass: Annotated[Quantity, In("mg", positive=True)]
+    """What moves with a stage along one axis: its plate, and of levers and guides, which turn about an end, a third."""
+    platform_mass: Annotated[Quantity, In("mg", positive=True)]
+    """Mass of the platform, its centre half the `platform_thickness` below the origin."""
+    platform_inertia: tuple[Inertia, Inertia, Inertia]
+    """Its moments of inertia about axes along x, y and z through its centre of mass."""
+    strut_mass: Annotated[Quantity, In("mg", low=0.0)]
+    """Mass of one strut, a slender rod."""
+    damping_ratio: Annotated[Quantity, In("1", low=0.0, high=1.0)]
+    """Damping ratio of every mode at home."""
+
+
 class MemsHexapod(Device):
-    """Heater power -> temperature -> bar force = restoring force of the stage at its displacement -> pose.
+    """Heater power -> temperature -> bar force = restoring force of the stage at its displacement -> pose; with `[dynamics]` the
+    difference of the forces accelerates the masses.
 
     Displacements and forces count positive in the direction in which the actuators push.
     """
@@ -173,6 +204,8 @@ class MemsHexapod(Device):
     """One axis of an X-Y stage, all six alike."""
     hexapod: Hexapod
     """Struts and platform."""
+    dynamics: HexapodDynamics | None = None
+    """`[dynamics]`: where inertia counts."""
 
     @model_validator(mode="after")
     def _lengths_fit(self) -> MemsHexapod:
@@ -204,7 +237,7 @@ class MemsHexapod(Device):
             else []
         )
 
-    def physics(self, p: SimpleNamespace) -> BalancedPhysics:
+    def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """Equations of `ctrlgen.physics` with this device's numbers."""
         a, s, h = p.actuator, p.stage, p.hexapod
         C_XY = xy_stage.stage_compliance(s, a)
@@ -213,6 +246,7 @@ class MemsHexapod(Device):
         voltage = self.actuator.drive == "voltage"
         power_limit, resistance = self.actuator.power_limit.si, self.actuator.heater_resistance.si
         drive_limit = (power_limit * resistance) ** 0.5 if voltage else power_limit
+        most = (a.power_limit * a.heater_resistance) ** 0.5 if voltage else a.power_limit
         drive = Signal(
             "voltage" if voltage else "power",
             "heater voltage" if voltage else "heater power",
@@ -237,11 +271,8 @@ class MemsHexapod(Device):
             wire_stress = hexapod.wire_stress(signal.mechanism_displacement, loads, h)
             outermost = [4 * i + end for i in range(6) for end in (0, 3)]
             return [
-                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, drive_limit),
-                Limit(
-                    "temperature", state.label, self.axes, "degC", signal.state,
-                    self.actuator.ambient.si, self.actuator.temperature_limit.si,
-                ),
+                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, most),
+                Limit("temperature", state.label, self.axes, "degC", signal.state, a.ambient, a.temperature_limit),
                 Limit("force", "actuator force", self.axes, "N", signal.force, 0.0, None),
                 Limit("stroke", "stage displacement", self.axes, "um", d, 0.0, self.stage.stroke.si),
                 Limit(
@@ -254,7 +285,7 @@ class MemsHexapod(Device):
                 ),
             ]  # fmt: skip
 
-        return BalancedPhysics(
+        common: dict[str, Any] = dict(
             axes=self.axes,
             components=("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"),
             pose_units=("rad",) * 3 + ("um",) * 3,
@@ -264,25 +295,59 @@ class MemsHexapod(Device):
             rest=(a.ambient,) * 6,
             displacement_scale=1e-5,
             force_scale=0.05,
-            heating_power=heating_power,
-            power=AxisSignal("heater power", "W", "P_", power_limit),
-            rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
-            force=lambda u, T, d: thermal_actuator.force(T, a),
             restoring_force=lambda d: xy_stage.force(d, s, a),
             restoring_force_parts=lambda d: {
                 "linear": xy_stage.linear_force(d, s, a),
                 "nonlinear": xy_stage.nonlinear_force(d, s),
             },
             pose=lambda d: ca.mtimes(J, d),
+            second_order_kinematics=lambda d: second_order(lambda pose, d: hexapod.loop_closure(pose, d, h), d),
             limits=limits,
             bipolar=False,
             documented={
                 "force": (thermal_actuator.force, thermal_actuator.expansion),
                 "restoring_force": (xy_stage.force, xy_stage.linear_force, xy_stage.nonlinear_force),
             },
-            tangent_compliance=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
-            loop_closure=lambda pose, d: hexapod.loop_closure(pose, d, h),
         )
+        if p.dynamics is None:
+            return BalancedPhysics(
+                **common,
+                heating_power=heating_power,
+                power=AxisSignal("heater power", "W", "P_", power_limit),
+                rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
+                force=lambda u, T, d: thermal_actuator.force(T, a),
+                tangent_compliance=lambda d: (
+                    xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d)
+                ),
+            )
+        M = hexapod.mass(h, p.dynamics, J)
+        D = modal_damping(M, home_stiffness(lambda d: xy_stage.force(d, s, a)), p.dynamics.damping_ratio)
+        return InertialPhysics(
+            **common,
+            mass=M,
+            dynamics=lambda u, T, d, v: (
+                thermal_actuator.force(T, a),
+                thermal_actuator.temperature_rate(T, heating_power(u), a),
+            ),
+            damping_force=lambda v: ca.mtimes(D, v),
+        )
+
+
+def home_stiffness(force: Callable[[ca.SX], ca.SX]) -> ca.SX:
+    """(6, 6) [N/m] slope of a `force` (6,) of the displacements (6,) at home."""
+    d = ca.SX.sym("d", 6)
+    return ca.substitute(ca.jacobian(force(d), d), d, ca.SX.zeros(6))
+
+
+def natural_frequencies(device: MemsHexapod) -> np.ndarray:
+    """(6,) [Hz] with the drives held, at home, ascending; none of a device without the table `dynamics`."""
+    p = device.values()
+    if p.dynamics is None:
+        return np.zeros(0)
+    J = hexapod.jacobian(p.hexapod, xy_stage.stage_compliance(p.stage, p.actuator))
+    K = home_stiffness(lambda d: xy_stage.force(d, p.stage, p.actuator))
+    M, K = (ca.DM(ca.evalf(ca.SX(matrix))).full() for matrix in (hexapod.mass(p.hexapod, p.dynamics, J), K))
+    return np.sqrt(eigh(K, M, eigvals_only=True)) / (2 * np.pi)
 
 
 def matrices(device: MemsHexapod) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
+from ctrlgen.numerics.second_order import second_order
 from ctrlgen.physics import meso_hexapod
 
 Length = Annotated[Quantity, In("mm", positive=True)]
@@ -113,7 +114,9 @@ class MesoHexapod(Device):
             force_unit="um",
             pose=lambda d: ca.mtimes(J, d),
             limits=limits,
-            loop_closure=lambda pose, d: meso_hexapod.loop_closure(pose, d, p.hexapod, p.directions.jacobian),
+            second_order_kinematics=lambda d: second_order(
+                lambda pose, d: meso_hexapod.loop_closure(pose, d, p.hexapod, p.directions.jacobian), d
+            ),
         )
 
 

@@ -4,7 +4,8 @@ from ctrlgen.effects import Effect, Param, Place
 
 
 class FiniteRotation(Effect):
-    """Delta pose = g pose_2(d): second order of the loop closure for links of constant length; g = 1 for ideal pivots at their ends.
+    """Delta pose = g pose_2(d): second order of the loop closure for links of constant length; g = 1 for ideal pivots at their ends,
+    or in a mechanism file for its flexures.
 
     Holds for travel d far below the links' length l; the neglected third order is (d/l)^2 of the motion.
     """

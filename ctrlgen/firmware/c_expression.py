@@ -71,7 +71,7 @@ class Linear:
             return None
         if node.operation == READ:
             return node.array, {node.index: 1.0}
-        if node.operation == ca.OP_MUL and node.operands[0].constant:
+        if node.operation == ca.OP_MUL and node.operands[0].fixed:
             inner = self._known[node.operands[1].number]
             return inner and (inner[0], {i: node.operands[0].value * c for i, c in inner[1].items()})
         if node.operation in (ca.OP_ADD, ca.OP_SUB):
@@ -102,12 +102,14 @@ class Text:
 
 @dataclass(frozen=True)
 class Call:
-    """A law of one axis that is a C function of its own: its name, the elements that it reads, its operations, what it calls."""
+    """A law of one axis that is a C function of its own: its name, the elements that it reads, its operations, what it calls, and the
+    numbers that it is handed because they are known only when the program starts."""
 
     name: str
     reads: tuple[Node, ...]
     operations: int
     calls: frozenset[str]
+    given: tuple[Node, ...] = ()
 
 
 def text_of(
@@ -186,14 +188,15 @@ class _Body:
         if node.number in self.laws:
             law = self.laws[node.number]
             self.calls |= law.calls
-            return f"{law.name}({', '.join(self._place('r', read) for read in law.reads)})", 1
+            places = [self._place("r", read) for read in law.reads] + [self._place("c", node) for node in law.given]
+            return f"{law.name}({', '.join(places)})", 1
         if node.constant:
             return self._place("c", node), 0
         if node.operation == READ:
             return self._place("r", node), 0
         op, inside = node.operation, 1 + sum(self.parts[n.number][1] for n in node.operands)
         a = [self._operand(n) for n in node.operands]
-        if op == ca.OP_MUL and node.operands[0].constant and node.operands[0].value == -1.0:
+        if op == ca.OP_MUL and node.operands[0].fixed and node.operands[0].value == -1.0:
             return f"-{a[1]}", inside
         if op in _BINARY:
             return f"{a[0]} {_BINARY[op]} {a[1]}", inside

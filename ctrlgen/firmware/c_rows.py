@@ -7,9 +7,10 @@ combinations are rows of a matrix; an expression that several rows need is store
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from ctrlgen.firmware.c_constants import Constants
 from ctrlgen.firmware.c_expression import PLACE, SCALAR, Call, Linear, Text, text_of
 from ctrlgen.firmware.expression_graph import Node, reached
 from ctrlgen.firmware.real import Real
@@ -21,11 +22,12 @@ class Rows:
     """The lines of one function."""
 
     def __init__(
-        self, rows: Sequence[Node], real: Real, named: Callable[[Node], str], may_be_result: Sequence[str],
+        self, rows: Sequence[Node], real: Real, constants: Constants, may_be_result: Sequence[str],
         laws: Mapping[int, Call],
     ) -> None:  # fmt: skip
         self.laws = laws
-        self.rows, self.real, self.named, self.may_be_result = list(rows), real, named, set(may_be_result)
+        self.rows, self.real, self.may_be_result = list(rows), real, set(may_be_result)
+        self.named, self.array = constants.named, constants.array
         self.ends: dict[int, Node] = {}
         self.lines: list[str] = []
         self.tables: dict[str, str] = {}  # name by C initialiser
@@ -151,6 +153,8 @@ class Rows:
             self.lines += written
 
     def _constant(self, nodes: Sequence[Node]) -> str:
+        if any(node.source for node in nodes):
+            return self.named(nodes[0]) if len({node.number for node in nodes}) == 1 else f"{self.array(nodes)}[i]"
         literals = [self.real.literal(node.value) for node in nodes]
         if len(set(literals)) == 1:
             return self.named(nodes[0])

@@ -17,10 +17,11 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ctrlgen.firmware.c_constants import WIDTH, Constants
+from ctrlgen.firmware.c_constants import DERIVED, WIDTH, Constants, Derived
 from ctrlgen.firmware.c_expression import PLACE, Call, Linear, Text, text_of
 from ctrlgen.firmware.c_rows import Rows, bare
-from ctrlgen.firmware.expression_graph import Graph, Node, reached
+from ctrlgen.firmware.expression_graph import GIVEN, Graph, Node, reached
+from ctrlgen.numerics.interval_arithmetic import Interval
 from ctrlgen.firmware.real import Real
 
 Ranges = Mapping[str, tuple[np.ndarray, np.ndarray]]
@@ -46,6 +47,7 @@ class Kernel:
 
     def call(self, result: str, **values: str) -> str:
         """A C call with each argument's expression by name."""
+        values = {DERIVED: "&state->derived", **values}
         return f"{self.name}({', '.join([*(values[a] for a in self.arguments), result])})"
 
     def value(self, **values: str) -> str:
@@ -76,17 +78,49 @@ class Law:
 @dataclass
 class Printer:
     """Prints the functions of one file. `ranges`: low and high of arguments by name; `numbers`: value and formula of each element of
-    the arguments that are constants of the device; `laws`: what may be a function of its own."""
+    the arguments that are constants of the device; `laws`: what may be a function of its own; `given`: path and range of the numbers
+    that the C is given when it starts; `derived_type`: the C type of the structure of what follows from them."""
 
     real: Real
     ranges: Ranges
     numbers: Mapping[str, Sequence[tuple[float, str]]] = field(default_factory=dict)
     laws: Sequence[Law] = ()
+    given: Mapping[str, Interval] = field(default_factory=dict)
+    derived_type: str = ""
 
     def __post_init__(self) -> None:
-        self._graph = Graph()
+        self._graph = Graph(self.given)
         self._constants = Constants(self.real)
+        self._constants.reserve(*(law.name for law in self.laws))
         self._law_texts: dict[str, str] = {}
+
+    @property
+    def derived(self) -> list[Derived]:
+        """What the kernels and tables so far read of the numbers that follow from those given at the start."""
+        return list(self._constants.derived.values())
+
+    def table(self, function: ca.Function) -> list[Node]:
+        """The rows of a `function` of `numbers` alone."""
+        return self._graph.rows(function, self.ranges, self.numbers)
+
+    def member(self, node: Node) -> str:
+        """A number outside the kernels: a literal, or a member of the structure of what is computed at the start."""
+        return f"{DERIVED}->{self._constants.named(node)}" if node.source else self.real.literal(node.value)
+
+    def array(self, nodes: Sequence[Node], name: str) -> str:
+        """The member `name` of that structure that holds all of them."""
+        return self._constants.array(nodes, name)
+
+    def starting(self, members: Sequence[Derived], name: str, about: str) -> Kernel:
+        """given, the numbers of the start -> those of `members`, one after the other."""
+        rows = [source for member in members for source in member.sources]
+        body = Rows(rows, self.real, self._constants, [], {}).run()
+        text = _function(name, about, {GIVEN: len(self.given)}, len(rows), body.lines, self.real.value)
+        return Kernel(name, text, (GIVEN,), body.operations, body.calls)
+
+    def depends(self, member: Derived, path: str) -> bool:
+        """Whether a member follows from the number at `path`."""
+        return self._graph.read(GIVEN, list(self.given).index(path)) in reached(member.sources)
 
     @property
     def laws_text(self) -> str:
@@ -114,6 +148,8 @@ class Printer:
         self, function: ca.Function, named: ca.Function | None, renamed: Mapping[str, str] | None = None
     ) -> list[Node]:
         """The rows of `function`, with the formulas of `named`, the same function in terms of parameters."""
+        if named is not None and self.given:
+            return self._graph.rows(named, self.ranges, self.numbers, renamed)
         rows = self._graph.rows(function, self.ranges, None, renamed)
         if named is None:
             return rows
@@ -126,19 +162,23 @@ class Printer:
             if node.leaf or any(n.index != i for n in reached([node]) if n.array):
                 return {}
             texts.append(text_of(node, {}, linear, self.real))
-        same = {(text.shape, tuple(self.real.literal(c.value) for c in text.constants)) for text in texts}
+        same = {
+            (text.shape, tuple(c.number if c.source else self.real.literal(c.value) for c in text.constants))
+            for text in texts
+        }
         if len(same) > 1 or texts[0].operations < FEWEST_OPERATIONS:
             return {}
         by_name = {read.array: read for read in texts[0].reads}
+        given = tuple(dict.fromkeys(node for node in texts[0].constants if node.source))
         found = {}
         for i, node in enumerate(nodes):
             reads = tuple(self._graph.read(array, i) for array in by_name)
-            found[node.number] = Call(law.name, reads, texts[0].operations, texts[0].calls)
+            found[node.number] = Call(law.name, reads, texts[0].operations, texts[0].calls, given)
         if law.name not in self._law_texts:
-            self._law_texts[law.name] = self._law_text(law, texts[0], list(by_name))
+            self._law_texts[law.name] = self._law_text(law, texts[0], list(by_name), given)
         return found
 
-    def _law_text(self, law: Law, text: Text, arrays: Sequence[str]) -> str:
+    def _law_text(self, law: Law, text: Text, arrays: Sequence[str], given: Sequence[Node]) -> str:
         T = self.real.value
 
         def filled(match: re.Match) -> str:
@@ -152,7 +192,8 @@ class Printer:
             )
 
         lines = [bare(PLACE.sub(filled, line)) for line in text.lines] + [f"return {PLACE.sub(filled, text.result)};"]
-        parameters = ", ".join(f"{T} {SCALAR_NAMES.get(array, array)}" for array in arrays)
+        names = [SCALAR_NAMES.get(array, array) for array in arrays] + [self._constants.named(node) for node in given]
+        parameters = ", ".join(f"{T} {name}" for name in names)
         return f"{_comment(law.about)}static inline {T} {law.name}({parameters})\n{{\n{_indented(lines)}\n}}\n"
 
     @property
@@ -173,21 +214,20 @@ class Printer:
         """
         rows = self._rows(function, named)
         laws = self._calls({a: function.numel_in(a) for a in function.name_in()}, rows)
-        body = Rows(rows, self.real, self._constants.named, [steps[0]] if steps else may_be_result, laws).run()
+        body = Rows(rows, self.real, self._constants, [steps[0]] if steps else may_be_result, laws).run()
+        body.lines = self._with_derived(body.lines)
         sizes = {a: function.size1_in(a) for a in function.name_in()}
         parts = [(name, about, body.lines)]
         if steps:
             parts = _iterated(name, about, body, *steps, sizes)
-        arguments = [
-            tuple(a for a in sizes if any(re.search(rf"\b{a}\[", line) for line in lines)) for _, _, lines in parts
-        ]
+        arguments = [_read(sizes, lines) for _, _, lines in parts]
         if len(parts) > 1:
-            arguments[1] = tuple(a for a in sizes if a in arguments[0] or a in arguments[1])
+            arguments[1] = tuple(a for a in (DERIVED, *sizes) if a in arguments[0] or a in arguments[1])
         texts = [
             _function(
                 one,
                 words,
-                {a: sizes[a] for a in read},
+                {a: sizes.get(a, self.derived_type) for a in read},
                 0 if returned else function.size1_out(0),
                 lines,
                 self.real.value,
@@ -196,6 +236,20 @@ class Printer:
         ]
         operations = body.operations * (steps[1] if steps else 1)
         return Kernel(name, "\n".join(texts), arguments[-1], operations, body.calls)
+
+    def _with_derived(self, lines: Sequence[str]) -> list[str]:
+        """`lines` with a local copy of each number of the structure that they name: it stays in a register."""
+        words = set(re.findall(r"\b\w+\b", " ".join(lines)))
+        used = [member.name for member in self.derived if len(member.nodes) == 1 and member.name in words]
+        return [*(f"const {self.real.value} {name} = {DERIVED}->{name};" for name in used), *lines]
+
+
+def _read(sizes: Mapping[str, int], lines: Sequence[str]) -> tuple[str, ...]:
+    """The arguments that `lines` read."""
+    return tuple(
+        a for a in (DERIVED, *sizes)
+        if any(re.search(rf"\b{a}->" if a == DERIVED else rf"\b{a}\[", line) for line in lines)
+    )  # fmt: skip
 
 
 def _iterated(
@@ -222,7 +276,7 @@ def _iterated(
             [*head, loop[0], f"    {T} value = {own};", "    int step;", *before, f"    for (step = 0; step < {count}; step++) {{",
              *during, "    }", "    result[i] = value;", "}"],
         )]  # fmt: skip
-    read = [a for a in sizes if any(re.search(rf"\b{a}\[", line) for line in body.lines)]
+    read = _read(sizes, body.lines)
     call = ", ".join("result" if a == argument else a for a in read)
     start = [f"for (i = 0; i < {size}; i++) {{", f"    result[i] = {argument}[i];", "}"]
     again = [f"for (step = 0; step < {count}; step++) {{", f"    {name}_step({call}, result);", "}"]
@@ -232,9 +286,11 @@ def _iterated(
     ]
 
 
-def _function(name: str, about: str, arguments: Mapping[str, int], size: int, lines: Sequence[str], T: str) -> str:
-    """A static function; with `size` 0 it returns its only row."""
-    read = [f"const {T} {a}[{n}]" for a, n in arguments.items()]
+def _function(
+    name: str, about: str, arguments: Mapping[str, int | str], size: int, lines: Sequence[str], T: str
+) -> str:
+    """A static function of arrays of so many numbers, and of pointers to such a type; with `size` 0 it returns its only row."""
+    read = [f"const {n} *{a}" if isinstance(n, str) else f"const {T} {a}[{n}]" for a, n in arguments.items()]
     comment = _comment(about)
     if not size:
         lines = [line.replace("result[0] =", "return") for line in lines]

@@ -2,6 +2,9 @@
 
 Equal expressions are one node. Numbers are folded, and those that come from named parameters keep their formula. A product is a
 number times a bare product, (c x) (d y) = (c d) (x y), where the ranges of x and y say that x y neither overflows nor vanishes.
+
+A number that the program is given when it starts is folded like any other, but keeps the expression that it is computed by then, its
+`source`; no decision is taken on its value, only on its range.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ MOST_FACTORS = 64  # largest whole exponent that is printed as products
 LONGEST_FORMULA = 120  # characters of a number's formula; a longer one says nothing to a reader
 SAME_NUMBER = 1e-6  # relative difference of a number computed in two orders, digits lost to cancellation included
 PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
+GIVEN = "given"  # the array of the numbers that the program is given when it starts
 TWICE_PRINTED = (ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX)  # their operands appear twice in C
 _FORMULA = {
     ca.OP_ADD: "{0} + {1}", ca.OP_SUB: "{0} - {1}", ca.OP_MUL: "{0} * {1}", ca.OP_DIV: "{0} / {1}", ca.OP_NEG: "-{0}", ca.OP_SQ: "{0}^2",
@@ -44,11 +48,19 @@ class Node:
     formula: str = ""
     array: str = ""
     index: int = 0
+    source: Node | None = (
+        None  # of a number that is known when the program starts: its expression in the numbers given then
+    )
 
     @property
     def constant(self) -> bool:
         """Whether it is a number."""
         return self.operation == CONSTANT
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is a number that is known now."""
+        return self.constant and self.source is None
 
     @property
     def leaf(self) -> bool:
@@ -57,16 +69,20 @@ class Node:
 
 
 class Graph:
-    """Makes nodes, each of them once."""
+    """Makes nodes, each of them once. `given`: path and range of the parameters that the program is given when it starts."""
 
-    def __init__(self) -> None:
+    def __init__(self, given: Mapping[str, Interval] | None = None) -> None:
         self._nodes: dict[tuple, Node] = {}
         self._count = 0
+        self._given = {path: self.read(GIVEN, k, within) for k, (path, within) in enumerate((given or {}).items())}
 
-    def constant(self, value: float, formula: str = "") -> Node:
-        """A number, and the formula of parameters that it comes from."""
-        key = (CONSTANT, value, formula)
-        return self._nodes.get(key) or self._make(key, CONSTANT, within=(value, value), value=value, formula=formula)
+    def constant(self, value: float, formula: str = "", source: Node | None = None) -> Node:
+        """A number, and the formula of parameters that it comes from; with a `source` the value is that of the device file."""
+        key = (CONSTANT, value, formula) if source is None else (CONSTANT, source.number)
+        within = (value, value) if source is None else source.within
+        return self._nodes.get(key) or self._make(
+            key, CONSTANT, within=within, value=value, formula=formula, source=source
+        )
 
     def read(self, array: str, index: int, within: Interval = UNBOUNDED) -> Node:
         """Element `index` of an argument or of a local array."""
@@ -137,7 +153,8 @@ class Graph:
     ) -> Node:
         name, row = function.name_in(place[0]), int(function.sparsity_in(place[0]).row()[place[1]])
         if name in numbers:
-            return self.constant(*numbers[name][row])
+            value, path = numbers[name][row]
+            return self.constant(value, path, self._given.get(path))
         name = renamed.get(name, name)
         low, high = ranges.get(name, (None, None))
         return self.read(name, row, UNBOUNDED if low is None else (float(low[row]), float(high[row])))
@@ -149,7 +166,7 @@ class Graph:
             return self._folded(op, a)
         if op in (ca.OP_SQ, ca.OP_INV):
             op, a = (ca.OP_MUL, [a[0], a[0]]) if op == ca.OP_SQ else (ca.OP_DIV, [self.constant(1.0), a[0]])
-        if op == ca.OP_IF_ELSE_ZERO and a[0].constant:
+        if op == ca.OP_IF_ELSE_ZERO and a[0].fixed:
             return a[1] if a[0].value else self.constant(0.0)
         if op in (ca.OP_NEG, ca.OP_TWICE, ca.OP_ASSIGN):
             return self._scaled(a[0], self.constant({ca.OP_NEG: -1.0, ca.OP_TWICE: 2.0, ca.OP_ASSIGN: 1.0}[op]))
@@ -165,18 +182,18 @@ class Graph:
             if low.within[1] <= high.within[0]:  # known before the device runs
                 return low if op == ca.OP_FMIN else high
             (c, x), (d, y) = self._split(a[0]), self._split(a[1])
-            if c.value == d.value > 0 and c.value != 1.0:
+            if c.fixed and d.fixed and c.value == d.value > 0 and c.value != 1.0:
                 return self._scaled(self._operation(op, x, y), c)
         if op in (ca.OP_ADD, ca.OP_SUB):
             return self._sum(op, *a)
-        if op in (ca.OP_POW, ca.OP_CONSTPOW) and a[1].constant and _by_products(a[1].value):
+        if op in (ca.OP_POW, ca.OP_CONSTPOW) and a[1].fixed and _by_products(a[1].value):
             return self._power(a[0], a[1].value)
         return self._operation(op, *a)
 
     def _sum(self, op: int, a: Node, b: Node) -> Node:
-        if b.constant and b.value == 0.0:
+        if b.fixed and b.value == 0.0:
             return a
-        if a.constant and a.value == 0.0:
+        if a.fixed and a.value == 0.0:
             return b if op == ca.OP_ADD else self._scaled(b, self.constant(-1.0))
         if b.constant and b.value < 0:
             op, b = (ca.OP_SUB if op == ca.OP_ADD else ca.OP_ADD), self._folded(ca.OP_NEG, [b])
@@ -191,11 +208,12 @@ class Graph:
     def _product(self, op: int, a: Node, b: Node) -> Node:
         """a b or a/b with the numbers gathered in front, if the bare operands' product is of a size that can be trusted."""
         (c, x), (d, y) = self._split(a), self._split(b)
-        if c.value == d.value == 1.0:
+        if _one(c) and _one(d):
             return self._operation(op, a, b)
         factor = self._folded(op, [c, d])
         size = max(abs(v) for v in PRODUCT[op](x.within, y.within))
-        if not (1 / TRUSTED < size < TRUSTED and 1 / TRUSTED < abs(factor.value) < TRUSTED):
+        factors = [abs(v) for v in factor.within]
+        if not (1 / TRUSTED < size < TRUSTED and 1 / TRUSTED < min(factors) and max(factors) < TRUSTED):
             return self._operation(op, a, b)
         if x.constant:  # c/(d y) = (c/d)/y
             return self._operation(op, factor, y)
@@ -229,9 +247,9 @@ class Graph:
         if node.constant:
             return self._folded(ca.OP_MUL, [factor, node])
         c, x = self._split(node)
-        if c.value != 1.0:
+        if not _one(c):
             factor = self._folded(ca.OP_MUL, [factor, c])
-        return x if factor.value == 1.0 else self._operation(ca.OP_MUL, factor, x)
+        return x if _one(factor) else self._operation(ca.OP_MUL, factor, x)
 
     def _folded(self, op: int, a: Sequence[Node]) -> Node:
         values = [node.value for node in a]
@@ -255,9 +273,22 @@ class Graph:
                 and a[1].formula.startswith("1 / ")
             ):
                 formula = f"{_term(a[0])} / {a[1].formula[4:]}"
-        return self.constant(
-            value, _short(formula) if len(formula) > LONGEST_FORMULA or formula.count("f(") > 1 else formula
-        )
+        formula = _short(formula) if len(formula) > LONGEST_FORMULA or formula.count("f(") > 1 else formula
+        return self.constant(value, formula, self._source(op, a) if any(node.source for node in a) else None)
+
+    def _source(self, op: int, a: Sequence[Node]) -> Node:
+        """The expression of a number in those that the program is given."""
+        parts = [node.source or node for node in a]
+        less_one = len(parts) == 2 and parts[1].fixed and parts[1].value == {ca.OP_SUB: 1.0, ca.OP_ADD: -1.0}.get(op)
+        if (
+            less_one and parts[0].operation == ca.OP_EXP
+        ):  # e^y - 1 = 2 t/(1 - t), t = tanh(y/2), which keeps the digits near y = 0
+            half = self.apply(ca.OP_MUL, [self.constant(0.5), parts[0].operands[0]])
+            t = self._operation(ca.OP_TANH, half)
+            return self._operation(
+                ca.OP_DIV, self.apply(ca.OP_TWICE, [t]), self.apply(ca.OP_SUB, [self.constant(1.0), t])
+            )
+        return self.apply(op, parts)
 
     def _operation(self, op: int, *operands: Node) -> Node:
         key = (op, *(node.number for node in operands))
@@ -282,6 +313,15 @@ def reached(roots: Iterable[Node], ends: Iterable[Node] = ()) -> list[Node]:
             if node.number not in stop:
                 left.extend(node.operands)
     return [seen[number] for number in sorted(seen)]
+
+
+def given_later(rows: Iterable[Node]) -> bool:
+    """Whether rows need a number that is known only when the program starts."""
+    return any(node.source for node in reached(rows))
+
+
+def _one(node: Node) -> bool:
+    return node.fixed and node.value == 1.0
 
 
 def _computed(op: int, values: Sequence[float]) -> float:

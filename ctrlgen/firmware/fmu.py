@@ -29,8 +29,9 @@ from ctrlgen.firmware.player_only import check_online
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.firmware.toolchains import compile_c, find_compilers
+from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import controller_of
-from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.scenario import Scenario, check_tightened
 from ctrlgen.version import __version__, program
 
 VERSIONS = (3, 2)
@@ -98,12 +99,13 @@ class _Unit:
         return [*self.inputs, *self.outputs, *(v for v in (self.status, self.settles) if v)]
 
 
-def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
+def write_fmus(scenario: Scenario, out: Path, fmi: int = 3, limited: Model | None = None) -> Fmus:
     """Writes `{scenario}_controller.fmu` and `{scenario}_plant.fmu` to the folder `out`, for FMI `fmi` (3 or 2).
 
     With binaries for this computer where a C compiler is found, and the sources in any case. A device with inertia that has states
-    which its motion does not determine gets no controller. Raises InputError for a scenario without a sample rate, ToolError where a
-    compiler refuses.
+    which its motion does not determine gets no controller. The controller keeps the limits of the model `limited`, that of a robust
+    solution; by default those of the device. Raises InputError for a scenario without a sample rate, or one whose limits are to
+    be tightened and are not, ToolError where a compiler refuses.
     """
     if fmi not in VERSIONS:
         raise InputError("--fmi", [Fault(str(fmi), "is not a supported FMI version; use 3 or 2")])
@@ -111,6 +113,8 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
         what = 'is missing: FMI co-simulation advances by samples; add sample_rate = "1 kHz" and duration = "1 s"'
         raise InputError(scenario.path, [Fault("sample_rate", what)])
     plant, remark = plant_of(scenario), ""
+    limited = plant.model if limited is None else plant.model.limited_as(limited)
+    check_tightened(scenario, limited)
     try:
         compiler: str | None = next(iter(find_compilers()))
     except ToolError as error:
@@ -118,7 +122,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
     with whole_folder(Path(out)) as draft, tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         units = [_plant_unit(scenario, plant, Path(scratch))]
         try:
-            units.insert(0, _controller_unit(scenario, plant, Path(scratch)))
+            units.insert(0, _controller_unit(scenario, limited, plant.sample_time, Path(scratch)))
         except InputError as error:
             if not (plant.inertial or plant.model.redundant or plant.model.rate_limits):
                 raise
@@ -128,10 +132,10 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3) -> Fmus:
     return Fmus(tuple(Path(out) / name for name in names), binary, remark.strip())
 
 
-def _controller_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
+def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
-    check_online(plant.model)
-    controller = controller_of(plant.model, scenario.file.follow, plant.sample_time)
+    check_online(scenario, model)
+    controller = controller_of(model, scenario.file.follow, sample_time)
     m, core = controller.nominal, f"{scenario.device.name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
     for end in ("h", "c"):

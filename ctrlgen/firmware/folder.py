@@ -27,7 +27,7 @@ from ctrlgen.firmware.templates import write
 from ctrlgen.firmware.vectors import played_vectors, vectors
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import controller_of
-from ctrlgen.trajectory.scenario import Scenario, motion_targets
+from ctrlgen.trajectory.scenario import Scenario, check_tightened, motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 
@@ -66,7 +66,8 @@ def generate(
 
     `figures` (name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives) are put beside the README.
     """
-    check_online(model)
+    check_tightened(scenario, model)
+    check_online(scenario, model)
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     played = solution if scenario.sample_time else None
     command = scenario.command(model) if solution is None else solution.command

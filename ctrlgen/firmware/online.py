@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import base_unit, show
+from ctrlgen.devices import Limit
+from ctrlgen.firmware.c_constants import DERIVED
 from ctrlgen.firmware.cprint import Kernel, Law, Printer
 from ctrlgen.firmware.elementary import elementary_text
 from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.run_time import Tables, given_ranges, start_calls, start_context
 from ctrlgen.firmware.templates import comment
 from ctrlgen.model.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
 from ctrlgen.model.lost_state import FAR
 from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.model.nearest_displacement import SWEEPS
+from ctrlgen.model.run_time_check import check_run_time
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
@@ -29,15 +33,28 @@ UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
     """The context of online.c.j2 and online.h.j2."""
+    check_run_time(controller)
     model = controller.nominal
     n = len(model.axes)
     (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
     s_low, s_high = np.maximum(x_low[: model.n_states], -UNLIMITED), np.minimum(x_high[: model.n_states], UNLIMITED)
+    x_range, u_range = (
+        (np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0))
+        for ends in zip(
+            *((c.nominal.x_bounds, c.nominal.u_bounds) for c in (controller, *controller.variants)), strict=True
+        )
+    )
+    s_range = (
+        np.maximum(x_range[0][: model.n_states], -UNLIMITED),
+        np.minimum(x_range[1][: model.n_states], UNLIMITED),
+    )
     ranges = {  # of the kernels' arguments; a target has none
-        "z": model.z_bounds, "wanted": model.z_bounds, "x": model.x_bounds, "state": (s_low, s_high), "drive": model.u_bounds,
+        "z": model.z_bounds, "wanted": model.z_bounds, "x": x_range, "state": s_range, "drive": u_range,
     }  # fmt: skip
-    inverses = controller.named
-    printer = Printer(real, ranges, {"p": inverses.numbers}, printed_laws(model, inverses.model))
+    inverses, given = controller.named, given_ranges(controller)
+    printer = Printer(
+        real, ranges, {"p": inverses.numbers}, printed_laws(model, inverses.model), given, f"{prefix}_derived"
+    )
     printed = _Kernels(printer, kernel_comments(controller))
 
     modes: list[dict[str, Any]] = []
@@ -56,7 +73,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
                 for part in ("displacement", "state", "drive", "advance")
                 if getattr(inverse, part).size1_out(0)
             }
-            uses_state = any({"x", "z"} & set(named[part].arguments) for part in ("state", "drive") if part in named)
+            uses_state = any(
+                {"x", "z", DERIVED} & set(named[part].arguments) for part in ("state", "drive") if part in named
+            )
             modes.append({
                 "name": name, "z": z, "uses_state": uses_state,
                 "examined_first": controller.examined_first[name == "step"],
@@ -77,13 +96,11 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
     if controller.composite_bound:
         bound = printed.kernel(controller.composite_bound, "bound", ("composite_bound",), returned=True)
-    slack = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
-    z_slack, s_slack, u_slack = slack.slacks
+    z_slack, s_slack, u_slack = controller.slacks_of(controller.slack if real is Real.DOUBLE else FLOAT_SLACK)
     drive, follow = model.signals["drive"], controller.target
-    called = printed.calls | ({"square_root"} if shares else set())
-    (z_centre, z_half), (s_centre, s_half), (u_centre, u_half) = (
-        _middles(low, high, real) for low, high in ((z_low, z_high), (s_low, s_high), (u_low, u_high))
-    )
+    limited = _limits_in_c(controller, printer, real, u_slack)
+    start = start_context(controller, printer)
+    called = printed.calls | ({"square_root"} if shares else set()) | set(start_calls(start))
     return {
         "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(model.device.title),
         "source": comment(model.device.source),
@@ -91,6 +108,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
+        "reserved_for": None if model.probability is None else f"{100 * model.probability:.10g} % along {scenario.name}",
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
         "elementary": elementary_text(called, real), "bound": bound, "nearest_slopes": controller.nearest_slopes, "sweeps": SWEEPS,
@@ -106,10 +124,10 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "input_limits": controller.input_limits,
         "plausible": [([_member(i, model.x.numel()) for i in those], most) for those, most in controller.plausible],
         "rest": model.rest,
-        "z_low": z_low, "z_high": z_high, "z_slack": z_slack, "z_centre": z_centre, "z_half": z_half,
-        "s_low": s_low, "s_high": s_high, "s_slack": s_slack, "s_centre": s_centre, "s_half": s_half,
-        "u_low": u_low, "u_high": u_high, "u_slack": u_slack, "u_centre": u_centre, "u_half": u_half,
-        "u_safe": controller.safe_drive, "ready": READY, "far": FAR,
+        "z_low": z_low, "z_high": z_high, "z_slack": z_slack,
+        "s_low": s_low, "s_high": s_high, "s_slack": s_slack,
+        "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
+        "u_safe": controller.safe_drive, "ready": READY, "far": FAR, **limited, **start,
     }  # fmt: skip
 
 
@@ -228,9 +246,64 @@ def _member(i: int, x_count: int) -> str:
 
 
 def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and half width of ranges; the width is four roundings smaller, so that the test with it is on the safe side."""
+    """Middle and squared half width of ranges; the width is four roundings smaller, so that the test with it is on the safe side."""
     centre, half = (low + high) / 2, (high - low) / 2
-    return centre, np.maximum(half - 4 * real.epsilon * (np.abs(centre) + half), 0.0)
+    return centre, np.maximum(half - 4 * real.epsilon * (np.abs(centre) + half), 0.0) ** 2
+
+
+def _middle_formulas(low: ca.SX, high: ca.SX, real: Real) -> tuple[ca.SX, ca.SX]:
+    """The same of formulas."""
+    centre, half = (low + high) / 2, (high - low) / 2
+    return centre, ca.fmax(half - 4 * real.epsilon * (ca.fabs(centre) + half), 0.0) ** 2
+
+
+def _u_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
+    return m.bounds_formula(m.u)
+
+
+def _s_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
+    """Of the actuators' states, where they have limits."""
+    low, high = m.bounds_formula(m.x[: m.n_states])
+    return ca.fmax(low, -UNLIMITED), ca.fmin(high, UNLIMITED)
+
+
+def _limits_in_c(controller: Controller, printer: Printer, real: Real, u_slack: np.ndarray) -> dict[str, Any]:
+    """Middles and squared half widths as C, by "z_middle", ..., and where each table of limits is found, by its name in "arrays"."""
+    model, tables, limited = controller.nominal, Tables(controller, printer), any(controller.drive_can_be_limited)
+    (u_low, u_high), n_s = model.u_bounds, model.n_states
+    s_low, s_high = np.maximum(model.x_bounds[0][:n_s], -UNLIMITED), np.minimum(model.x_bounds[1][:n_s], UNLIMITED)
+    arrays = {
+        "U_LOW": tables.array("U_LOW", lambda m: _u_bounds(m)[0], u_low),
+        "U_HIGH": tables.array("U_HIGH", lambda m: _u_bounds(m)[1], u_high),
+        "U_LEAST": "U_LEAST", "U_MOST": "U_MOST",
+    }  # fmt: skip
+    if limited:
+        arrays |= {
+            "U_LEAST": tables.array("U_LEAST", lambda m: _u_bounds(m)[0] - ca.DM(u_slack), u_low - u_slack),
+            "U_MOST": tables.array("U_MOST", lambda m: _u_bounds(m)[1] + ca.DM(u_slack), u_high + u_slack),
+        }
+    middles = {
+        "z_middle": [[real.literal(v) if v else "" for v in row] for row in _middles(*model.z_bounds, real)],
+        "u_middle": _middle_texts(tables, _u_bounds, u_low, u_high, real), "s_middle": [],
+    }  # fmt: skip
+    if controller.state_can_be_limited:
+        arrays |= {
+            "S_LOW": tables.array("S_LOW", lambda m: _s_bounds(m)[0], s_low),
+            "S_HIGH": tables.array("S_HIGH", lambda m: _s_bounds(m)[1], s_high),
+        }
+        middles["s_middle"] = _middle_texts(tables, _s_bounds, s_low, s_high, real)
+    rest = tables.each("X_REST", lambda m: m.rest_formula, model.rest)
+    return {"arrays": arrays, "rest_given": rest, **middles}
+
+
+def _middle_texts(
+    tables: Tables, bounds: Callable[[Model], tuple[ca.SX, ca.SX]], low: np.ndarray, high: np.ndarray, real: Real
+) -> list[list[str]]:
+    centre, square = _middles(low, high, real)
+    return [
+        tables.texts(lambda m: _middle_formulas(*bounds(m), real)[0], centre),
+        tables.texts(lambda m: _middle_formulas(*bounds(m), real)[1], square),
+    ]
 
 
 def _number(value: float) -> float | int:
@@ -242,7 +315,10 @@ def _si_text(signal: Any) -> str:
     return ", ".join(f"{c} [{base_unit(u)}]" for c, u in zip(signal.channels, signal.units, strict=True))
 
 
-def _limit_text(limit: Any) -> str:
+def _limit_text(limit: Limit) -> str:
     low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
     high = "" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"
-    return f"{low}{limit.label}{high}"
+    step = "K" if limit.unit == "degC" else limit.unit
+    sides = zip((limit.lower, limit.upper), limit.reserve, strict=True)
+    reserved = [f"{show(limit.described(b), limit.unit)} less {show(r, step)}" for b, r in sides if b is not None and r]
+    return f"{low}{limit.label}{high}" + (f" ({'; '.join(reserved)} reserved)" if reserved else "")

@@ -15,13 +15,16 @@ from ctrlgen.firmware.package import LICENCE, MANIFEST, input_files
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.model.model import Model
+from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.version import __version__, commit, program
 
 
-def check_online(model: Model) -> None:
-    """Raises InputError for a device whose drives the online C cannot compute yet."""
+def check_online(scenario: Scenario, model: Model) -> None:
+    """Raises InputError for a device, or a scenario of it, whose drives the online C cannot compute yet."""
     faults = []
+    if scenario.file.feedforward == "static":
+        faults.append(Fault("feedforward", "is static, in a scenario"))
     if model.rate_limits:
         faults.append(
             Fault("device", f"has limits on rates of drives ({', '.join(r.label for r in model.rate_limits)})")

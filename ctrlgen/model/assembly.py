@@ -17,7 +17,7 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit, show
-from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics, Signal
+from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics, Limit, Signal
 from ctrlgen.devices.sensor import mounting_faults
 from ctrlgen.effects import Place
 from ctrlgen.model.effect_terms import EffectTerms
@@ -69,8 +69,9 @@ def movable(device: Device) -> tuple[str, ...]:
 
 
 def symbolic_model(device: Device) -> Model:
-    """The model of `device` with every number free that is not zero and no count: its numbers as formulas."""
-    paths = [path for path, number in device.quantities() if not number.whole and number.si != 0]
+    """The model of `device` with every number free that is no count and not zero, or given when the C starts: its numbers as formulas."""
+    given = {constant.path for constant in device.given_at_start}
+    paths = [path for path, number in device.quantities() if not number.whole and (number.si != 0 or path in given)]
     return _assemble(device, paths, NO_RISE, sample_time=None, per_record=False)
 
 
@@ -131,6 +132,7 @@ def _assemble(
         return ca.substitute(ca.substitute(ca.SX(expr), a, acceleration), parts.held, parts.held_value)
 
     signals = {name: replace(signal, expr=closed(signal.expr)) for name, signal in parts.signals.items()}
+    limits = physics.limits(_limited(physics, signals, own_x, z))
     return Model(
         name=device.name,
         device=device,
@@ -159,7 +161,8 @@ def _assemble(
         ),
         signals=signals,
         force_parts=physics.restoring_force_parts(z),
-        limits=tuple(physics.limits(_limited(physics, signals, own_x, z))),
+        limits=tuple(_with_numbers(limit, p, p_nominal) for limit in limits),
+        bounds_formulas=tuple((limit.lower, limit.upper) for limit in limits),
         laws=tuple(
             Law(name, f"{label} [{physics.force_unit}] of an axis", closed(expr), physics.documented.get(of, ()))
             for name, label, of, expr in _named_forces(physics, z, v)
@@ -336,6 +339,16 @@ def _drive_weights(physics: DevicePhysics) -> np.ndarray:
 def _numbers(values: Sequence[float | ca.SX], p: ca.SX, p_nominal: np.ndarray) -> np.ndarray:
     """Values that may hold free parameters, at their nominal ones."""
     return ca.Function("rest", [p], [ca.vertcat(*map(ca.SX, values), NONE)])(p_nominal).full().ravel()
+
+
+def _with_numbers(limit: Limit, p: ca.SX, p_nominal: np.ndarray) -> Limit:
+    """A limit whose bounds may hold free parameters, at their nominal values."""
+    if not any(isinstance(bound, ca.SX) for bound in (limit.lower, limit.upper)):
+        return limit
+    lower, upper = (
+        None if bound is None else float(_numbers([bound], p, p_nominal)[0]) for bound in (limit.lower, limit.upper)
+    )
+    return replace(limit, lower=lower, upper=upper)
 
 
 def _check_stiffness(model: Model) -> None:

@@ -14,7 +14,6 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
 from ctrlgen.effects import Channel, Effect, Place, State, faults_at
-from ctrlgen.numerics.second_order import second_order
 
 # Typical displacements beyond which a law reads the stage's force at that end: a search may try values farther out, where
 # no stage goes and a restoring force may have no value (a root of a negative number).
@@ -171,8 +170,8 @@ class EffectTerms:
     @cached_property
     def second_order_kinematics(self) -> ca.SX:
         """What finite rotations of the links add to the pose; large, hence built only when an effect asks for it."""
-        assert isinstance(self.physics, BalancedPhysics) and self.physics.loop_closure  # `available` says so
-        return second_order(self.physics.loop_closure, self.mechanism_displacement)
+        assert self.physics.second_order_kinematics  # `available` says so
+        return self.physics.second_order_kinematics(self.mechanism_displacement)
 
     @cached_property
     def tangent_compliance(self) -> ca.SX:
@@ -233,7 +232,7 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,
         "voltage": any(same_dimension(unit, "V") for unit in physics.drive.units),
-        "second_order_kinematics": isinstance(physics, BalancedPhysics) and physics.loop_closure is not None,
+        "second_order_kinematics": physics.second_order_kinematics is not None,
         "tangent_compliance": isinstance(physics, BalancedPhysics) and physics.tangent_compliance is not None,
     }  # fmt: skip
     return frozenset(name for name, given in present.items() if given)

@@ -22,6 +22,7 @@ from ctrlgen.model.lost_state import Groups, is_beyond, plausible_sums
 from ctrlgen.model.model import Limit, Model, Signal
 from ctrlgen.model.named_inverse import NamedInverses, named_inverses
 from ctrlgen.model.nearest_displacement import coupling, nearest_displacement
+from ctrlgen.model.run_time import choices, with_constants
 from ctrlgen.numerics.interval_arithmetic import bounds
 
 SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
@@ -67,9 +68,24 @@ class Controller:
         """The same kernels with their numbers as formulas of the device's parameters."""
         return named_inverses(self.model.device, self.follow, self.sample_time)
 
+    def at(self, values: dict[str, float]) -> Controller:
+        """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them."""
+        model = build_model(with_constants(self.model.device, values))
+        return type(self)(model, self.follow, self.sample_time, self.slack)
+
+    @cached_property
+    def variants(self) -> tuple[Controller, ...]:
+        """The controllers of devices with other run-time constants, within their ranges (`ctrlgen.model.run_time`): decisions that are
+        taken before the C runs hold for all of them."""
+        return tuple(self.at(values) for values in choices(self.model.device.given_at_start))
+
     @cached_property
     def newton_steps(self) -> int:
         """Steps to the displacement that balances the forces: one where the balance is linear in it."""
+        return max(c._own_newton_steps for c in (self, *self.variants))
+
+    @cached_property
+    def _own_newton_steps(self) -> int:
         m = self.nominal
         return NEWTON_STEPS if ca.depends_on(ca.jacobian(m.balance, m.z), m.z) else 1
 
@@ -158,11 +174,15 @@ class Controller:
     @cached_property
     def state_can_be_limited(self) -> bool:
         """Whether a displacement in range can need an actuator state beyond its limits, by interval arithmetic."""
+        return any(c._own_state_can_be_limited for c in (self, *self.variants))
+
+    @cached_property
+    def _own_state_can_be_limited(self) -> bool:
         m, n = self.nominal, self.nominal.n_states
         ranges = {"wanted": m.z_bounds, "z": m.z_bounds, "x": m.x_bounds}
         for k in (self.static, self.moving or self.static) if n else ():
             low, high = bounds(k.state, ranges)
-            slack = self.slacks[1]
+            slack = self._own_slacks(self.slack)[1]
             if np.any(low < m.x_bounds[0][:n] - slack) or np.any(high > m.x_bounds[1][:n] + slack):
                 return True
         return False
@@ -171,6 +191,11 @@ class Controller:
     def drive_can_be_limited(self) -> tuple[bool, bool]:
         """Whether a displacement in range can need a drive beyond its limits to settle there, or to step there, by interval arithmetic
         over every state. An actuator that never does for an equilibrium needs no line search to settle."""
+        settle, step = zip(*(c._own_drive_can_be_limited for c in (self, *self.variants)), strict=True)
+        return any(settle), any(step)
+
+    @cached_property
+    def _own_drive_can_be_limited(self) -> tuple[bool, bool]:
         m, n = self.nominal, self.nominal.n_states
         low, high = m.u_bounds
         found = []
@@ -180,7 +205,8 @@ class Controller:
                 state = bounds(k.state, ranges)
                 ranges["state"] = (np.maximum(state[0], m.x_bounds[0][:n]), np.minimum(state[1], m.x_bounds[1][:n]))
             least, most = bounds(k.drive, ranges)
-            found.append(not (np.all(least >= low - self.slacks[2]) and np.all(most <= high + self.slacks[2])))
+            slack = self._own_slacks(self.slack)[2]
+            found.append(not (np.all(least >= low - slack) and np.all(most <= high + slack)))
         return found[0], found[1]
 
     @property
@@ -219,8 +245,16 @@ class Controller:
 
         That of the drive is what the other two change it by.
         """
+        return self.slacks_of(self.slack)
+
+    def slacks_of(self, slack: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`slacks` for this share of a signal's typical size."""
+        z_slack, state_slack, u_slacks = zip(*(c._own_slacks(slack) for c in (self, *self.variants)), strict=True)
+        return z_slack[0], state_slack[0], np.max(u_slacks, axis=0)
+
+    def _own_slacks(self, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         m, n = self.nominal, self.nominal.n_states
-        z_slack, state_slack = self.slack * m.z_scale, self.slack * m.x_scale[:n]
+        z_slack, state_slack = share * m.z_scale, share * m.x_scale[:n]
         x, z = self.rest()
         kernel = (self.moving or self.static).drive
         drives = [_row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
@@ -229,13 +263,20 @@ class Controller:
     @cached_property
     def plausible(self) -> Groups:
         """What a state is judged by, see `plausible_sums`."""
-        return plausible_sums(self.nominal)
+        own, *others = (plausible_sums(c.nominal) for c in (self, *self.variants))
+        wider = [{those: most for those, most in sums} for sums in others]
+        return tuple((those, max(most, *(w.get(those, most) for w in wider), most)) for those, most in own)
 
     @cached_property
     def examined_first(self) -> tuple[bool, bool]:
         """Whether the state is examined before it is used, to settle and to step: where the displacement of a target depends on it, or
         effects remember. Else it is examined where a limit is met: till then one that is lost would show in the drives, or none of its
         numbers enters the answer and all are written anew."""
+        settle, step = zip(*(c._own_examined_first for c in (self, *self.variants)), strict=True)
+        return any(settle), any(step)
+
+    @cached_property
+    def _own_examined_first(self) -> tuple[bool, bool]:
         m = self.nominal
         kernels = [k.displacement for k in (self.static, self.moving or self.static)]
         targets = [ca.SX.sym("target", k.size1_in("target")) for k in kernels]

@@ -7,8 +7,8 @@ z' = v. All SX, SI inside. `ctrlgen.model.assembly` builds it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -29,7 +29,7 @@ class Law:
     documented: Sequence[Callable[..., Any]] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
     """The physics of one device, symbolic; made by `build_model`."""
 
@@ -72,6 +72,7 @@ class Model:
     ]  # drive, power, state where there are some, force, displacement, pose, reading; in this order
     force_parts: dict[str, ca.SX]  # parts of the restoring force by name
     limits: tuple[Limit, ...]
+    bounds_formulas: tuple[tuple[float | ca.SX | None, float | ca.SX | None], ...]  # of each limit, in terms of p
     laws: tuple[Law, ...]  # parts of the equations that have a name
     rate_limits: tuple[Limit, ...]  # on the change by time of a drive, which is their `expr`
     drive_weights: (
@@ -90,6 +91,8 @@ class Model:
     z_scale: np.ndarray
     u_scale: np.ndarray
     force_scale: float
+
+    probability: float | None = None  # with which the limits, tightened by their reserves, hold; None: as described
 
     @cached_property
     def rates(self) -> ca.SX:
@@ -195,6 +198,17 @@ class Model:
                     high[i] = min(high[i], limit.upper)
         return low, high
 
+    def bounds_formula(self, symbol: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Lower and upper bounds (n,) of x, z or u as formulas of p."""
+        low, high = ([ca.SX(side)] * symbol.numel() for side in (-np.inf, np.inf))
+        for limit, (lower, upper) in zip(self.limits, self.bounds_formulas, strict=True):
+            for _, i in _positions(limit, symbol):
+                if lower is not None:
+                    low[i] = lower if low[i].is_inf() or low[i].is_minus_inf() else ca.fmax(low[i], lower)
+                if upper is not None:
+                    high[i] = upper if high[i].is_inf() else ca.fmin(high[i], upper)
+        return ca.vertcat(ca.SX(0, 1), *low), ca.vertcat(ca.SX(0, 1), *high)
+
     def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u", "rate"] | None:
         """Whether a limit is on one of the states, displacements or drives itself, or on the rate of a drive; None where it is on an
         expression of them."""
@@ -220,6 +234,18 @@ class Model:
         for i, limit in zip(self.rate_places, self.rate_limits, strict=True):
             low[i], high[i] = limit.lower, limit.upper
         return low, high
+
+    def tightened(self, reserves: Mapping[str, tuple[float, float]], probability: float | None) -> Model:
+        """The model with the bounds of the named limits moved inward by (below, above) [SI], which then hold with the `probability`:
+        whatever reads its limits keeps the tightened ones."""
+        limits = tuple(limit.tightened(*reserves.get(limit.name, (0.0, 0.0))) for limit in self.limits)
+        return replace(self, limits=limits, probability=probability)
+
+    def limited_as(self, other: Model) -> Model:
+        """The model with the reserves of the `other` of the same device, but for its effects."""
+        if other.probability is None:
+            return self
+        return self.tightened({limit.name: limit.reserve for limit in other.limits}, other.probability)
 
     @property
     def redundant(self) -> bool:

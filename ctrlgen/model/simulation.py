@@ -12,6 +12,7 @@ from ctrlgen.model.discretisation import held_step, one_step_map
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_solver
 
+PERIODIC = 1e-9  # typical sizes by which a period may end elsewhere than it began
 MOST_NEWTON_STEPS = 50  # from a displacement far off; the sample before needs three
 
 
@@ -91,3 +92,30 @@ def _simulate_inertial(
         raise SolverError("the simulated motion is not finite; check the drive, and the device's damping")
     states = np.hstack([start[:, None], states]).T
     return trace(model, sample_time * np.arange(len(u) + 1), states[:, :n], states[:, n:], np.vstack([u, u[-1:]]))
+
+
+def periodic_start(model: Model, u: np.ndarray, sample_time: float, begin: np.ndarray) -> tuple[np.ndarray, int]:
+    """(x, z) (n_x + n_axes,) of a `model` with inertia from which the held drives `u` (n, n_u) [SI] lead back to it, begun at `begin`, and
+    how many steps of Newton's method that took. Raises SolverError where none is found, as with undamped modes."""
+    after, y = one_step_map(model, sample_time), ca.vertcat(model.x, model.z)
+    step = ca.vertcat(after.x, after.z)
+    size, turns = y.numel(), ca.SX.sym("S", y.numel(), y.numel())  # slopes by the start
+    slopes = ca.mtimes(ca.jacobian(step, y), turns)
+    one = ca.Function(
+        "one", [ca.vertcat(y, ca.vec(turns)), model.u, model.p], [ca.vertcat(step, ca.vec(slopes))], {"cse": True}
+    )
+    along, p = one.mapaccum(len(u)), np.tile(model.p_nominal[:, None], (1, len(u)))
+    scale, start = np.concatenate([model.x_scale, model.z_scale]), begin
+    for iteration in range(1, MOST_NEWTON_STEPS + 1):
+        end = along(np.concatenate([start, np.eye(size).ravel()]), u.T, p).full()[:, -1]
+        slope = end[size:].reshape(size, size).T
+        try:
+            change = np.linalg.solve(np.eye(size) - slope, end[:size] - start)
+        except np.linalg.LinAlgError:
+            break
+        start = start + change
+        if not np.all(np.isfinite(start)):
+            break
+        if np.abs(change / scale).max() < PERIODIC:
+            return start, iteration
+    raise SolverError("no periodic motion under these drives was found; give the device damping, or make the path open")

@@ -47,8 +47,13 @@ def blade_compliance(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> 
     EA = E t w, EI_z = E w t^3/12, EI_y = E t w^3/12, GJ = chi beta EI_z.
     Source: S1 eq. (21)-(23). `l`, `t`, `w` [m], `E` [Pa], `nu` [1].
     """
+    return beam_compliance(l, *blade_rigidity(t, w, E, nu))
+
+
+def blade_rigidity(t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """EA [N], EI_y, EI_z, GJ [N m^2] of `blade_compliance`."""
     EI_z = E * w * t**3 / 12
-    return beam_compliance(l, E * t * w, E * t * w**3 / 12, EI_z, shear_ratio(nu) * torsion_ratio(t, w) * EI_z)
+    return E * t * w, E * t * w**3 / 12, EI_z, shear_ratio(nu) * torsion_ratio(t, w) * EI_z
 
 
 def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
@@ -57,8 +62,13 @@ def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
     EA = pi E d^2/4, EI = pi E d^4/64, GJ = 2 chi EI.
     Source: S1 eq. (24). `l`, `d` [m], `E` [Pa], `nu` [1].
     """
+    return beam_compliance(l, *wire_rigidity(d, E, nu))
+
+
+def wire_rigidity(d: Scalar, E: Scalar, nu: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """EA [N], EI_y, EI_z, GJ [N m^2] of `wire_compliance`."""
     EI = E * ca.pi * d**4 / 64
-    return beam_compliance(l, E * ca.pi * d**2 / 4, EI, EI, 2 * shear_ratio(nu) * EI)
+    return E * ca.pi * d**2 / 4, EI, EI, 2 * shear_ratio(nu) * EI
 
 
 def round_section(d: Scalar) -> tuple[Scalar, Scalar, Scalar]:

@@ -165,6 +165,28 @@ def jacobian(h: Any, C_XY: Matrix) -> Matrix:
     return ca.horzcat(*columns)
 
 
+def mass(h: Any, m: Any, J: Matrix) -> Matrix:
+    """(6, 6) [kg] of the stages' displacements d, T = 1/2 d'^T M d' at home, the platform moving by J d.
+
+    Stages `stage_mass` along each axis; platform T = 1/2 m |delta' + theta' x c|^2 + 1/2 theta'^T I theta', its centre of mass c half its
+    thickness below the origin; struts, slender rods that move in line between their ends, m/6 (|a'|^2 + a'.b' + |b'|^2). Flexures have no
+    mass. Source: R. J. Guyan, AIAA J. 3 (1965) 380 (all bodies move as they do at rest).
+    """
+    g = geometry(h)
+    turn, shift = J[:3, :], J[3:, :]
+    centre = shift + ca.mtimes(ca.skew(ca.vertcat(0, 0, h.platform_thickness / 2)), turn)  # theta' x (0, 0, -t/2)
+    M = m.stage_mass * ca.DM.eye(6)
+    M += m.platform_mass * ca.mtimes(centre.T, centre)
+    M += ca.mtimes([turn.T, ca.diag(ca.vertcat(*m.platform_inertia)), turn])
+    for i, j in enumerate(STAGE_OF_STRUT):
+        upper = shift - ca.mtimes(ca.skew(g.platform[i]), turn)
+        lower = ca.horzcat(*(g.rotation[j][:, :2] if k == j else ca.DM.zeros(3, 2) for k in range(3)))
+        both = ca.mtimes(upper.T, lower)
+        ends = ca.mtimes(upper.T, upper) + (both + both.T) / 2 + ca.mtimes(lower.T, lower)
+        M += m.strut_mass / 3 * ends
+    return M
+
+
 def stage_loads(h: Any, C_XY: Matrix, J: Matrix) -> Matrix:
     """Force of the struts against each actuated axis per stage displacement [N/m], shape (6, 6).
 

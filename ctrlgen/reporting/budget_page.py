@@ -67,6 +67,7 @@ def budget_record(budget: ErrorBudget) -> dict[str, Any]:
         ],
         "reasons": list(budget.reasons), "probability": budget.probability,
         "limits": [_safety(budget, s) for s in budget.safeties],
+        "broken": budget.broken,
         "band": {
             f"{signal.channels[i]} [{g.unit}]": difference(budget.combined[:, i], g.unit).tolist()
             for g in budget.groups for i in g.channels

@@ -104,6 +104,9 @@ class BudgetRecord(Origin):
     reasons: list[str] = Field(description="Why first order and draws differ; empty where they agree.")
     probability: float = Field(description="Probability at which limits are judged, at each sample.")
     limits: list[SafetyEntry] = Field(description="One entry a bound.")
+    broken: Number = Field(
+        description="Share of the draws that break a limit anywhere on the path; null without draws."
+    )
     band: dict[str, list[float]] = Field(
         description="Combined standard uncertainty at every sample, by 'channel [unit]', in the unit of its group."
     )

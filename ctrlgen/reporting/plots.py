@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from ctrlgen.core.units import from_si
+from ctrlgen.core.units import from_si, show
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
@@ -143,11 +143,13 @@ def draw_margins(solution: Solution) -> Figure:
         share = 100 * max(margin.share or 0.0, 0.0)
         axes.barh(row, share, color=COLOURS[2] if margin is solution.tightest else COLOURS[0], height=0.6)
         unit = margin.limit.unit
-        value, bound = from_si(margin.value, unit), from_si(margin.bound, unit)
+        value, bound = from_si(margin.value, unit), from_si(margin.limit.described(margin.bound), unit)
+        step = "K" if unit == "degC" else unit
+        reserved = f" less {show(margin.reserve, step, 3)} reserved" if margin.reserve else ""
         axes.text(
             share + 1,
             row,
-            f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}",
+            f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}{reserved}",
             va="center",
             fontsize=8,
         )

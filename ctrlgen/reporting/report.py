@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import from_si
+from ctrlgen.core.units import difference, from_si, show
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.reporting.html import render
@@ -70,6 +70,7 @@ def summary(
         "limits_added": list(solution.rows_added),
         "tracking_error": _by_channel(signal, error),
         "error_between_samples": None if (between := solution.between_samples) is None else _by_channel(signal, between),
+        "robust": _robust(solution),
         "margins": [_margin(m, solution) for m in solution.margins],
         "tightest": solution.tightest.limit.name,
         "expected": [
@@ -100,14 +101,37 @@ def passed(comparison: Comparison | None, expected: tuple[ExpectationResult, ...
     return (comparison is None or comparison.passed) and all(e.passed for e in expected)
 
 
+def _robust(solution: Solution) -> dict[str, Any] | None:
+    """With which probability the limits hold, and to where the path was moved for that; None for the device as described."""
+    if solution.model.probability is None:
+        return None
+    signal = solution.model.signals[solution.scenario.file.follow]
+    units, home = dict(zip(signal.channels, signal.units, strict=True)), solution.scenario.home
+    moved = {f"{channel} [{units[channel]}]": float(difference(by, units[channel])) for channel, by in home.items()}
+    return {"probability": solution.model.probability, "moved": moved, "sentence": robust_sentence(solution)}
+
+
+def robust_sentence(solution: Solution) -> str | None:
+    """Such as 'all limits hold with 99.9 % for what is not known exactly; moved by delta_z = -8.41 um'; None where nothing is reserved."""
+    if solution.model.probability is None:
+        return None
+    signal = solution.model.signals[solution.scenario.file.follow]
+    units = dict(zip(signal.channels, signal.units, strict=True))
+    moved = ", ".join(f"{c} = {'+' if v > 0 else ''}{show(v, units[c])}" for c, v in solution.scenario.home.items())
+    sentence = (
+        f"all limits hold with {100 * solution.model.probability:.10g} % along the path for what is not known exactly"
+    )
+    return sentence + (f"; for the least error it is moved by {moved}" if moved else "")
+
+
 def _margin(m: Margin, solution: Solution) -> dict[str, Any]:
     unit = m.limit.unit
-    distance = m.distance if unit == "degC" else float(from_si(m.distance, unit))
+    distance, reserve = (float(difference(v, unit)) for v in (m.distance, m.reserve))
     return {
         "limit": m.limit.name, "label": m.limit.label, "unit": unit, "channel": m.channel, "sample": m.sample,
         "time_s": float(solution.trace.time[m.sample]) if solution.scenario.sample_time else None, 
-        "value": float(from_si(m.value, unit)), "bound": float(from_si(m.bound, unit)),
-        "margin": distance, "margin_unit": "K" if unit == "degC" else unit, "share_left": m.share,
+        "value": float(from_si(m.value, unit)), "bound": float(from_si(m.limit.described(m.bound), unit)),
+        "reserve": reserve, "margin": distance, "margin_unit": "K" if unit == "degC" else unit, "share_left": m.share,
     }  # fmt: skip
 
 

@@ -67,10 +67,23 @@ class MarginRow(Keys):
     sample: int = Field(description="Sample at which it did.")
     time_s: Number = Field(description="Time of that sample [s]; null for settled poses.")
     value: float = Field(description="The quantity there.")
-    bound: float = Field(description="The bound that it approached.")
-    margin: float = Field(description="Distance between both, in margin_unit.")
+    bound: float = Field(description="The bound of the device that it approached.")
+    reserve: float = Field(
+        description="What is kept of it for what is not known exactly, in margin_unit; 0 where nothing is."
+    )
+    margin: float = Field(description="Distance between both less the reserve, in margin_unit.")
     margin_unit: str = Field(description="Unit of margin; K for a temperature.")
     share_left: Number = Field(description="Margin as a share of the limit's range; null for a limit without a range.")
+
+
+class RobustPath(Keys):
+    """Limits that hold for what is not known exactly."""
+
+    probability: float = Field(description="With which all limits hold along the path.")
+    moved: dict[str, float] = Field(
+        description="By how much the path was moved for the least expected error, by 'channel [unit]'."
+    )
+    sentence: str = Field(description="The same in words.")
 
 
 class ExpectedRow(Keys):
@@ -139,6 +152,7 @@ class Summary(Origin):
     error_between_samples: dict[str, float] | None = Field(
         description="The same between samples, under held drives; null for a device without inertia."
     )
+    robust: RobustPath | None = Field(description="Null where the limits hold for the device as described.")
     margins: list[MarginRow] = Field(description="One row a limit.")
     tightest: str = Field(description="Name of the limit with the smallest share left.")
     expected: list[ExpectedRow] = Field(description="One row an expectation of the scenario.")

@@ -154,7 +154,8 @@ class InertialInverse:
         device = self.model.device
         kept = tuple(e for e in device.effect if not left_out(e))
         plain = build_model(device.model_copy(update={"effect": kept}), sample_time=self.sample_time)
-        return InertialInverse(ganged_as(plain, self.model), self.follow, self.sample_time, approximate)
+        model = ganged_as(plain, self.model).limited_as(self.model)
+        return InertialInverse(model, self.follow, self.sample_time, approximate)
 
     @cached_property
     def _equilibrium(self) -> ca.Function:

@@ -58,17 +58,25 @@ def unreachable(
     nearest = _nearest_pose(model, scenario.file.follow, wanted[worst]) if held else None
     if nearest is not None:
         lines.append(f"  nearest pose of that sample that can be held: {_point(signal, nearest)}")
-    slowed = None if scenario.sample_time is None else scenario.slowed(model)
-    found = Alternatives(inverse, signal, command, scenario.closed, slowed, [c.worst for c in causes]).found()
+    line, found = instead(scenario, inverse, command, [c.worst for c in causes])
+    lines += [line] * bool(line)
+    return Unreachable("\n".join(lines), Infeasibility(samples, worst, wanted, nearest, found))
+
+
+def instead(
+    scenario: Scenario, inverse: Inverse, command: Command, worst: Sequence[int]
+) -> tuple[str, dict[str, np.ndarray]]:
+    """What can be followed instead of a path that breaks limits most at the samples `worst`: a line of text, empty for one pose, and
+    the paths (n, channels) [SI] by what they are compared with the commanded one."""
+    slowed = None if scenario.sample_time is None else scenario.slowed(inverse.model)
+    signal = inverse.model.signals[scenario.file.follow]
+    found = Alternatives(inverse, signal, command, scenario.closed, slowed, worst).found()
+    line = ""
     if found:
-        lines.append(f"  the path can be followed {'; or '.join(a.what for a in found)}")
+        line = f"  the path can be followed {'; or '.join(a.what for a in found)}"
     elif len(command) > 1:
-        lines.append(
-            "  no shifted, smaller or slower path was found that can be followed; command smaller motions near home"
-        )
-    return Unreachable(
-        "\n".join(lines), Infeasibility(samples, worst, wanted, nearest, {a.what: samples_of(a.command) for a in found})
-    )
+        line = "  no shifted, smaller or slower path was found that can be followed; command smaller motions near home"
+    return line, {a.what: samples_of(a.command) for a in found}
 
 
 def primary(model: Model, broken: Sequence[Violation]) -> list[Violation]:

@@ -7,12 +7,19 @@ The inverse of the device with one force for each axis (`ctrlgen.model.allocatio
 
 Where the closed form keeps the limits it is the answer. Else a linear programme says whether any drives keep them: if so IPOPT finds
 those of least effort, a convex quadratic programme; if not, its drives break the limits by the least sum, in shares of their ranges,
-which is what an explanation names.
+which is what an explanation names. Where limits on rates couple the samples and only an answer is asked for, two smaller programmes
+give it for most paths. Some samples k_1 < k_2 < ... have to satisfy
+
+    low rate <= (u_k_j+1 - u_k_j) / (k_j+1 - k_j) T <= high rate,
+
+as the mean of what the samples between them keep: where no drives do, none follow the path. Those farthest inside of the limits are
+joined by lines in time and corrected to B_k u_k = f_k; where these keep every limit, they follow it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 from itertools import combinations
 
@@ -33,6 +40,16 @@ from ctrlgen.trajectory.violations import NEGLIGIBLE, violations
 TOLERANCE = 1e-10  # of a share: IPOPT's of the optimality error, the linear programme's of each row
 MOST_ITERATIONS = 200
 NEAR = 1e-6  # ranges from a limit within which a drive is at it
+COARSE = 100  # samples along a path that decide for most whether its rates can be kept
+FOLLOWS = 1e-2  # share of a correction that a drive takes whose rate is limited, where others can
+
+
+class Wanted(Enum):
+    """Which drives are asked for."""
+
+    LEAST = "those of least effort"
+    ANY = "any that keep the limits"
+    EVIDENT = "any that keep the limits where few samples show that some do"
 
 
 class LeastEffortInverse:
@@ -97,10 +114,11 @@ class LeastEffortInverse:
         periods: int = PERIODS,
     ) -> bool:
         """Whether `command` can be followed with a `margin`, a share of each limit; where nothing but the samples matters, judged by
-        those `chosen`."""
+        those `chosen`; with limits on rates and samples `chosen`, paths within a thousandth or so of a limit are taken as beyond it."""
         if self.model.rate_limits or self._facets is None:
             found = self._forces(command, closed, periods)
-            found = self._allocated(found, samples_of(command)[0], closed, margin, best=False)
+            wanted = Wanted.ANY if chosen is None else Wanted.EVIDENT
+            found = self._allocated(found, samples_of(command)[0], closed, margin, wanted)
             return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
         if isinstance(command, np.ndarray) and isinstance(self.inner, PathInverse) and not self.inner.remembers:
             x, z, f = self.inner.equilibria(command if chosen is None else command[chosen])
@@ -113,28 +131,27 @@ class LeastEffortInverse:
         return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
 
     def _allocated(
-        self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0, best: bool = True
-    ) -> InverseTrajectory:
+        self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
+    ) -> InverseTrajectory:  # fmt: skip
         """`found` with drives instead of forces."""
         if not np.all(np.isfinite(found.u)):
             u = np.full((len(found.u), self.model.u.numel()), np.nan)
             return replace(found, u=u, u_start=u[0])
         if self.sample_time is None:
-            u = self.drives(found.z, found.u, margin=margin, best=best)
+            u = self.drives(found.z, found.u, margin=margin, wanted=wanted)
             return replace(found, u=u, u_start=u[0])
         z = np.vstack([found.z[1:], found.z[:1] if closed else found.z[-1:]])  # where each drive leads
         if closed:
-            u = self.drives(z, found.u, closed, margin, best)
+            u = self.drives(z, found.u, closed, margin, wanted)
             return replace(found, u=u, u_start=u[-1])
         _, z_start, f_start = self.inner.at_rest(first)
-        u = self.drives(np.vstack([z_start, z]), np.vstack([f_start, found.u]), margin=margin, best=best)
+        u = self.drives(np.vstack([z_start, z]), np.vstack([f_start, found.u]), margin=margin, wanted=wanted)
         return replace(found, u=u[1:], u_start=u[0])
 
     def drives(
-        self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0, best: bool = True
-    ) -> np.ndarray:
-        """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other; where not
-        the `best` are asked for, any that keep the limits do."""
+        self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
+    ) -> np.ndarray:  # fmt: skip
+        """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other."""
         timed = self.sample_time is not None and bool(self.model.rate_limits)
         n = len(f)
         u = self.allocation.drive.map(n)(z.T, f.T).full().T
@@ -149,7 +166,7 @@ class LeastEffortInverse:
         if chosen.any():
             rates = self._rate_bounds(margin) if timed else None
             u[chosen] = self._solved(
-                self._slopes(z[chosen]), f[chosen], u[chosen], self._bounds(margin), rates, closed, best
+                self._slopes(z[chosen]), f[chosen], u[chosen], self._bounds(margin), rates, closed, wanted
             )
         return u
 
@@ -182,7 +199,7 @@ class LeastEffortInverse:
     def _slopes(self, z: np.ndarray) -> np.ndarray:
         """(n, n_axes, n_u) B at each displacement."""
         n, n_u = len(z), self.model.u.numel()
-        return np.array(np.split(self._B.map(n)(z.T).full(), n, axis=1)).reshape(n, -1, n_u)
+        return self._B.map(n)(z.T).full().reshape(-1, n, n_u).swapaxes(0, 1)
 
     @cached_property
     def _B(self) -> ca.Function:
@@ -201,30 +218,55 @@ class LeastEffortInverse:
 
     def _solved(
         self, B: np.ndarray, f: np.ndarray, begin: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
-        rates: tuple[np.ndarray, np.ndarray] | None, closed: bool, best: bool,
+        rates: tuple[np.ndarray, np.ndarray] | None, closed: bool, asked: Wanted,
     ) -> np.ndarray:  # fmt: skip
-        """The programme of the module's text, begun at the closed form; where no drives keep the limits, or not the `best` are asked
-        for, those that break them least."""
+        """The programme of the module's text, begun at the closed form; where no drives keep the limits, or not those of least
+        effort are `asked` for, those that break them least, or where the answer is no, perhaps the closed form."""
         m, n, n_u = self.model, len(f), self.model.u.numel()
+        if rates is not None and asked is not Wanted.LEAST and n >= 2 * COARSE:
+            few = self._interpolated(B, f, begin, bounds, rates, closed)
+            if few is not None or asked is Wanted.EVIDENT:
+                return begin if few is None else few
         span = 1 / np.sqrt(effort_weights(m) / m.drive_weights)
         shares = B * span
         size = np.linalg.norm(shares, axis=2)  # what full drives push
-        pushed = sp.block_diag(shares / size[:, :, None], format="csr")
-        limited = _Rows(sp.eye(n * n_u, format="csr"), *(np.tile(bound / span, n) for bound in bounds))
-        if rates is not None:
-            allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
-            step = sp.eye(n) - sp.eye(n, k=-1)
-            step = (step - sp.eye(n, k=n - 1)).tocsr() if closed else step.tocsr()[1:]  # nothing comes before the first
-            count = step.shape[0]
-            change = sp.kron(step, sp.diags_array(span / allowed), format="csr")
-            limited = limited.joined(_Rows(change, *(np.tile(bound / allowed, count) for bound in rates)))
+        pushed = _diagonal(shares / size[:, :, None])
+        limited = _limited_rows(bounds, rates, span, np.ones(n if closed else n - 1), n)
         wanted = (f / size).ravel()
         least, excess = _least_excess(pushed, wanted, limited)
-        if excess > NEGLIGIBLE or not best:
+        if excess > NEGLIGIBLE or asked is not Wanted.LEAST:
             return least.reshape(n, n_u) * span
         weights = np.tile(m.drive_weights / m.drive_weights.max(), n)
         u = _least_squares(weights, pushed, wanted, limited, (begin / span).ravel()).reshape(n, n_u) * span
         return _polished(u, shares, f, (bounds[0] / span, bounds[1] / span), span)
+
+    def _interpolated(
+        self, B: np.ndarray, f: np.ndarray, begin: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
+        rates: tuple[np.ndarray, np.ndarray], closed: bool,
+    ) -> np.ndarray | None:  # fmt: skip
+        """Drives that keep the limits, from those of `COARSE` samples; those `begin` of the closed form, which break them, where these
+        samples show that none keep them; None where neither is shown."""
+        n = len(f)
+        k = np.unique(np.linspace(0, n - 1, COARSE).round().astype(int))
+        gaps = np.append(np.diff(k), n - k[-1]) if closed else np.diff(k)
+        span = 1 / np.sqrt(effort_weights(self.model) / self.model.drive_weights)
+        shares = B[k] * span
+        size = np.linalg.norm(shares, axis=2)
+        pushed = _diagonal(shares / size[:, :, None])
+        limited = _limited_rows(bounds, rates, span, gaps, len(k))
+        least, excess = _least_worst(pushed, (f[k] / size).ravel(), limited)
+        if excess > NEGLIGIBLE:
+            return begin
+        coarse, at = least.reshape(len(k), -1) * span, np.arange(n)
+        if closed:
+            k, coarse = np.append(k, n), np.vstack([coarse, coarse[:1]])
+        u = np.column_stack([np.interp(at, k, own) for own in coarse.T])
+        yields = np.where(np.isfinite(rates[1] - rates[0]), FOLLOWS, 1.0) * span  # most where no rate is limited
+        missing = np.linalg.solve((B * yields**2) @ B.swapaxes(1, 2), f[:, :, None] - B @ u[:, :, None])
+        u += (yields[:, None] ** 2 * (B.swapaxes(1, 2) @ missing))[:, :, 0]
+        change = np.diff(u, axis=0, prepend=u[-1:] if closed else u[:1])
+        kept = np.all((u >= bounds[0]) & (u <= bounds[1]) & (change >= rates[0]) & (change <= rates[1]))
+        return u if kept else None
 
 
 @dataclass(frozen=True)
@@ -246,22 +288,55 @@ class _Rows:
         return _Rows(A, np.append(self.low, other.low), np.append(self.high, other.high))
 
 
+def _diagonal(blocks: np.ndarray) -> sp.csr_array:
+    """The block diagonal matrix of `blocks` (n, rows, columns)."""
+    n = len(blocks)
+    return sp.bsr_array((blocks, np.arange(n), np.arange(n + 1))).tocsr()
+
+
+def _limited_rows(
+    bounds: tuple[np.ndarray, np.ndarray], rates: tuple[np.ndarray, np.ndarray] | None, span: np.ndarray, gaps: np.ndarray, n: int
+) -> _Rows:  # fmt: skip
+    """The limits of the drives of `n` samples, and of their changes, `gaps` times the `rates`, from each to the next, of a closed path also
+    from the last to the first."""
+    limited = _Rows(sp.eye(n * len(span), format="csr"), *(np.tile(bound / span, n) for bound in bounds))
+    if rates is None:
+        return limited
+    allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
+    step = (sp.eye(n, k=1) - sp.eye(n) + sp.eye(n, k=1 - n)).tocsr()[: len(gaps)]
+    change = sp.kron(sp.diags_array(1 / gaps) @ step, sp.diags_array(span / allowed), format="csr")
+    return limited.joined(_Rows(change, *(np.tile(bound / allowed, len(gaps)) for bound in rates)))
+
+
+def _least_worst(pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows) -> tuple[np.ndarray, float]:
+    """Drives that push as `wanted` and stay inside of limits, or break them, by the same most or least share, and that share, negative
+    inside; by a linear programme. Raises SolverError."""
+    one = sp.csr_array(np.ones((len(limited.low), 1)))
+    return _programme(pushed, wanted, limited, one, -1.0)
+
+
 def _least_excess(pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows) -> tuple[np.ndarray, float]:
     """Drives that push as `wanted` and break limits by the least sum, and that sum; by a linear programme. Raises SolverError."""
-    m, n = limited.A.shape
-    one, cost = sp.eye(m), np.concatenate([np.zeros(n), np.ones(m)])
+    return _programme(pushed, wanted, limited, sp.eye(limited.A.shape[0], format="csr"), 0.0)
+
+
+def _programme(
+    pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows, beyond: sp.csr_array, least: float
+) -> tuple[np.ndarray, float]:
+    """Minimises the sum of excesses e >= `least`, low - `beyond` e <= A s <= high + `beyond` e; s and the largest e. Raises SolverError."""
+    n, m = limited.A.shape[1], beyond.shape[1]
     above, below = np.isfinite(limited.high), np.isfinite(limited.low)
     A = sp.vstack(
-        [sp.hstack([limited.A, -one], format="csr")[above], sp.hstack([-limited.A, -one], format="csr")[below]]
+        [sp.hstack([limited.A, -beyond], format="csr")[above], sp.hstack([-limited.A, -beyond], format="csr")[below]]
     )
     answer = linprog(
-        cost, A_ub=A, b_ub=np.concatenate([limited.high[above], -limited.low[below]]), b_eq=wanted,
+        np.append(np.zeros(n), np.ones(m)), A_ub=A, b_ub=np.append(limited.high[above], -limited.low[below]), b_eq=wanted,
         A_eq=sp.hstack([pushed, sp.csr_array((len(wanted), m))]), method="highs", options={"primal_feasibility_tolerance": TOLERANCE},
-        bounds=np.column_stack([np.append(np.full(n, -np.inf), np.zeros(m)), np.full(n + m, np.inf)]),
+        bounds=np.column_stack([np.append(np.full(n, -np.inf), np.full(m, least)), np.full(n + m, np.inf)]),
     )  # fmt: skip
     if answer.x is None:
         raise SolverError(f"no drives push as the path needs ({answer.message}); command a smaller or slower path")
-    return answer.x[:n], float(answer.x[n:].max(initial=0.0))
+    return answer.x[:n], float(answer.x[n:].max(initial=least))
 
 
 def _least_squares(

@@ -125,7 +125,8 @@ class PathInverse:
             return self
         device = self.model.device
         plain = device.model_copy(update={"effect": tuple(e for e in device.effect if not e.states)})
-        return PathInverse(ganged_as(build_model(plain), self.model), self.follow, self.sample_time)
+        model = ganged_as(build_model(plain), self.model).limited_as(self.model)
+        return PathInverse(model, self.follow, self.sample_time)
 
     def trajectory(self, command: np.ndarray, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
         """What `command` (n, channels) [SI] takes; not finite where the equations have no solution. A closed path is run through

@@ -69,6 +69,15 @@ class Path_(Section):
         that ends stays at its last sample. Raises InputError."""
         raise NotImplementedError
 
+    def geometry(self, frame: Frame, order: int, share: np.ndarray) -> np.ndarray:
+        """(order + 1, len(share), channels) [SI, per share^k]: the curve alone, without a law of time, and its derivatives where the
+        `share` of it, 0 ... 1, is behind. Raises InputError."""
+        raise NotImplementedError
+
+    def corners_at(self, frame: Frame) -> np.ndarray:
+        """The shares at which the curve begins, has corners, and ends."""
+        return np.array([0.0, 1.0])
+
 
 class Smooth_(Path_):
     """Base of the paths with a law of time."""
@@ -81,6 +90,10 @@ class Smooth_(Path_):
     def continuous(self) -> int:
         """Those that are zero at the rest points."""
         return MINIMUM_JERK if self.smooth is None else self.smooth
+
+    def geometry(self, frame: Frame, order: int, share: np.ndarray) -> np.ndarray:
+        """By the law of time of degree one, in which the share is the time: of n samples, n or n - 1 lie between the ends."""
+        return self.model_copy(update={"smooth": 0}).derivatives(frame, 1 if self.closed else 2, order, share)
 
 
 class Curve_(Smooth_):
@@ -149,6 +162,11 @@ class Legs_(Smooth_):
     def corners(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
         """The rest points (m, channels) [SI] and when they are reached, in any unit of time. Raises InputError."""
         raise NotImplementedError
+
+    def corners_at(self, frame: Frame) -> np.ndarray:
+        """When the rest points are reached, as a share of the whole."""
+        _, times = self.corners(frame)
+        return (times - times[0]) / (times[-1] - times[0])
 
     def derivatives(self, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
         """The law of time on each leg."""
@@ -274,7 +292,7 @@ class Poses(Path_):
     """Samples listed in the scenario (`points`) or in a CSV file (`file`), one row per sample.
 
     Between samples, and for derivatives, the path is the spline of degree 2 p + 1 through them whose first p derivatives are zero at
-    both ends, p the derivatives that are needed.
+    both ends, p the derivatives that are needed; or the periodic one.
     """
 
     kind: Literal["poses"]
@@ -283,11 +301,22 @@ class Poses(Path_):
     """The samples, each as channels with units; channels left out are zero."""
     file: str = ""
     """A CSV file, relative to scenario.toml: a header row of channels such as `delta_z [um]`, then one row a sample."""
+    periodic: bool = False
+    """The first sample follows the last one. Otherwise the path ends at its last sample."""
     folder: SkipJsonSchema[Path] = Field(default=Path(), exclude=True)
     """Where `file` is looked for; set by the program."""
+    listed: SkipJsonSchema[tuple[tuple[float, ...], ...]] = Field(default=(), exclude=True)
+    """The samples of `file` [SI] where it is yet to be written; set by the program."""
+
+    @property
+    def closed(self) -> bool:
+        """As stated."""
+        return self.periodic
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
         """The samples as listed; `n` is not read."""
+        if self.listed:
+            return np.array(self.listed)
         if bool(self.points) == bool(self.file):
             what = "give points or file, not both" if self.points else "is missing; give points or file"
             raise InputError("path", [Fault("points", what)])
@@ -302,6 +331,10 @@ class Poses(Path_):
         if len(listed) < 2 * order + 2:
             what = f"has {len(listed)} samples; their {order}. derivative takes {2 * order + 2} or more: add samples"
             raise InputError("path", [Fault("points", what)])
+        if self.periodic:
+            ring = np.vstack([listed, listed[:1]])
+            spline = make_interp_spline(np.arange(len(ring)), ring, 2 * order + 1, bc_type="periodic")
+            return np.stack([spline(at, k, extrapolate="periodic") for k in range(order + 1)])
         spline = make_interp_spline(np.arange(len(listed)), listed, 2 * order + 1, bc_type=(still, still))
         return np.stack([spline(np.clip(at, 0, len(listed) - 1), k) for k in range(order + 1)])
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import re
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -16,16 +17,19 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import In, Quantity, read_quantity, show, written_unit
+from ctrlgen.core.units import In, Quantity, read_probability, read_quantity, show, written_unit
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.base import Section
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import build_model
-from ctrlgen.model.inverse_dynamics import relative_degrees
+from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
 from ctrlgen.model.model import Model
+from ctrlgen.model.quasi_static import natural_modes
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.motion import Command, Motion
 from ctrlgen.trajectory.paths import PathKind, Poses
+from ctrlgen.trajectory.shaping import Shaper, Shaping
+from ctrlgen.trajectory.shaping import shaper as make_shaper
 
 FILE = "scenario.toml"
 MOST_SAMPLES = 1_000_000  # of one path: what memory holds
@@ -44,6 +48,32 @@ class Expectation(Section):
     """Smallest and largest value that pass, with units."""
     source: str = ""
     """Where the expected value comes from."""
+
+
+class Robust(Section):
+    """Limits that hold for what is not known exactly: the standard deviations of uncertainty.toml beside the scenario and those of the
+    device file."""
+
+    probability: str
+    """With which all limits hold along the whole path, such as "99.9 %"."""
+    home: tuple[str, ...] = ()
+    """Channels of the followed signal along which the whole path may be moved; of the places where the limits hold, that with the
+    smallest expected error is taken."""
+
+    @model_validator(mode="after")
+    def _meaning(self) -> Robust:
+        if not 0.5 <= self.chance < 1:
+            raise ValueError(
+                f'probability = "{self.probability}" must be at least 50 % and below 100 %, such as "99.9 %"'
+            )
+        if len(set(self.home)) < len(self.home):
+            raise ValueError(f"home names a channel twice: {', '.join(self.home)}; name each once")
+        return self
+
+    @property
+    def chance(self) -> float:
+        """The probability as a number, 0.999 for "99.9 %"."""
+        return read_probability(self.probability)
 
 
 class ScenarioFile(Section):
@@ -67,10 +97,26 @@ class ScenarioFile(Section):
     """Number of samples of a static scenario; not needed for a list of poses."""
     path: PathKind
     """The commanded path; its `kind` chooses the shape."""
+    shaping: Shaping | None = None
+    """`[shaping]`: the path is shaped so that it leaves a mode of the device at rest. Left out: it is not."""
+    feedforward: Literal["inertia", "static"] = "inertia"
+    """Of a device with inertia. `inertia`: the drives that move its masses along the path. `static`: those that would if it stood in
+    balance at every moment, without inertia and damping; it then follows as well as it does, and vibrates.
+    """
     outcome: Literal["solved", "unreachable"] = "solved"
     """Whether a trajectory is expected to exist; `unreachable` passes where none does."""
+    robust: Robust | None = None
+    """Left out: the limits hold for the device as described, and may be broken by one whose numbers differ."""
     expect: tuple[Expectation, ...] = ()
     """`[[expect]]` tables: values that the solution must have."""
+
+    @model_validator(mode="after")
+    def _robust_feedforward(self) -> ScenarioFile:
+        if self.robust is not None and self.feedforward == "static":
+            raise ValueError(
+                'robust solves for drives that keep the path, which feedforward = "static" does not; leave out one of them'
+            )
+        return self
 
     @model_validator(mode="after")
     def _timing(self) -> ScenarioFile:
@@ -79,6 +125,8 @@ class ScenarioFile(Section):
                 raise ValueError(
                     "duration is given without sample_rate; add sample_rate, or leave both out for a static scenario"
                 )
+            if self.shaping is not None:
+                raise ValueError("shaping is of motions in time: give sample_rate and duration, or leave it out")
             if self.points is None and not isinstance(self.path, Poses):
                 raise ValueError(
                     'a static scenario needs points = N; for motion in time give sample_rate = "1 kHz" and duration'
@@ -109,7 +157,7 @@ class Scenario:
     """A scenario ready to be solved. `file` is what scenario.toml says; `name` the folder's name as a C identifier.
 
     `inputs`: the "scenario" itself, its "device" (with "device_code" where that names a Python file) and, where a path is read from
-    a file, its "poses".
+    a file, its "poses"; of a robust one that is solved its "uncertainty". `home` [SI] is by how much the path is moved, by channel.
     """
 
     name: str
@@ -117,6 +165,7 @@ class Scenario:
     file: ScenarioFile
     device: Device
     inputs: dict[str, Input]
+    home: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def digest(self) -> dict[str, str]:
@@ -143,26 +192,93 @@ class Scenario:
         """How many times as long -> the target of the same path; None for one that is not shaped by a formula."""
         if isinstance(self.file.path, Poses) or self.file.duration is None or self.file.sample_rate is None:
             return None
-        n, rate = len(self.command(model)), self.file.sample_rate
+        n, rate = self._sample_count(self.file.sample_rate, self.file.duration), self.file.sample_rate
+        given = self._shaping_as_given(model)
 
         def target(times: float) -> Command:
             samples = min(round(times * n), MOST_SAMPLES)
             longer = read_quantity("s", f"{samples / rate.si!r} s")
-            return replace(self, file=self.file.model_copy(update={"duration": longer})).target(model)
+            return replace(self, file=self.file.model_copy(update={"duration": longer} | given)).target(model)
 
         return target
 
     def command(self, model: Model) -> np.ndarray:
         """The commanded samples (n, channels) of the followed signal, SI. Raises InputError."""
         samples = self._on_path(model, lambda path, frame, n: path.samples(frame, n))
+        samples = samples + self._moved_by(model) if self.file.shaping is None else self._positions(model, len(samples))
         if self.sample_time and len(samples) < 2:
             what = "has one sample, but motion in time needs two or more; for one pose leave out sample_rate"
             raise InputError(self.path, [Fault("path", what)])
         return samples
 
+    def geometry(self, model: Model, order: int, share: np.ndarray) -> np.ndarray:
+        """(order + 1, len(share), channels) [SI, per share^k]: the curve of the path alone, where the `share` of it, 0 ... 1, is behind.
+        Raises InputError."""
+        return self._on_path(model, lambda path, frame, n: path.geometry(frame, order, share))
+
+    def corners(self, model: Model) -> np.ndarray:
+        """The shares of the path at which it begins, has corners, and ends; a closed one has none. Raises InputError."""
+        return self._on_path(model, lambda path, frame, n: path.corners_at(frame))
+
     def target(self, model: Model) -> Command:
         """What is to be followed: the samples, with their derivatives where the model has inertia. Raises InputError."""
         return self.motion(model) if model.inertial else self.command(model)
+
+    def positions(self, model: Model, after: float) -> np.ndarray:
+        """(n, channels) [SI] of the followed signal so many samples `after` each sample; before it where negative."""
+        n = len(self._on_path(model, lambda path, frame, n: path.samples(frame, n)))
+        return self._positions(model, n, after)
+
+    def _positions(self, model: Model, n: int, after: float = 0.0) -> np.ndarray:
+        """(n, channels) [SI] of the path of `n` samples, or shaped as many more as that takes, so many samples `after` each."""
+        order = (
+            1 if isinstance(self.file.path, Poses) else 0
+        )  # listed samples are joined by cubic splines, and not by lines
+        shaper = self.shaper(model)
+        longer = 0 if shaper is None else shaper.samples(self.sample_time or 0.0)
+        return self._tables(model, order, np.arange(n + longer) + after, shaper)[0]
+
+    def _tables(self, model: Model, order: int, at: np.ndarray, shaper: Shaper | None) -> np.ndarray:
+        """(order + 1, len(at), channels) [SI, per sample^k] of the path, shaped where there is a shaper."""
+        impulses = [(1.0, 0.0)] if shaper is None else list(zip(shaper.amplitudes, shaper.times, strict=True))
+        rate = 1 / (self.sample_time or 1.0)
+        parts = []
+        for amplitude, time in impulses:
+            evaluate = partial(_derivatives_at, order=order, at=at - time * rate)
+            parts.append(amplitude * self._on_path(model, evaluate))
+        tables = np.sum(parts, axis=0)
+        tables[0] += self._moved_by(model)
+        return np.asarray(tables)
+
+    def shaper(self, model: Model) -> Shaper | None:
+        """The impulses with which the path is convolved; None where it is not shaped. Raises InputError for a closed path, and where the
+        model has no mode and no frequency is stated."""
+        given = self.file.shaping
+        if given is None:
+            return None
+        if self.closed:
+            what = "leaves a mode at rest where a path ends, but this one is periodic: write from_rest = true in path, or leave it out"
+            raise InputError(self.path, [Fault("shaping", what)])
+        if given.frequency is not None:
+            return make_shaper(
+                given.kind, given.frequency.si, 0.0 if given.damping_ratio is None else given.damping_ratio.si
+            )
+        end = self._on_path(model, lambda path, frame, n: path.samples(frame, n))[-1]
+        mode = least_damped_mode(model, self.file.follow, tuple(end)) if model.inertial else None
+        if mode is None:
+            why = "no mode that vibrates" if model.inertial else "no inertia, so that no mode vibrates"
+            what = f'is missing: the model of {model.name} has {why}; write that of the device, frequency = "100 Hz", or leave out shaping'
+            raise InputError(self.path, [Fault("shaping.frequency", what)])
+        ratio = mode[1] if given.damping_ratio is None else given.damping_ratio.si
+        return make_shaper(given.kind, mode[0], ratio)
+
+    def _shaping_as_given(self, model: Model) -> dict[str, Shaping]:
+        """The table of a shaped scenario with its numbers written out."""
+        if (used := self.shaper(model)) is None or self.file.shaping is None:
+            return {}
+        numbers = {"frequency": f"{used.frequency!r} Hz", "damping_ratio": repr(used.damping_ratio)}
+        table = {"kind": used.kind} | numbers
+        return {"shaping": Shaping.model_validate(table)}
 
     def motion(self, model: Model, at: np.ndarray | None = None) -> Motion:
         """The path with as many derivatives by time as the drive of a `model` with inertia needs, at the samples or at the positions
@@ -177,15 +293,21 @@ class Scenario:
             raise InputError(self.path, [Fault("path", f"{what}: raise sample_rate, or make the path longer")])
         self._check_smoothness(model, samples, order)
         places = np.arange(len(samples)) if at is None else at
-        tables = self._on_path(model, lambda path, frame, n: path.derivatives(frame, n, order, places))
+        tables = self._tables(model, order, places, self.shaper(model))
         rates = self.sample_time ** -np.arange(1.0, order + 1)
         return Motion(tables[0], tables[1:] * rates[:, None, None])
+
+    def _moved_by(self, model: Model) -> np.ndarray:
+        """(channels,) by how much the path is moved."""
+        return np.array([self.home.get(channel, 0.0) for channel in model.signals[self.file.follow].channels])
 
     def _check_smoothness(self, model: Model, samples: np.ndarray, order: int) -> None:
         """Refuses a path whose derivative of this order jumps, so that the drive would."""
         path = self._path(model)
         if isinstance(path, Poses):
-            still = np.vstack([samples[:1].repeat(order + 1, axis=0), samples, samples[-1:].repeat(order + 1, axis=0)])
+            rest = (samples[:1].repeat(order + 1, axis=0), samples[-1:].repeat(order + 1, axis=0))
+            before, after = (samples, samples) if self.closed else rest
+            still = np.vstack([before[-order - 1 :], samples, after[: order + 1]])
             largest, change = (np.abs(np.diff(still, k, axis=0)).max(axis=0) for k in (order, order + 1))
             if np.any(change > RESOLVED * largest):
                 what = (
@@ -235,6 +357,14 @@ class Scenario:
         return n
 
 
+def check_tightened(scenario: Scenario, model: Model) -> None:
+    """Refuses the model of a device as described where the scenario asks for limits that hold for what is not known exactly. Raises
+    InputError."""
+    if scenario.file.robust is not None and model.probability is None:
+        what = "asks for tightened limits, which this model does not have: take ctrlgen.solve, and the model of the solution"
+        raise InputError(scenario.path, [Fault("robust", what)])
+
+
 def model_of(scenario: Scenario) -> Model:
     """The model that is led along the path: without laws of readings that look back by samples (delay, clock offset), which change no
     drive; a warning names them. Raises InputError where a feedback loop reads what they do, so that they do change its drive."""
@@ -256,6 +386,21 @@ def model_of(scenario: Scenario) -> Model:
 def _read_by_the_loop(model: Model) -> bool:
     """Whether states that change once a sample, as those of late readings do, act on the output of the feedback loop."""
     return bool(ca.depends_on(model.held_value, model.x[list(model.stepped)]))
+
+
+def _derivatives_at(path: PathKind, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
+    return path.derivatives(frame, n, order, at)
+
+
+@lru_cache(maxsize=8)  # a scenario asks for it whenever it is sampled
+def least_damped_mode(model: Model, follow: str, target: tuple[float, ...]) -> tuple[float, float] | None:
+    """(undamped natural frequency [Hz], damping ratio) of the mode damped least at rest at `target` (channels,) [SI] of the signal
+    `follow`; None where none vibrates."""
+    dynamics = inverse_dynamics(model, follow)
+    still = np.column_stack([np.array(target), np.zeros((len(target), dynamics.order))])
+    x, z, u = (v.full().ravel() for v in dynamics.kernel(still))
+    modes = natural_modes(model, x, z, u)
+    return modes[0] if modes else None
 
 
 def motion_targets(scenario: Scenario, model: Model) -> np.ndarray:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
 
 import casadi as ca
 import numpy as np
@@ -12,16 +13,19 @@ from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import show
 from ctrlgen.model.discretisation import one_step_map
 from ctrlgen.model.model import Limit, Model
-from ctrlgen.model.simulation import Trace, simulate
+from ctrlgen.model.quasi_static import natural_modes, quasi_static
+from ctrlgen.model.simulation import Trace, periodic_start, simulate
 from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
 from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
 from ctrlgen.trajectory.motion import Motion
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
-from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.sampled_inverse import SampledTrajectory
+from ctrlgen.trajectory.scenario import MOST_SAMPLES, Scenario, check_tightened
 from ctrlgen.trajectory.violations import Before, limited_values, violations
 
+SHOWN = 3  # limits that a message names
 LOOKED_AT_BETWEEN = 4  # parts of a sample at whose ends the motion between samples is looked at
 
 
@@ -40,6 +44,11 @@ class Margin:
     bound: float
     distance: float
     share: float | None
+
+    @property
+    def reserve(self) -> float:
+        """What is kept of the device's own bound for what is not known exactly; the distance is what is left beside it."""
+        return abs(self.limit.described(self.bound) - self.bound)
 
 
 @dataclass(frozen=True)
@@ -66,6 +75,12 @@ class Solution:
     def tightest(self) -> Margin:
         """The margin with the smallest share of its range left."""
         return min((m for m in self.margins if m.share is not None), key=lambda m: m.share or 0.0)
+
+
+def _one_period(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, sample_time: float) -> int:
+    """Samples of one period of the slowest mode, after a path at whose end it may still vibrate; none where none does."""
+    modes = natural_modes(model, x, z, u)
+    return min(ceil(1 / (min(f for f, _ in modes) * sample_time)), MOST_SAMPLES) if modes else 0
 
 
 def check_feasibility(
@@ -95,7 +110,31 @@ def check_motion(
     return inverse, motion, needed
 
 
+def check_static(
+    scenario: Scenario, model: Model
+) -> tuple[PathInverse | LeastEffortInverse, InverseTrajectory]:  # fmt: skip
+    """The inverse of a device with inertia in balance, and what it needs. Raises as `check_feasibility`, and InputError for a device
+    without inertia, or whose static drive depends on the motion."""
+    if not model.inertial or scenario.sample_time is None:
+        what = (
+            "is static, but the device has no inertia"
+            if not model.inertial
+            else "is of motions: give sample_rate and duration"
+        )
+        raise InputError(scenario.path, [Fault("feedforward", f"{what}; leave it out")])
+    still = quasi_static(model)
+    _check_invertible(scenario, still)
+    inverse = path_inverse(still, scenario.file.follow, scenario.sample_time)
+    command = scenario.command(model)
+    led = command if model.n_states else scenario.positions(model, -0.5)
+    needed = inverse.trajectory(led, scenario.closed)
+    if (error := unreachable(scenario, inverse, command, needed)) is not None:
+        raise error
+    return inverse, needed
+
+
 def _check_invertible(scenario: Scenario, model: Model) -> None:
+    check_tightened(scenario, model)
     if model.clocks and scenario.closed:
         what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
         raise InputError(scenario.path, [Fault("path", what)])
@@ -105,14 +144,48 @@ def _check_invertible(scenario: Scenario, model: Model) -> None:
 
 def solve(scenario: Scenario, model: Model, progress: Callable[[str], None] = lambda _: None) -> Solution:
     """The drives that follow `scenario`. Raises Unreachable where it cannot be followed, SolverError where none are found, and
-    InputError for a device that cannot be inverted, a path that is not smooth enough for one with inertia, or a closed path of one
-    that changes with time.
+    InputError for a device that cannot be inverted, a path that is not smooth enough for one with inertia, a closed path of one
+    that changes with time, or limits that are to be tightened and are not (`ctrlgen.budget.robust.solve` tightens them).
 
     The inverse of the path says sample by sample what it takes. Where that breaks a limit the path cannot be followed; where it
     keeps all of them it is the solution, from which IPOPT begins, and the answer where IPOPT ends elsewhere. With inertia it is what
     the drives are near that are held from sample to sample. `progress` is called before each run of IPOPT.
     """
+    if scenario.file.feedforward == "static":
+        return _solve_static(scenario, model, progress)
     return (_solve_inertial if model.inertial else _solve_balanced)(scenario, model, progress)
+
+
+def _solve_static(scenario: Scenario, model: Model, progress: Callable[[str], None]) -> Solution:
+    """The drives of a device with inertia that would follow if it stood in balance, and what it does under them: an open path from rest at
+    its start, a closed one in its periodic motion. A drive that acts without lag fits the middle of the sample for which it is held."""
+    inverse, needed = check_static(scenario, model)
+    assert scenario.sample_time is not None
+    command = scenario.command(model)
+    u, velocities = np.clip(needed.u, *model.u_bounds), np.zeros(model.v.numel())
+    x, z, _ = inverse.at_rest(command[0])
+    start = np.concatenate([x, velocities, z])
+    iterations = 0
+    if scenario.closed:
+        progress(f"periodic motion, {len(u)} samples")
+        start, iterations = periodic_start(model, u, scenario.sample_time, start)
+    x, z = np.split(start, [model.x.numel()])
+    n, after = len(u), 0 if scenario.closed else _one_period(model, x, z, u[-1], scenario.sample_time)
+    held = np.vstack([u, np.tile(u[-1:], (after, 1))])
+    reached = simulate(model, held, scenario.sample_time, x, z)
+    samples = Trace(reached.time[:n], {k: v[:n] for k, v in reached.signals.items()}, reached.x[:n], reached.z[:n])
+    before = Before(needed.before(scenario.closed), scenario.sample_time)
+    if broken := violations(model, samples.x, samples.z, u, before=before) or violations(
+        model, reached.x[:-1], reached.z[:-1], held
+    ):
+        names = "; ".join(f"{v.limit.label} at sample {v.worst}" for v in broken[:SHOWN])
+        raise SolverError(
+            f"without inertia feedforward the stage overshoots its limits ({names}); shape the path, slow it down, or leave out "
+            'feedforward = "static"'
+        )
+    margins = tuple(_margins(model, samples.x, samples.z, u, before))
+    between = error_between_samples(scenario, model, samples, u)
+    return Solution(scenario, model, command, samples, u, margins, iterations, (), between)
 
 
 def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], None]) -> Solution:
@@ -125,9 +198,7 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
     needed = inverse.needed(found, motion, scenario.closed)
     if (error := unreachable(scenario, inverse, motion, needed)) is not None:
         raise error
-    reached = simulate(model, u, inverse.sample_time, found.x[0], found.z[0])
-    n = len(motion)
-    samples = Trace(reached.time[:n], {k: v[:n] for k, v in reached.signals.items()}, reached.x[:n], reached.z[:n])
+    samples = _driven(model, found, u, inverse.sample_time)
     off = np.linalg.norm(
         (samples.signals[scenario.file.follow] - motion.position) / model.signals[scenario.file.follow].scale, axis=1
     )
@@ -141,6 +212,42 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
     )
     between = error_between_samples(scenario, model, samples, u)
     return Solution(scenario, model, motion.position, samples, u, margins, found.iterations, (), between)
+
+
+def _driven(model: Model, found: SampledTrajectory, u: np.ndarray, sample_time: float) -> Trace:
+    """The samples of the model under the drives u (n, n_u), by the shipped integrator."""
+    reached, n = simulate(model, u, sample_time, found.x[0], found.z[0]), len(u)
+    return Trace(reached.time[:n], {k: v[:n] for k, v in reached.signals.items()}, reached.x[:n], reached.z[:n])
+
+
+def unlimited(scenario: Scenario, model: Model) -> Solution:
+    """What the path of `scenario` takes, whether or not it keeps the limits: without margins. Raises as `solve` where the inverse of
+    the path alone does not give it."""
+    if model.inertial:
+        motion = scenario.motion(model)
+        moved = motion_inverse(model, scenario.file.follow, scenario.sample_time or 0.0)
+        found = moved.sampled(motion, scenario.closed)
+        return Solution(
+            scenario, model, motion.position, _driven(model, found, found.u, scenario.sample_time or 0.0), found.u, (),
+            found.iterations, (),
+        )  # fmt: skip
+    command = scenario.command(model)
+    needed = path_inverse(model, scenario.file.follow, scenario.sample_time).trajectory(command, scenario.closed)
+    if not needed.exact:
+        return solve(scenario, model)
+    free = replace(model, limits=())  # which would clip
+    result = TrajectoryProgramme(free, scenario.file.follow, command, scenario.sample_time, scenario.closed).exact(
+        needed
+    )
+    return Solution(scenario, model, command, result.trace, result.u, (), 0, ())
+
+
+def judged_by(solution: Solution, scenario: Scenario, model: Model) -> Solution:
+    """The same drives with the margins that the limits of `model` leave; those on rates stay."""
+    trace, rates = solution.trace, {limit.name for limit in model.rate_limits}
+    margins = _margins(model, trace.x, trace.z, solution.drive, None)
+    kept = [m for m in solution.margins if m.limit.name in rates]
+    return replace(solution, scenario=scenario, model=model, margins=(*margins, *kept))
 
 
 def error_between_samples(scenario: Scenario, model: Model, samples: Trace, u: np.ndarray) -> np.ndarray:
@@ -157,7 +264,8 @@ def error_between_samples(scenario: Scenario, model: Model, samples: Trace, u: n
         reached = ca.Function("between", [model.x, model.z, model.u, model.p], [signal]).map(n)(
             samples.x.T, samples.z.T, u.T, p
         )
-        wanted = scenario.motion(model, np.arange(n) + share).position
+        smooth = scenario.file.feedforward == "inertia"
+        wanted = scenario.motion(model, np.arange(n) + share).position if smooth else scenario.positions(model, share)
         worst = np.maximum(worst, np.abs(reached.full().T - wanted).max(axis=0))
     return worst
 

@@ -12,6 +12,7 @@ from ctrlgen.app.budget_console import print_budget
 from ctrlgen.app.commands.app import OtherDevice, ScenarioPath, app
 from ctrlgen.app.console import out, progress
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import read_probability
 
 DRAWS = 10_000  # as in ctrlgen.budget.error_budget, which is imported when it is needed
 
@@ -81,10 +82,7 @@ def budget(
 
 def _probability(text: str) -> float:
     """0.999 for '99.9 %' and for '0.999'. Raises InputError."""
-    body = text.strip()
     try:
-        return float(body.removesuffix("%")) / (100 if body.endswith("%") else 1)
-    except ValueError:
-        raise InputError(
-            "--probability", [Fault(repr(text), 'is not a probability; write "99.9 %" or 0.999')]
-        ) from None
+        return read_probability(text)
+    except ValueError as error:
+        raise InputError("--probability", [Fault("value", str(error))]) from None

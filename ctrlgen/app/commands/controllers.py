@@ -130,9 +130,7 @@ def fmu(
 
     Example:  ctrlgen fmu scenarios/circle20 --out out/fmu
     """
-    from ctrlgen.firmware.fmu import write_fmus
-
-    made = write_fmus(load_scenario(scenario, device), out_folder, fmi)
+    made = pipeline.fmus_into(load_scenario(scenario, device), out_folder, fmi)
     for path in made.paths:
         out.print(str(path), soft_wrap=True, markup=False)
     out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)

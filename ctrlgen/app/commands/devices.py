@@ -10,7 +10,7 @@ import typer
 
 from ctrlgen.app import pipeline
 from ctrlgen.app.commands.app import DevicePath, OutFolder, app
-from ctrlgen.app.console import err, out, print_recording, print_reproduced, print_workspace, progress
+from ctrlgen.app.console import err, out, print_recording, print_reproduced, print_shaper, print_workspace, progress
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show
@@ -24,7 +24,7 @@ from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.schema import FILE as RECORDING
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.scenario import load_scenario, model_of
-from ctrlgen.trajectory.solution import check_feasibility, check_motion
+from ctrlgen.trajectory.solution import check_feasibility, check_motion, check_static
 
 
 @app.command()
@@ -66,8 +66,17 @@ def check(
         model = model_of(scenario)
         command = scenario.command(model)
         out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
+        print_shaper(scenario, model)
         try:
-            if model.inertial:
+            if scenario.file.robust is not None:
+                from ctrlgen.budget.robust import solve  # scipy takes a moment to import
+                from ctrlgen.reporting.report import robust_sentence
+
+                out.print(str(robust_sentence(solve(scenario, model))), markup=False, soft_wrap=True)
+                return
+            if scenario.file.feedforward == "static":
+                _, needed = check_static(scenario, model)
+            elif model.inertial:
                 *_, needed = check_motion(scenario, model)
             else:
                 _, needed = check_feasibility(scenario, model, command)

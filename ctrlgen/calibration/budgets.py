@@ -1,0 +1,77 @@
+"""What a calibration does to the error budget of a path: the constants known by their bounds alone, and then by the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ctrlgen.budget.error_budget import ErrorBudget, budget_of
+from ctrlgen.budget.uncertainty import FILE, Uncertain, Uncertainties, load_uncertainties
+from ctrlgen.calibration.calibrate import Calibration, sd_of_bounds
+from ctrlgen.core.units import to_si
+from ctrlgen.devices import Device
+from ctrlgen.devices.run_time import RunTimeConstant
+from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
+from ctrlgen.trajectory.solution import solve
+
+
+def budgets(
+    calibration: Calibration, scenario: Path | str, device: Path | str, progress: Callable[[str], None] = lambda _: None
+) -> tuple[ErrorBudget, ErrorBudget]:
+    """The first-order error budgets of a path before and after. What uncertainty.toml beside the scenario states of other numbers
+    counts in both. Raises InputError, Unreachable, SolverError."""
+    read = load_scenario(scenario, device)
+    model = model_of(read)
+    others = load_uncertainties(read, model) if (read.path.parent / FILE).is_file() else None
+    constants = calibration.device.given_at_start
+    wide = np.diag([sd_of_bounds(c) ** 2 for c in constants])
+    told = "bounds of [run_time], uniform between them"
+    before = _budget(read, calibration.device, _stated(others, constants, wide, [told] * len(constants)), progress)
+    sources = ["calibration" if row.determined else told for row in calibration.constants]
+    after = _budget(read, calibration.calibrated, _stated(others, constants, calibration.covariance, sources), progress)
+    return before, after
+
+
+def _budget(scenario: Scenario, device: Device, stated: Uncertainties, progress: Callable[[str], None]) -> ErrorBudget:
+    own = replace(scenario, device=device)
+    model = model_of(own)
+    return budget_of(solve(own, model, progress), stated, draws=0, progress=progress)
+
+
+def _stated(
+    others: Uncertainties | None, constants: tuple[RunTimeConstant, ...], covariance: np.ndarray, sources: list[str]
+) -> Uncertainties:
+    """The constants with this covariance, and what is stated of other numbers."""
+    paths, sds = {c.path for c in constants}, np.sqrt(np.diag(covariance))
+    lines = [
+        Uncertain(c.path, "number", (c.path,), (float(sd),), _shown(c, float(sd)), source, _step(c))
+        for c, sd, source in zip(constants, sds, sources, strict=True)
+    ]
+    correlation = covariance / np.outer(sds, sds)
+    if others is None:
+        return Uncertainties(tuple(lines), correlation, None, 0.0, False, {}, {}, {})
+    kept, columns, first = [], [], 0
+    for line in others.lines:
+        if not paths & set(line.paths):
+            kept.append(line)
+            columns += range(first, first + len(line.sds))
+        first += len(line.sds)
+    k, n = len(constants), len(constants) + len(columns)
+    joint = np.eye(n)
+    joint[:k, :k], joint[k:, k:] = correlation, others.correlation[np.ix_(columns, columns)]
+    return replace(others, lines=(*lines, *kept), correlation=joint)
+
+
+def _shown(c: RunTimeConstant, sd: float) -> str:
+    scale = to_si(1.0, c.unit) - to_si(0.0, c.unit)
+    unit = "K" if to_si(0.0, c.unit) else c.unit
+    return f"{sd / scale:.3g} {'' if unit == '1' else unit}".strip()
+
+
+def _step(c: RunTimeConstant) -> tuple[str, tuple[float, ...]]:
+    if to_si(0.0, c.unit):
+        return "1 K", (1.0,)
+    return ("1 %", (0.01 * abs(c.default),)) if c.default else (f"1 {c.unit}", (to_si(1.0, c.unit),))

@@ -1,0 +1,92 @@
+"""The largest path that can be repeated at a frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.units import Quantity, from_si, written_unit
+from ctrlgen.path_timing.confirmed import Followed
+from ctrlgen.path_timing.optimum import Optimiser, Optimum
+from ctrlgen.trajectory.paths import Circle
+
+SMALLEST = 1e-3  # of the path: below, it is no longer the same
+LARGEST = 1e3
+CLOSE = 1e-3  # of a scale, to which it is found
+FEWEST = 4  # samples of a period
+IMPOSSIBLE = 10.0  # periods, as their logarithm, for a path that cannot be followed
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """What can be repeated at a `frequency` [Hz]: the largest `scale` of the path about its middle with the best law of time, and
+    `even` at even speed; None where no scale can. `diameter` [SI] and `unit` of a circle as stated."""
+
+    frequency: float
+    scale: float | None
+    even: float | None
+    diameter: float | None
+    unit: str
+
+    def size(self, scale: float | None) -> float | None:
+        """The diameter in its unit at a scale; None where there is none."""
+        return None if scale is None or self.diameter is None else float(from_si(self.diameter * scale, self.unit))
+
+
+def at_frequency(followed: Followed, optimiser: Optimiser, frequency: Quantity, known: Optimum) -> Repetition:
+    """The largest scales at a `frequency`. Raises InputError for one that samples cannot show."""
+    period, h = 1 / frequency.si, followed.sample_time
+    if period < FEWEST * h:
+        what = f"leaves {period / h:.3g} samples for a period at {followed.rate.text}; give a higher --sample-rate or a lower frequency"
+        raise InputError("--frequency", [Fault(frequency.text, what)])
+    n = int(period / h * (1 + 1e-9))
+
+    def behind(log_scale: float) -> float:
+        """The logarithm of the shortest time over the period."""
+        try:
+            duration = optimiser.along(followed.curve.scaled(float(np.exp(log_scale))), sampled=False).duration
+        except SolverError:
+            return IMPOSSIBLE
+        return float(np.log(duration / period))
+
+    def at_even_speed(scale: float) -> bool:
+        curve = followed.curve.scaled(scale)
+        share = curve.evenly(n)
+        return len(share) - 1 <= period / h * (1 + 1e-9) and replace(followed, curve=curve).keeps(share)
+
+    best = _crossing(behind, float(np.log(known.duration / period)))
+    even = None if followed.model.inertial and not followed.curve.closed else _largest(at_even_speed)
+    path = followed.curve.scenario.file.path
+    diameter = path.diameter if isinstance(path, Circle) else None
+    unit = written_unit(diameter.text) if diameter else ""
+    return Repetition(frequency.si, best, even, diameter.si if diameter else None, unit)
+
+
+def _crossing(behind: Callable[[float], float], at_one: float) -> float | None:
+    """The scale at which `behind` (log scale) is zero, as it is `at_one` at the scale 1; None where it is above zero at all."""
+    step, here, value = float(np.log(2)) * (1 if at_one <= 0 else -1), 0.0, at_one
+    while np.log(SMALLEST) < here + step < np.log(LARGEST):
+        there = behind(here + step)
+        if (there <= 0) != (value <= 0):
+            root = brentq(behind, *sorted((here, here + step)), xtol=CLOSE / 4)
+            return float(np.exp(root - CLOSE / 4))  # on the safe side
+        here, value = here + step, there
+    return float(np.exp(here)) if value <= 0 else None
+
+
+def _largest(holds: Callable[[float], bool]) -> float | None:
+    """Near the largest scale at which something holds; None where it does at none."""
+    scale, growth = 1.0, 2.0 if holds(1.0) else 0.5
+    while (growth > 1) == holds(scale * growth):
+        scale *= growth
+        if not SMALLEST < scale < LARGEST:
+            return scale if growth > 1 else None
+    held, fails = sorted((scale, scale * growth))
+    while fails - held > CLOSE * held:
+        middle = float(np.sqrt(fails * held))
+        fails, held = (fails, middle) if holds(middle) else (middle, held)
+    return held

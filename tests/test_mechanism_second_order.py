@@ -1,0 +1,216 @@
+"""Mechanisms to second order: closed forms, geometrically exact beams, the special hexapod's loop closure, and one energy for pose and
+force."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from conftest import DEVICE
+from mechanism_files import PARALLELOGRAM, TWO_BODIES, blade, dm, loaded, spring, with_values
+from test_mechanism import mems_hexapod_text
+
+from ctrlgen import InputError, build_model, load_device, load_scenario, run, solve
+from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism_second_order import SecondOrder
+from ctrlgen.model.assembly import movable
+from ctrlgen.numerics.second_order import second_order
+from ctrlgen.physics import hexapod
+
+LENGTH, THICKNESS = 20e-3, 0.2e-3  # of the blades of PARALLELOGRAM
+SIX = 'channels = ["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]'
+ALWAYS = 'kinematics = "second_order"\n'
+SHARE = '[[effect]]\nkind = "finite_rotation"\nat = "all"\nshare = "1"\n'
+TRIPOD = DEVICE.parent / "tripod.toml"
+
+
+def skewed() -> str:
+    """The parallelogram with blades of two lengths in planes of their own: nothing vanishes by symmetry."""
+    right = blade("right", 10)
+    other = right.replace('["10 mm", "0 mm", "0 mm"]', '["10 mm", "2 mm", "1 mm"]').replace("20 mm", "14 mm")
+    other = other.replace("[0, 1, 0]", "[0.2, 1, 0.1]").replace("[-1, 0, 0]", "[-1, 0, 0.3]")
+    return PARALLELOGRAM.replace(right, other).replace(
+        blade("left", -10), blade("left", -10).replace("[0, 1, 0]", "[-0.1, 1, 0.2]")
+    )
+
+
+class Expanded:
+    """A mechanism's motion of all six components of its output, and the force on its axes, by order."""
+
+    def __init__(self, device) -> None:
+        self.c = Condensed(*with_values(device))
+        self.s = SecondOrder(self.c)
+        x = ca.SX.sym("d", len(self.c.directions))
+        point = self.c.output_point
+        seen = self.s._seen(-1, device.bodies.index(device.output.body), point)
+        self.K, self.J = dm(self.c.stiffness), dm(self.c.output_motion)
+        self.second = ca.Function("second", [x], [ca.mtimes(seen, self.s.products(x))])
+        self.force = ca.Function("force", [x], [self.s.restoring_force(x, stiffening=False)])
+
+    def pose(self, d) -> np.ndarray:
+        return self.second(d).full().ravel()
+
+
+def test_the_stage_of_a_parallelogram_comes_nearer_by_six_tenths_of_its_travel_squared_over_its_length(tmp_path):
+    """-0.6 y^2/l (Awtar, Slocum, Sevincer 2007), for blades so thin that their own stretch, (t/l)^2 of it, is small; nothing else moves."""
+    y, moved = 300e-6, Expanded(loaded(tmp_path, PARALLELOGRAM)).pose([300e-6])
+    assert moved[4] == pytest.approx(-0.6 * y**2 / LENGTH, rel=3 * (THICKNESS / LENGTH) ** 2)
+    assert np.abs(np.delete(moved, 4)).max() < 1e-12 * y
+
+
+def exact(device, parts: int = 8):
+    """The same mechanism of geometrically exact beams, where Exudyn is."""
+    pytest.importorskip("exudyn", reason="no Exudyn to compare with: pip install ctrlgen[plant]")
+    from exact_mechanism import ExactMechanism
+
+    return ExactMechanism(device, parts)
+
+
+def orders(device, direction, size: float, parts: int = 8) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Second order of the pose (6,) and of the force (n,) per size squared, by expansion and as geometrically exact beams have it: the
+    even part of their answer to forces of both signs."""
+    expanded, plant = Expanded(device), exact(device, parts)
+    forces = expanded.K @ (np.asarray(direction) * size)
+    d, pose, force = [], [], []
+    for sign in (1, -1):
+        state = plant.pushed(sign * forces, steps=4)
+        d.append(plant.travel(state))
+        pose.append(plant.output(state) - expanded.J @ d[-1])
+        force.append(sign * forces - expanded.K @ d[-1])
+    mine = [np.mean([law(x).full().ravel() for x in d], axis=0) for law in (expanded.second, expanded.force)]
+    return mine[0], mine[1], np.mean(pose, axis=0), np.mean(force, axis=0)
+
+
+def within(mine: np.ndarray, theirs: np.ndarray, rel: float) -> bool:
+    """Rotations and displacements each within a share of the largest of them."""
+    parts = (slice(0, 3), slice(3, 6)) if len(mine) == 6 else (slice(None),)
+    return all(np.abs(mine[p] - theirs[p]).max() < rel * np.abs(theirs[p]).max() for p in parts)
+
+
+def test_a_parallelogram_comes_nearer_as_geometrically_exact_beams_do(tmp_path):
+    """Sixteen parts a blade follow its arc to 1e-4: their error falls with the square of their number."""
+    device = loaded(tmp_path, PARALLELOGRAM)
+    mine, _, theirs, _ = orders(device, [1.0], 200e-6, parts=16)
+    assert mine[4] == pytest.approx(theirs[4], rel=2e-4)
+    assert theirs[4] == pytest.approx(-0.6 * 200e-6**2 / LENGTH, rel=1e-3)
+
+
+def test_skewed_blades_turn_shift_and_pull_as_geometrically_exact_beams_do(tmp_path):
+    """All six components and the force, in which bending of blades, their twist and the turning of the body have part. Sixteen parts
+    a blade leave 0.5 % where a blade both bends and twists, eight 2 %."""
+    mine, force, theirs, exact_force = orders(loaded(tmp_path, skewed()), [1.0], 40e-6, parts=16)
+    assert within(mine, theirs, 0.005)
+    assert force == pytest.approx(exact_force, rel=1e-3)
+
+
+def test_the_shipped_tripod_turns_and_pulls_as_geometrically_exact_beams_do():
+    mine, force, theirs, exact_force = orders(load_device(TRIPOD), [1.0, -0.7, 0.4], 100e-6)
+    assert within(mine, theirs, 0.002) and within(force, exact_force, 0.002)
+    assert abs(theirs[2]) > 1e-6  # rad, of wires that stand along the tangents and shorten: no first order is in it
+
+
+@pytest.fixture(scope="module")
+def struts(tmp_path_factory):
+    """The MEMS hexapod as a mechanism file."""
+    return loaded(tmp_path_factory.mktemp("hexapod"), mems_hexapod_text(load_device(DEVICE)))
+
+
+def test_the_hexapod_as_a_mechanism_turns_its_struts_as_its_special_loop_closure_nearly_says(struts):
+    """Ideal pivots in the middle of the wires are near to the wires themselves: within 7 %, as the plant of exact beams shows in
+    docs/loop.md (a share of 0.95)."""
+    h, d = load_device(DEVICE).values().hexapod, np.array([12, 3, 18, 7, 1, 15]) * 1e-6
+    loop = ca.DM(second_order(lambda pose, x: hexapod.loop_closure(pose, x, h), ca.DM(d))).full().ravel()
+    mine = Expanded(struts).pose(d)
+    for part in (slice(0, 3), slice(3, 6)):
+        assert np.abs(mine[part] - loop[part]).max() < 0.07 * np.abs(loop[part]).max()
+        assert mine[part] @ loop[part] < 0.999 * loop[part] @ loop[part]
+
+
+def test_the_hexapod_as_a_mechanism_turns_as_geometrically_exact_struts_do(struts):
+    """Within the third order's trace in the mean of two strokes of opposite sign, 1e-3."""
+    plant, expanded, d = exact(struts), Expanded(struts), np.array([6, -3, 9, 4, -1, 7]) * 1e-6
+    theirs = np.mean([plant.output(plant.stroked(sign * d)) - expanded.J @ (sign * d) for sign in (1, -1)], axis=0)
+    assert within(expanded.pose(d), theirs, 0.01)
+
+
+def test_what_a_mirror_turns_round_has_no_second_order(tmp_path):
+    """A skewed blade and its image in x: what changes sign with x is odd in the travel, and the rest even."""
+    skew = blade("left", -10).replace("[0, 1, 0]", "[-0.1, 1, 0.2]").replace("[-1, 0, 0]", "[-1, 0, 0.3]")
+    text = PARALLELOGRAM.replace(blade("right", 10), "").replace(blade("left", -10), skew + 'pattern = "twin"\n')
+    device = loaded(tmp_path, text.replace("[[body]]", '[[pattern]]\nname = "twin"\nmirror = "x"\n[[body]]'))
+    expanded = Expanded(device)
+    moved, odd = expanded.pose([100e-6]), [1, 2, 3]  # theta_y, theta_z, delta_x
+    assert np.abs(moved[odd] / expanded.J.ravel()[odd]).max() < 1e-10 * 100e-6
+    assert abs(moved[0]) > 1e-7 and moved[4] < -0.5 * 100e-6**2 / LENGTH
+    assert np.abs(expanded.force([100e-6]).full()).max() < 1e-9 * expanded.K.max() * 100e-6
+
+
+def test_the_effect_of_finite_rotation_adds_what_the_file_states_always(tmp_path):
+    """share = 1 in the linear mechanism is the pose of `kinematics = "second_order"`; its force stays that of the linear one."""
+    text = TRIPOD.read_text()
+    always = build_model(loaded(tmp_path, ALWAYS + text))
+    added = build_model(loaded(tmp_path, text + SHARE))
+    d = [90e-6, -50e-6, 20e-6]
+    poses = [
+        ca.Function("p", [m.z], [m.signals["pose"].expr])(d).full()
+        for m in (always, added, build_model(load_device(TRIPOD)))
+    ]
+    assert poses[0] == pytest.approx(poses[1], rel=1e-12)
+    assert np.abs(poses[0] - poses[2]).max() > 1e-10
+    assert set(always.force_parts) == {"linear", "geometric"}
+
+
+@pytest.mark.long
+def test_a_path_of_a_mechanism_of_second_order_is_solved_and_its_c_is_the_model(tmp_path):
+    """The rotation of skewed blades is quadratic, and so is their force; drive and C follow both."""
+    (tmp_path / "device.toml").write_text(ALWAYS + skewed().replace('channels = ["delta_x"]', 'channels = ["theta_z"]'))
+    (tmp_path / "scenario.toml").write_text(
+        'title = "t"\ndevice = "device.toml"\nsample_rate = "1 kHz"\nduration = "20 ms"\n'
+        '[path]\nkind = "line"\nstart = { theta_z = "-20 urad" }\nend = { theta_z = "30 urad" }\n'
+    )
+    device = load_device(tmp_path / "device.toml")
+    solution, expanded = solve(load_scenario(tmp_path), build_model(device)), Expanded(device)
+    d = solution.trace.signals["displacement"][-1]
+    turned = expanded.J[2] @ d + expanded.pose(d)[2]
+    assert turned == pytest.approx(30e-6, rel=1e-9)
+    assert abs(expanded.pose(d)[2]) > 1e-4 * 30e-6
+    assert solution.drive[-1, 0] == pytest.approx((expanded.K @ d + expanded.force(d).full().ravel())[0] / 2, rel=1e-9)
+    assert run(tmp_path, tmp_path / "out").passed
+
+
+def test_readings_of_second_order_are_those_of_points(tmp_path):
+    """A gauge that looks along the blades sees the arc that the stage follows."""
+    reading = '[[reading]]\nname = "gauge"\nbody = "stage"\nat = ["3 mm", "0 mm", "0 mm"]\nalong = [1, 1, 0]\n'
+    model = build_model(loaded(tmp_path, ALWAYS + PARALLELOGRAM + reading))
+    seen = ca.Function("r", [model.z], [model.signals["reading"].expr])(200e-6).full().ravel()
+    nearer = 200e-6 - np.sqrt(2) * seen[1]
+    assert nearer == pytest.approx(0.6 * 200e-6**2 / LENGTH, rel=3 * (THICKNESS / LENGTH) ** 2)
+
+
+def test_numbers_of_the_drawing_may_be_free(tmp_path):
+    """A diagnosis that fits a thickness has the pose and force of the fixed model at its number."""
+    device = loaded(tmp_path, ALWAYS + skewed())
+    free = tuple(name for name in movable(device) if name.endswith("thickness"))
+    one, two = build_model(device, free=free), build_model(device)
+    assert len(free) == 2
+    for expression in (lambda m: m.signals["pose"].expr, lambda m: m.force_parts["geometric"]):
+        a, b = (float(ca.Function("p", [m.z, m.p], [expression(m)])(30e-6, m.p_nominal)) for m in (one, two))
+        assert a == pytest.approx(b, rel=1e-9) and a != 0
+
+
+@pytest.mark.parametrize(
+    ("key", "says"),
+    [
+        ('kinematics = "exact"\n', "kinematics"),
+        (ALWAYS, "the second order is that of linear flexures"),
+    ],
+)
+def test_what_has_no_second_order_is_refused(tmp_path, key, says):
+    push = (
+        '[[actuator]]\nname = "stack"\nkind = "force"\non = "b"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]\n'
+        'gain = "1 N/V"\nlow = "-9 V"\nhigh = "9 V"\ntravel = "50 um"\n'
+        '[output]\nbody = "b"\nat = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]\n'
+    )
+    with pytest.raises(InputError) as caught:
+        loaded(tmp_path, key + TWO_BODIES + spring('F_x_per_delta_x3 = "1e-3 N/um^3"', to="a") + push)
+    assert says in str(caught.value)

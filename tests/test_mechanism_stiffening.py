@@ -1,0 +1,168 @@
+"""Geometric stiffening of mechanisms: stretching, beam-columns and buckling against closed forms and geometrically exact beams."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from mechanism_files import HEAD, PARALLELOGRAM, SILICON, blade, dm, loaded, with_values
+from scipy.optimize import brentq
+
+from ctrlgen import InputError, build_model, load_scenario, run, solve
+from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism_second_order import SecondOrder
+from ctrlgen.model.assembly import movable
+
+E, L, T, W = 130e9, 20e-3, 0.2e-3, 8e-3  # of the blades of PARALLELOGRAM
+EA, EI = E * T * W, E * W * T**3 / 12
+STIFFENS = "geometric_stiffening = true\n"
+
+
+def held() -> str:
+    """A stage between two blades in line, pushed across them where it does not turn: their ends cannot come nearer."""
+    other = blade("right", -10).replace("[0, 1, 0]", "[0, -1, 0]") + STIFFENS
+    text = PARALLELOGRAM.replace(blade("right", 10), other)
+    return text.replace('at = ["0 mm", "-10 mm", "0 mm"]', 'at = ["0 mm", "0 mm", "0 mm"]')
+
+
+def force_law(device) -> ca.Function:
+    """d -> the whole force on the axes."""
+    physics, d = device.physics(device.values()), ca.SX.sym("d", len(device.placed_actuators))
+    return ca.Function("force", [d], [physics.restoring_force(d)])
+
+
+def guided(p: float) -> float:
+    """F l^3/(E I y) of a beam whose ends do not turn, with the axial load P = p E I/l^2: tension above zero, p < 0 softens it until
+    it buckles at -pi^2. Source: S. Timoshenko, J. M. Gere, Theory of Elastic Stability (1961), chapter 1."""
+    z = np.sqrt(complex(p))
+    return float((p * z / (z - 2 * np.tanh(z / 2))).real)
+
+
+def free(p: float) -> float:
+    """The same of a beam with one free end, which buckles at -pi^2/4."""
+    z = np.sqrt(complex(p))
+    return float((p * z / (z - np.tanh(z))).real)
+
+
+def stretched(y: float) -> float:
+    """Force on a clamped beam whose other end is guided and held lengthways: P l/EA = y^2 k'(p)/2l, k the `guided` stiffness."""
+    slope = lambda p: (guided(p + 1e-3) - guided(p - 1e-3)) / 2e-3  # noqa: E731
+    p = brentq(lambda p: p * EI / (L * EA) - slope(p) * y**2 / (2 * L), 1e-2, 100, xtol=1e-12)
+    return EI / L**3 * guided(p) * y
+
+
+def test_a_beam_with_held_ends_stretches_by_the_known_cubic(tmp_path):
+    """12 E I y/l^3 + (18/25) E A y^3/l^3 of each: P = E A 0.6 y^2/l^2, 1.2 P y/l; rotations of (t/l)^2 left out."""
+    device = loaded(tmp_path, held())
+    d, y = force_law(device), 100e-6
+    linear = 24 * EI / L**3
+    assert float(d(1e-9)) == pytest.approx(linear * 1e-9, rel=1e-6)
+    assert float(d(y)) - linear * y == pytest.approx(2 * 0.72 * EA * y**3 / L**3, rel=5 * (T / L) ** 2)
+
+
+@pytest.mark.parametrize(("share", "off"), [(0.25, 1e-4), (0.5, 1.2e-3), (1.0, 0.012)])
+def test_the_cubic_holds_to_one_percent_up_to_a_thickness(tmp_path, share, off):
+    """Against the beam whose shape the tension changes too: the next order is -(y/t)^4 of the linear force, about a hundredth."""
+    y = share * T
+    found = float(force_law(loaded(tmp_path, held()))(y)) / (2 * stretched(y)) - 1
+    assert 0.5 * off < found < off
+
+
+def test_held_blades_pull_as_geometrically_exact_beams_do(tmp_path):
+    pytest.importorskip("exudyn", reason="no Exudyn to compare with: pip install ctrlgen[plant]")
+    from exact_mechanism import ExactMechanism
+
+    device = loaded(tmp_path, held())
+    law, plant = force_law(device), ExactMechanism(device, 16)
+    for y, off in ((0.25 * T, 3e-4), (0.5 * T, 1.5e-3), (T, 0.012)):
+        force = float(law(y))
+        reached = plant.travel(plant.pushed([force], steps=10))[0]
+        assert float(law(reached)) == pytest.approx(force, rel=off)
+    assert force > 1.7 * 24 * EI / L**3 * T  # most of it is the stretching
+
+
+def test_a_stage_whose_blades_may_come_nearer_does_not_stiffen(tmp_path):
+    """Of the elastica's (36/35) (y/l)^2, of the bending alone, nothing is kept; the stretching cancels to rounding."""
+    device = loaded(tmp_path, PARALLELOGRAM.replace(blade("left", -10), blade("left", -10) + STIFFENS))
+    y = 300e-6
+    assert float(force_law(device)(y)) == pytest.approx(24 * EI / L**3 * y, rel=0.1 * (y / L) ** 2)
+
+
+def column(wires: int) -> str:
+    """A body on one wire, or guided by two, pushed across and along: d = (across, along)."""
+    text = HEAD + SILICON + '[[body]]\nname = "stage"\n'
+    for k in range(wires):
+        text += (
+            f'[[element]]\nkind = "wire"\nname = "wire{k}"\nfrom = "ground"\nto = "stage"\n'
+            f'at = ["{20 * k - 10 * (wires - 1)} mm", "0 mm", "0 mm"]\n'
+            f'along = [0, 1, 0]\nacross = [1, 0, 0]\nlength = "20 mm"\ndiameter = "0.2 mm"\nmaterial = "silicon"\n{STIFFENS}'
+        )
+    at = f'["0 mm", "{-10 * (wires - 1)} mm", "0 mm"]'
+    for name, along in (("across", "[1, 0, 0]"), ("along", "[0, 1, 0]")):
+        text += (
+            f'[[actuator]]\nname = "{name}"\nkind = "force"\non = "stage"\nat = {at}\nalong = {along}\ngain = "1 N/V"\nlow = "-9 V"\n'
+            'high = "9 V"\ntravel = "20 um"\n'
+        )
+    return text + '[output]\nbody = "stage"\nat = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x", "delta_y"]\n'
+
+
+@pytest.mark.parametrize(
+    ("wires", "exact", "series"), [(1, free, (3, 1.2, -1 / 175)), (2, guided, (12, 1.2, -1 / 700))]
+)
+def test_an_axial_load_stiffens_and_softens_as_a_beam_column(tmp_path, wires, exact, series):
+    """12 + 6 p/5 - p^2/700 of Awtar's beams, and of a free end 3 + 6 p/5 - p^2/175: within their third order of the beam-column."""
+    bending, area = E * np.pi * 0.2e-3**4 / 64, E * np.pi * 0.2e-3**2 / 4
+    device, d = loaded(tmp_path, column(wires)), ca.SX.sym("d", 2)
+    K = ca.Function("K", [d], [ca.jacobian(force_law(device)(d), d)])
+    for p in (-2.0, -0.5, 0.5, 2.0):
+        across = K([0.0, p * bending / (L * area)]).full()[0, 0] * L**3 / bending / wires
+        assert across == pytest.approx(np.polyval(series[::-1], p), abs=5e-4)
+        assert across == pytest.approx(exact(p), abs=3e-4 * abs(p) ** 3 + 5e-4)
+    assert across - series[0] == pytest.approx(2.4, rel=0.02)
+
+
+def test_force_and_pose_of_a_held_stage_come_from_one_energy(tmp_path):
+    """Slope of the restoring force: symmetric to rounding, with an axis along the blades too."""
+    device, d = loaded(tmp_path, column(2)), ca.SX.sym("d", 2)
+    K = ca.Function("K", [d], [ca.jacobian(force_law(device)(d), d)])([60e-6, 2e-6]).full()
+    assert abs(K[0, 1]) > 0.1 * K[0, 0] and K[0, 1] == pytest.approx(K[1, 0], rel=1e-9)
+
+
+@pytest.mark.long
+def test_a_held_stage_is_solved_and_its_c_is_the_model(tmp_path):
+    """The drive at the end of a line is that of the cubic, at twice the linear force."""
+    (tmp_path / "device.toml").write_text(held())
+    (tmp_path / "scenario.toml").write_text(
+        'title = "t"\ndevice = "device.toml"\nsample_rate = "1 kHz"\nduration = "20 ms"\n'
+        '[path]\nkind = "line"\nstart = { delta_x = "-100 um" }\nend = { delta_x = "235 um" }\n'
+    )
+    device = loaded(tmp_path, held().replace('high = "1 A"', 'high = "3 A"'))
+    solution, y = solve(load_scenario(tmp_path), build_model(device)), 235e-6
+    wanted = 24 * EI / L**3 * y + 1.44 * EA * (y / L) ** 3
+    assert solution.drive[-1, 0] == pytest.approx(wanted / 2, rel=1e-3) and wanted > 48 * EI / L**3 * y * 0.99
+    assert run(tmp_path, tmp_path / "out").passed
+
+
+def test_a_thickness_may_be_free(tmp_path):
+    """The slope of the stretching by the thickness: E A grows with it, and the linear force with its cube."""
+    device = loaded(tmp_path, held())
+    names = tuple(name for name in movable(device) if name.endswith("thickness"))
+    model, y = build_model(device, free=names), 150e-6
+    part = ca.Function("part", [model.z, model.p], [model.force_parts["geometric"]])
+    at = [float(part(y, s * np.array(model.p_nominal))) for s in (1.0, 1.1)]
+    assert at[1] / at[0] == pytest.approx(1.1, rel=1e-3)
+
+
+def test_stiffening_beside_prescribed_displacements_is_refused(tmp_path):
+    text = held().replace(
+        'kind = "force"\non = "stage"\nat = ["0 mm", "0 mm", "0 mm"]', 'kind = "displacement"\non = "left"'
+    )
+    with pytest.raises(InputError) as caught:
+        loaded(tmp_path, text.replace('gain = "2 N/A"', 'gain = "2 um/A"'))
+    assert "geometric_stiffening: of right has no effect where actuators prescribe displacements" in str(caught.value)
+
+
+def test_the_energy_of_fourth_order_has_no_negative_stretching(tmp_path):
+    """V_4 of a stage that is held by two blades is positive: stretching takes energy."""
+    s = SecondOrder(Condensed(*with_values(loaded(tmp_path, held()))))
+    assert dm(s.quartic)[0, 0] == pytest.approx(0.36 * EA / L**3, rel=1e-3)

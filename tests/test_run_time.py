@@ -1,0 +1,223 @@
+"""Constants that the generated C is given when it starts: the C is that of a device file with these numbers."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import SCENARIOS
+
+from ctrlgen import Controller, build_model, load_scenario
+from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.firmware.folder import generate
+from ctrlgen.firmware.online import online_context
+from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.run_time import derived_values
+from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.model.feedforward import ControllerStatus
+from ctrlgen.trajectory.scenario import Scenario
+
+HEXAPOD = SCENARIOS / "devices" / "mems_hexapod.toml"
+EFFECTS = """
+[[effect]]
+kind = "drive_gain"
+at = "2X"
+gain = "0.02"
+
+[[effect]]
+kind = "drive_offset"
+at = "1Y"
+offset = "10 mV"
+
+[run_time]
+constants = [
+    { number = "actuator.ambient", low = "10 degC", high = "40 degC" },
+    "actuator.thermal_resistance",
+    { number = "actuator.time_constant", low = "3.5 ms", high = "7 ms" },
+    "actuator.heater_resistance",
+    { number = "effect[0].gain", low = "-0.05", high = "0.05" },
+    { number = "effect[1].offset", low = "-50 mV", high = "50 mV" },
+]
+input = "actuator.ambient"
+"""
+REFUSED = 64  # status CONSTANTS
+
+
+def scenario_of(folder: Path, run_time: str, *changes: tuple[str, str]) -> Scenario:
+    """The circle on the hexapod with another end of its device file."""
+    text = HEXAPOD.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "device.toml").write_text(text + run_time)
+    circle = (SCENARIOS / "circle20" / "scenario.toml").read_text()
+    (folder / "scenario.toml").write_text(circle.replace("../devices/mems_hexapod.toml", "device.toml"))
+    return load_scenario(folder)
+
+
+@dataclass
+class Library:
+    """The generated controller in one arithmetic, called from Python."""
+
+    scenario: Scenario
+    folder: Path
+    real: Real
+    name: str
+
+    def __post_init__(self) -> None:
+        library = self.folder / f"lib_{self.real.suffix}.so"
+        source = self.folder / f"{self.name}.c"
+        subprocess.run(["gcc", *FLAGS, "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
+        self._calls = ctypes.CDLL(str(library))
+        self.number = ctypes.c_double if self.real is Real.DOUBLE else ctypes.c_float
+        self.state = (ctypes.c_uint64 * 200)()
+
+    def init(self, values: dict[str, float] | None = None) -> int:
+        """Starts with constants [SI, by path]; those left out, and all for None, as in the file."""
+        if values is None:
+            self._calls[f"{self.name}_init"](self.state)
+            return 0
+        stated = self.scenario.device.given_at_start
+        constants = (self.number * len(stated))(*(values.get(c.path, c.default) for c in stated))
+        return self._calls[f"{self.name}_init_with"](self.state, constants)
+
+    def call(self, what: str, target: np.ndarray) -> tuple[int, np.ndarray]:
+        """Status, and drive (6,), displacement (6,), temperature (6,)."""
+        out = (self.number * 18)()
+        status = self._calls[f"{self.name}_{what}"](self.state, (self.number * 6)(*target), out)
+        return status, np.array(out)
+
+    def set_ambient(self, value: float) -> int:
+        """Status of the function for the input."""
+        return self._calls[f"{self.name}_set_ambient"](self.state, self.number(value))
+
+    def write_state(self, state: tuple[np.ndarray, np.ndarray]) -> None:
+        """Sets x and z."""
+        numbers = (self.number * 12).from_buffer(self.state)
+        numbers[:] = [*state[0], *state[1]]
+
+    def read_state(self) -> tuple[np.ndarray, np.ndarray]:
+        """x and z."""
+        numbers = np.array((self.number * 12).from_buffer(self.state), dtype=float)
+        return numbers[:6], numbers[6:]
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("volts")
+    scenario = scenario_of(folder, EFFECTS, ('drive = "power"', 'drive = "voltage"'))
+    made = generate(scenario, build_model(scenario.device), folder / "c")
+    return {real: Library(scenario, made.path, real, made.online[real]) for real in Real}
+
+
+@pytest.fixture(scope="module")
+def controller(libraries):
+    device = libraries[Real.DOUBLE].scenario.device
+    return Controller(build_model(device), "pose", 1e-3)
+
+
+def chosen(controller: Controller) -> list[dict[str, float]]:
+    """The file's constants, both ends, and some drawn between."""
+    stated = controller.model.device.given_at_start
+    rng = np.random.default_rng(3)
+    drawn = [{c.path: rng.uniform(c.low, c.high) for c in stated} for _ in range(3)]
+    return [{}, {c.path: c.low for c in stated}, {c.path: c.high for c in stated}, *drawn]
+
+
+def targets(controller: Controller) -> np.ndarray:
+    """Poses within the range and beyond, one after the other, with one that is no command."""
+    rng = np.random.default_rng(4)
+    near = rng.uniform([-1e-3] * 3 + [-8e-6, -8e-6, 10e-6], [1e-3] * 3 + [8e-6, 8e-6, 25e-6], (60, 6))
+    near[::6] *= 4
+    near[20, 2] = np.nan
+    return near
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("real", Real)
+def test_the_c_with_other_constants_is_the_controller_of_a_device_file_with_these_numbers(libraries, controller, real):
+    """In double to 1e-9 of the largest drive; in float a rounding of 400 K is 0.2 mK, that is 2 uW of a
+    step and 17 mV of a heater that is nearly off."""
+    library = libraries[real]
+    limit = {Real.DOUBLE: 1e-9, Real.FLOAT: 2e-3}[real]  # five times that where secants of drives near zero have acted
+    acted = ControllerStatus(0)
+    for values in chosen(controller):
+        device = changed(controller.model.device, values).model_copy(update={"run_time": None})
+        reference = Controller(build_model(device), "pose", 1e-3)
+        assert library.init(values) == 0
+        state = reference.rest()
+        for k, target in enumerate(targets(controller)):
+            step = reference.step(state, target, settle=k % 15 == 0)
+            status, answer = library.call("settle" if k % 15 == 0 else "step", target)
+            assert status == step.status, (values, k)
+            expected = np.concatenate([step.drive / 12.2, step.displacement / 55e-6, step.actuator_state / 800])
+            found = answer / np.repeat([12.2, 55e-6, 800], 6)
+            secants = 5 if step.status & ControllerStatus.DRIVE and real is Real.FLOAT else 1
+            assert np.max(np.abs(found - expected)) < limit * secants, (values, k, found - expected)
+            acted |= step.status
+            library.write_state(step.state)  # each sample from one state: a path drifts where a limit acts
+            state = library.read_state()
+    assert acted & ControllerStatus.DRIVE and acted & ControllerStatus.DISPLACEMENT and acted & ControllerStatus.INPUT
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("real", Real)
+def test_an_ambient_that_changes_acts_from_the_next_sample_on(libraries, controller, real):
+    library = libraries[real]
+    assert library.init({}) == 0
+    cold, warm = (controller.at({"actuator.ambient": 273.15 + degC}) for degC in (22, 31))
+    target = np.array([0, 0, 0, 2e-6, 0, 20e-6])
+    state = cold.step(cold.rest(), target, settle=True).state
+    library.call("settle", target)
+    assert library.set_ambient(273.15 + 31) == 0
+    step = warm.step(state, target)
+    status, answer = library.call("step", target)
+    assert status == step.status == 0
+    assert np.allclose(answer[:6], step.drive, rtol=0, atol={Real.DOUBLE: 1e-9, Real.FLOAT: 1e-3}[real])
+    without = cold.step(state, target).drive
+    assert np.min(np.abs(step.drive - without)) > 5e-3  # V: the test sees what it is about
+
+
+@pytest.mark.long
+def test_constants_out_of_bounds_or_no_numbers_are_refused_and_every_call_then_answers_the_safe_drive(libraries):
+    for real, library in libraries.items():
+        stated = library.scenario.device.given_at_start
+        for c in stated:
+            for value in (c.low - 1e-3 * (c.high - c.low), c.high + 1e-3 * (c.high - c.low), np.nan, np.inf, -np.inf):
+                library.init()
+                assert library.init({c.path: value}) == REFUSED, (real, c.path, value)
+                status, answer = library.call("step", np.array([0, 0, 0, 0, 0, 20e-6]))
+                assert status == ControllerStatus.LOST and not answer[:6].any()
+            assert library.init({c.path: c.low}) == 0 and library.init({c.path: c.high}) == 0
+
+
+@pytest.mark.long
+def test_an_ambient_out_of_bounds_is_refused_and_the_last_one_kept(libraries):
+    library = libraries[Real.DOUBLE]
+    library.init()
+    before = bytes(library.state)
+    for value in (np.nan, 0.0, 400.0):
+        assert library.set_ambient(value) == REFUSED
+        assert bytes(library.state) == before
+
+
+@pytest.mark.long
+def test_what_follows_from_the_constants_is_computed_by_the_same_operations_in_c_and_in_python(libraries, controller):
+    """Bit for bit, but where an elementary function was called, whose last digits are its own: four roundings there."""
+    for real, library in libraries.items():
+        members = online_context(library.scenario, controller, real, library.name)["derived"]
+        stated = library.scenario.device.given_at_start
+        for values in chosen(controller):
+            library.init(values)
+            given = np.array([values.get(c.path, c.default) for c in stated], dtype=library.number)
+            numbers = np.frombuffer(bytes(library.state), dtype=library.number)[13:]  # behind x, z and a word
+            assert np.array_equal(numbers[: len(given)], given)
+            expected = derived_values(members, given, real)
+            found = numbers[len(given) :][: len(expected)]
+            assert len(expected) > 12 and np.all(np.isfinite(expected))
+            assert np.allclose(found, expected, rtol=4 * real.epsilon, atol=0), (real, found - expected)
+            assert np.mean(found == expected) > 0.7  # what no exponential enters
