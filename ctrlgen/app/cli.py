@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import typer
 
-from ctrlgen.app.commands import budgets, controllers, devices, examples, recordings  # noqa: F401, they register their commands
+from ctrlgen.app.commands import budgets, controllers, devices, examples, learning, recordings  # noqa: F401, they register their commands
 from ctrlgen.app.commands.app import app
 from ctrlgen.app.console import CHECK, complain, err, shows_warnings
 from ctrlgen.core.errors import CtrlgenError, Unreachable

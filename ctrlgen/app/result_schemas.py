@@ -9,12 +9,14 @@ from pydantic import BaseModel
 from ctrlgen.core.files import write_text
 from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
 from ctrlgen.reporting.budget_schema import BudgetRecord
+from ctrlgen.reporting.learning_schema import LearningRecord
 from ctrlgen.reporting.result_schemas import SCHEMAS, BuildRecord, Summary, schema_text
 
 RESULTS: dict[str, type[BaseModel]] = {
     "budget": BudgetRecord,
     "build": BuildRecord,
     "diagnosis": DiagnosisRecord,
+    "learning": LearningRecord,
     "summary": Summary,
 }
 
