@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ctrlgen.diagnosis.pipeline import diagnose
     from ctrlgen.diagnosis.selection.result import Diagnosis, Estimate, Finding
     from ctrlgen.firmware.folder import CFolder, generate
+    from ctrlgen.learning.learn import Learning, learn
     from ctrlgen.model.assembly import build_model
     from ctrlgen.model.feedforward import Controller, ControllerStatus, ControllerStep
     from ctrlgen.model.model import Model
@@ -72,6 +73,10 @@ _EXPORTS = {
     "firmware.folder": (
         "CFolder",
         "generate",
+    ),
+    "learning.learn": (
+        "Learning",
+        "learn",
     ),
     "model.assembly": ("build_model",),
     "model.feedforward": (
@@ -139,6 +144,7 @@ __all__ = [
     "Finding",
     "Infeasibility",
     "InputError",
+    "Learning",
     "Margin",
     "Model",
     "Outcome",
@@ -159,6 +165,7 @@ __all__ = [
     "error_budget",
     "fastest",
     "generate",
+    "learn",
     "load_batch",
     "load_device",
     "load_recordings",

@@ -15,6 +15,7 @@ from ctrlgen.app.commands import (  # noqa: F401, they register their commands
     devices,
     examples,
     fastest_paths,
+    learning,
     recordings,
 )
 from ctrlgen.app.commands.app import app

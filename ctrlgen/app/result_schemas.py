@@ -10,6 +10,7 @@ from ctrlgen.core.files import write_text
 from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
 from ctrlgen.reporting.budget_schema import BudgetRecord
 from ctrlgen.reporting.fastest_schema import FastestRecord
+from ctrlgen.reporting.learning_schema import LearningRecord
 from ctrlgen.reporting.result_schemas import SCHEMAS, BuildRecord, Summary, schema_text
 
 RESULTS: dict[str, type[BaseModel]] = {
@@ -17,6 +18,7 @@ RESULTS: dict[str, type[BaseModel]] = {
     "build": BuildRecord,
     "diagnosis": DiagnosisRecord,
     "fastest": FastestRecord,
+    "learning": LearningRecord,
     "summary": Summary,
 }
 

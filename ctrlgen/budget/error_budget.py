@@ -22,6 +22,7 @@ from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import difference, same_dimension
+from ctrlgen.model.model import Signal
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 
@@ -210,7 +211,7 @@ def budget_of(
     path = UncertainPath(solution, stated)
     linear = _propagated(path)
     combined = linear.combined("pose", stated)
-    groups = _groups(path)
+    groups = groups_of(path.signal)
     slopes = slopes_of_limits(path, linear)
     found = margins(path, linear, slopes)
     critical = critical_samples(found, probability)
@@ -237,10 +238,10 @@ def _propagated(path: UncertainPath) -> Propagated:
         raise SolverError(f"{error}; a law of the device has no slope along it") from None
 
 
-def _groups(path: UncertainPath) -> tuple[Group, ...]:
-    """Translations in nm, rotations in urad, and what has another unit in that."""
+def groups_of(signal: Signal) -> tuple[Group, ...]:
+    """Channels of a signal by kind: translations in nm, rotations in urad, and what has another unit in that."""
     units: dict[tuple[str, str], list[int]] = {}
-    for i, unit in enumerate(path.signal.units):
+    for i, unit in enumerate(signal.units):
         kinds = (("translation", "nm", "m"), ("rotation", "urad", "rad"))
         name, shown = next(((n, s) for n, s, base in kinds if same_dimension(unit, base)), (f"in {unit}", unit))
         units.setdefault((name, shown), []).append(i)

@@ -125,20 +125,8 @@ class UncertainPath:
         before = min(max(settled, LEAST_BEFORE), MOST_BEFORE)
         if scenario.closed:
             return u[np.arange(-before - 1, self.n - 1) % self.n], before
-        held = self._holding()
+        held = holding_drive(self.solution)
         return np.vstack([np.tile(held, (before + 1, 1)), u[:-1]]), before
-
-    def _holding(self) -> np.ndarray:
-        """(n_u,) the drive that holds the first sample of an open path."""
-        m, trace = self.solution.model, self.solution.trace
-        still = ca.Function("still", [m.u], [ca.substitute(
-            ca.vertcat(ca.vertcat(ca.SX(0, 1), m.starting) / np.maximum(m.x_scale, 1e-300), m.balance / m.force_scale),
-            ca.vertcat(m.x, m.z, m.p), ca.vertcat(trace.x[0], trace.z[0], m.p_nominal),
-        )])  # fmt: skip
-        found = least_squares(
-            lambda w: still(w * m.u_scale).full().ravel(), self.solution.drive[0] / m.u_scale, xtol=1e-15, gtol=1e-15
-        )
-        return found.x * m.u_scale
 
     def _start(self) -> np.ndarray:
         """(n_s,) S before the first of the drives: of the path as solved."""
@@ -183,6 +171,19 @@ class UncertainPath:
         """The drives, each rounded to the nearest step of the converter."""
         low, _ = self.solution.model.u_bounds
         return low + np.round((self.drive - low) / self.lsb()) * self.lsb()
+
+
+def holding_drive(solution: Solution) -> np.ndarray:
+    """(n_u,) the drive that holds the first sample of an open path."""
+    m, trace = solution.model, solution.trace
+    still = ca.Function("still", [m.u], [ca.substitute(
+        ca.vertcat(ca.vertcat(ca.SX(0, 1), m.starting) / np.maximum(m.x_scale, 1e-300), m.balance / m.force_scale),
+        ca.vertcat(m.x, m.z, m.p), ca.vertcat(trace.x[0], trace.z[0], m.p_nominal),
+    )])  # fmt: skip
+    found = least_squares(
+        lambda w: still(w * m.u_scale).full().ravel(), solution.drive[0] / m.u_scale, xtol=1e-15, gtol=1e-15
+    )
+    return found.x * m.u_scale
 
 
 def _warmed(model: Model, free: Sequence[str], rise: ca.SX) -> Model:

@@ -24,10 +24,11 @@ from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits
 
 
-def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
+def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool = True) -> Recording:
     """The recordings in `paths` (each a recording.toml or the folder that holds one) joined and validated.
 
-    At least one record must be fitted and one held out; where none has role "hold_out", part of the longest is held out.
+    At least one record must be fitted and one held out; where none has role "hold_out", part of the longest is held out. Without
+    `hold_out` every record stays as it is.
     Raises InputError with every fault of every file.
     """
     files = [_File(Path(path), model, several=len(paths) > 1) for path in paths]
@@ -62,7 +63,8 @@ def load_recordings(paths: Sequence[Path | str], model: Model) -> Recording:
     records = [record for content in contents for record in content.records]
     faults = validation.compare_records(records, [where for content in contents for where in content.places], names)
     kind = readable[0][1].kind
-    divided = validation.with_hold_out(records, kind) if not faults else validation.Validated()
+    whole = validation.Validated(tuple(records))
+    divided = validation.with_hold_out(records, kind) if hold_out and not faults else whole
     if faults or divided.faults:
         raise InputError(source, [*faults, *divided.faults])
     noise, noise_notes = _stated(channels, columns, "noise")

@@ -208,7 +208,7 @@ def _solve_inertial(scenario: Scenario, model: Model, progress: Callable[[str], 
             f"sample {int(off.argmax())}; raise sample_rate, or make the path slower or smoother"
         )
     margins = tuple(
-        _margins(model, samples.x, samples.z, u, Before(needed.before(scenario.closed), inverse.sample_time))
+        closest_margins(model, samples.x, samples.z, u, Before(needed.before(scenario.closed), inverse.sample_time))
     )
     between = error_between_samples(scenario, model, samples, u)
     return Solution(scenario, model, motion.position, samples, u, margins, found.iterations, (), between)
@@ -311,11 +311,11 @@ def _from_result(
     if broken := violations(model, result.x, result.z, result.u, before=before):
         names = ", ".join(dict.fromkeys(v.limit.label for v in broken))
         raise SolverError(f"what the solver calls a solution breaks limits ({names}); command a smaller or slower path")
-    margins = tuple(_margins(model, result.x, result.z, result.u, before))
+    margins = tuple(closest_margins(model, result.x, result.z, result.u, before))
     return Solution(scenario, model, command, result.trace, result.u, margins, result.iterations, added)
 
 
-def _margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: Before | None) -> list[Margin]:
+def closest_margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: Before | None) -> list[Margin]:
     """One Margin per limit, with the drives `before` also of their rates: the smallest distance to its nearer side."""
     margins = []
     for limit, table in limited_values(model, x, z, u, before):

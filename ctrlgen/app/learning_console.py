@@ -1,0 +1,44 @@
+"""Console output of learning from runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from ctrlgen.app.console import out, show_table, table_of
+
+if TYPE_CHECKING:
+    from ctrlgen.learning.learn import Learning
+
+
+def print_learning(learning: Learning) -> None:
+    """The runs with their errors, reached and predicted, how the device answered, and what comes next."""
+    from ctrlgen.reporting.learning_page import shown_error, verdict
+
+    out.print(f"[bold]learning from runs: {escape(learning.solution.scenario.file.title)}[/bold]", soft_wrap=True)
+    heads = [(f"{g.name} {what}{f' [{g.unit}]' if what == 'measured' else ''}", "right")
+             for g in learning.groups for what in ("measured", "noise", "repeating", "predicted")]  # fmt: skip
+    table = table_of(("run", "left"), ("repetitions", "right"), *heads)  # type: ignore[arg-type]
+    for k, run in enumerate(learning.runs):
+        cells = []
+        for g in learning.groups:
+            cells += [f"{g.shown(run.rms[g.name]):.4g}", f"{g.shown(run.noise[g.name]):.3g}", shown_error(learning, run, g.name)]
+            cells.append("" if run.predicted is None else f"{g.shown(run.predicted[g.name]):.3g}")
+        table.add_row(escape(run.name), str(run.repeats), *cells, style="bold" if k == learning.base else None)
+    if not learning.stop:
+        cells = []
+        for g in learning.groups:
+            cells += ["", "", "", f"{g.shown(learning.predicted[g.name]):.3g}"]
+        table.add_row("next", "", *cells)
+    show_table(table)
+    if learning.response is not None:
+        names = learning.solution.model.signals["drive"].channels
+        pairs = zip(names, learning.response.gain, learning.response.se, strict=True)
+        text = ", ".join(f"{name} {gain:.3f} ± {se:.2g}" for name, gain, se in pairs if gain == gain)
+        out.print(f"observed over predicted change from run to run: {text}", markup=False, soft_wrap=True)
+    out.print(verdict(learning), markup=False, soft_wrap=True, style="green" if learning.stop else None)
+    if learning.step < 1 and not learning.stop:
+        out.print(f"share of the full step that is taken: {learning.step:g}", markup=False, soft_wrap=True)
+    for note in learning.notes:
+        out.print(note, markup=False, soft_wrap=True, style="yellow")

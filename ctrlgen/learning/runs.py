@@ -1,0 +1,248 @@
+"""Recordings -> the runs of one path: their drives, and what was measured in each repetition.
+
+Each record is a run, or of a closed path as many as it holds whole periods; records in a row that were driven alike are one run with
+more repetitions. A record of something else is refused: another rate, other rows, drives that do not belong to the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import show
+from ctrlgen.learning.lifted import Lifted
+from ctrlgen.recordings.reader import load_recordings
+from ctrlgen.recordings.recording import Record, Recording
+
+SAME_DRIVE = 1e-3  # of a drive's range: digits of a file, noise of a measured drive
+RATE = 0.1  # sample times by which a run's rows may drift from the path's
+FEWEST_MEASURED = 20  # samples of a run at which a channel must have been read, or all
+WIDEST_GAP = 0.1  # of the run, between samples that were read
+SETTLED = 4.0  # times the variance between periods, by which the first may differ from the others before it is left out
+OFF_PATH = 0.5  # of the path's extent, by which the model under the recorded drives may be off the path (rms)
+FAR_READING = 3.0  # times the size of the path, by which the readings may be off it (rms)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The same drives (n, n_u) [SI], as often as they were repeated: readings `y` (m, n, n_y) of the followed signal, NaN where there is
+    none; `names` of the records, and how many first `unsettled` periods were left out."""
+
+    names: tuple[str, ...]
+    drive: np.ndarray
+    y: np.ndarray
+    unsettled: int = 0
+
+    @property
+    def name(self) -> str:
+        """The records' names."""
+        return ", ".join(self.names)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """All runs in their order. `noise` (n_y,) [SI] is stated by the recording, NaN where it is not; `observed` (n_y,): the channel was
+    read. `notes`: what reading them marked."""
+
+    runs: tuple[Run, ...]
+    noise: np.ndarray
+    observed: np.ndarray
+    notes: tuple[str, ...]
+
+
+def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
+    """The runs in the recordings at `paths`, each a recording.toml or its folder, in this order. Raises InputError with every fault."""
+    recording = load_recordings(paths, lifted.model, hold_out=False)
+    source = str(paths[0]) if len(paths) == 1 else "recordings"
+    records = [record for record in recording.records if record.role != "rest"]
+    places, faults = _places(recording, lifted), list[Fault]()
+    if lifted.static != (recording.kind == "poses"):
+        what = (
+            "a row of separate equilibria: record its settled poses" if lifted.static else "a motion in time: record a series"
+        )
+        raise InputError(source, [Fault("kind", f"{recording.kind!r} does not fit the scenario, which is {what}")])
+    if all(place is None for place in places):
+        name = lifted.solution.scenario.file.follow
+        what = f"has no reading of the followed {name}; add {name}.{lifted.signal.channels[0]} or reading.{lifted.signal.channels[0]}"
+        raise InputError(source, [Fault("columns", what)])
+    runs = list[Run]()
+    for record in records:
+        try:
+            found = _run(record, places, lifted)
+        except ValueError as error:
+            faults.append(Fault(record.name, str(error)))
+            continue
+        if runs and _alike(runs[-1].drive, found.drive, lifted):
+            last = runs[-1]
+            runs[-1] = Run((*last.names, *found.names), last.drive, np.concatenate([last.y, found.y]), last.unsettled + found.unsettled)
+        else:
+            runs.append(found)
+    if faults:
+        raise InputError(source, faults)
+    if not runs:
+        raise InputError(source, [Fault("record", 'none is a run: all have role = "rest"')])
+    noise = np.array([np.nan if p is None else recording.noise[p] or np.nan for p in places], float)
+    observed = np.array([p is not None for p in places])
+    notes = [note for note in recording.notes if "are missing (first at" not in note]
+    notes += [
+        f"{run.name}: the first period differs from the others by more than they from each other, so it is taken as not settled and left out."
+        for run in runs if run.unsettled
+    ]  # fmt: skip
+    return Runs(tuple(runs), noise, observed, tuple(notes))
+
+
+def _places(recording: Recording, lifted: Lifted) -> list[int | None]:
+    """The column of each followed channel: that of the signal itself, or of its reading; None where it was not read."""
+    follow, places = lifted.solution.scenario.file.follow, list[int | None]()
+    for channel in lifted.signal.channels:
+        names = [name for name in (f"{follow}.{channel}", f"reading.{channel}") if name in recording.channels]
+        places.append(recording.channels.index(names[0]) if names else None)
+    return places
+
+
+def _alike(a: np.ndarray, b: np.ndarray, lifted: Lifted) -> bool:
+    return bool(np.all(np.abs(a - b) <= SAME_DRIVE * _range(lifted)))
+
+
+def _range(lifted: Lifted) -> np.ndarray:
+    """(n_u,) what the path's own drives move through, at least a share of the largest."""
+    u = lifted.solution.drive
+    return np.maximum(np.ptp(u, axis=0), SAME_DRIVE * np.abs(u).max())
+
+
+def _run(record: Record, places: Sequence[int | None], lifted: Lifted) -> Run:
+    """A record folded into repetitions of the path. Raises ValueError with what is wrong."""
+    n, every = lifted.n, _every(record, lifted)
+    if record.linear and not lifted.static:
+        raise ValueError('between_samples = "linear", but a player holds each drive until the next sample; record it so, or leave the key out')
+    rows = len(record.drive) // every
+    m = rows // n if lifted.closed or lifted.static else min(1, rows // n)
+    if not m:
+        raise ValueError(
+            f"has {len(record.drive)} rows, which is less than one run: {n} samples of the path" + (f", {every} rows each" if every > 1 else "")
+        )
+    used = record.drive[: m * n * every].reshape(m, n, every, -1)
+    allowed = SAME_DRIVE * _range(lifted)
+    if not np.all(np.ptp(used, axis=2) <= allowed):
+        raise ValueError(f"its drives change within a sample of {every} rows; let it begin at a sample of the path, by `rows`")
+    periods = used.mean(axis=2)
+    drive = periods.mean(axis=0)
+    if not np.all(np.abs(periods - drive) <= allowed):
+        k, i = np.argwhere(np.abs(periods - drive).max(axis=0) > allowed)[0]
+        name = lifted.model.signals["drive"].channels[i]
+        raise ValueError(
+            f"its drives do not repeat after {n} samples (drive.{name} at sample {k}); cut it by `rows` so that each record is one run"
+        )
+    observed = record.observed[: m * n * every : every].reshape(m, n, -1)
+    y = np.stack([np.full((m, n), np.nan) if p is None else observed[:, :, p] for p in places], axis=2)
+    for channel, p, values in zip(lifted.signal.channels, places, np.moveaxis(y, 2, 0), strict=True):
+        if p is not None and (fault := _too_few(np.isfinite(values).any(axis=0), lifted)):
+            raise ValueError(f"{channel} {fault}")
+    unsettled = _first_differs(y) if lifted.closed else 0
+    return Run((record.name,), drive, y[unsettled:], unsettled)
+
+
+def _every(record: Record, lifted: Lifted) -> int:
+    """Rows of the record in one sample of the path. Raises ValueError where that is no whole number."""
+    if lifted.static:
+        return 1
+    rows = lifted.sample_time / record.sample_time
+    every = max(1, round(rows))
+    if abs(rows / every - 1) * lifted.n > RATE:
+        own, its = (show(1 / t, "Hz") for t in (lifted.sample_time, record.sample_time))
+        raise ValueError(f"was recorded at {its}, the path runs at {own}; record at that rate or a whole multiple, or resample it so")
+    return every
+
+
+def _too_few(measured: np.ndarray, lifted: Lifted) -> str:
+    """What is wrong with the samples (n,) at which a channel was read; empty where they are enough."""
+    read = np.flatnonzero(measured)
+    if len(read) < min(FEWEST_MEASURED, lifted.n):
+        return f"was read at {len(read)} of {lifted.n} samples; {min(FEWEST_MEASURED, lifted.n)} or more are needed"
+    if lifted.static:
+        return "" if len(read) == lifted.n else f"was not read at pose {int(np.flatnonzero(~measured)[0])}"
+    gaps = np.diff(np.append(read, read[0] + lifted.n)) if lifted.closed else np.diff(np.concatenate([[0], read, [lifted.n - 1]]))
+    if gaps.max() > WIDEST_GAP * lifted.n:
+        return f"was not read for {gaps.max()} samples in a row; at most {int(WIDEST_GAP * lifted.n)} can be bridged"
+    return ""
+
+
+def _first_differs(y: np.ndarray) -> int:
+    """1 where the first of three or more periods differs from the others more than noise, and so was not settled; else 0."""
+    if len(y) < 3:
+        return 0
+    others = y[1:]
+    with np.errstate(invalid="ignore"):
+        spread = np.nanmean(others.var(axis=0, ddof=1), axis=0) if len(others) > 1 else np.nan
+        first = np.nanmean((y[0] - others.mean(axis=0)) ** 2, axis=0)
+        expected = spread * (1 + 1 / len(others))
+    return int(np.any(first > SETTLED * expected))
+
+
+def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
+    """Refuses runs whose drives or readings are not of this path. Raises InputError."""
+    command, scale = lifted.solution.command, np.array(lifted.signal.scale)
+    extent = np.sqrt(np.mean(((command - command.mean(axis=0)) / scale) ** 2))
+    size = np.sqrt(np.mean((command / scale) ** 2)) or extent
+    faults = list[Fault]()
+    for run in runs.runs:
+        model = lifted.run(run.drive)
+        off = _rms((model - command) / scale)
+        if off > OFF_PATH * extent:
+            what = (
+                f"its drives would lead the device as described {100 * off / extent:.0f} % of the path's extent away from the path: "
+                "it is of another scenario or another device"
+            )
+            if (shift := _shift(model / scale, command / scale, off, lifted.closed)) is not None:
+                what = f"it begins {shift} samples after the path does; let it begin where the path begins, by `rows`"
+            faults.append(Fault(run.name, what))
+            continue
+        away = (np.nanmean(run.y, axis=0) - command) / scale if len(run.y) > 1 else (run.y[0] - command) / scale
+        for channel, error in zip(lifted.signal.channels, away.T, strict=True):
+            far = _rms(error[np.isfinite(error)]) if np.isfinite(error).any() else 0.0
+            if far > FAR_READING * size:
+                what = f"its {channel} is {far / size:.0f} times the path's size away from it; check the column, its unit, sign and origin"
+                faults.append(Fault(run.name, what))
+    if faults:
+        raise InputError(source, faults)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _shift(model: np.ndarray, command: np.ndarray, off: float, closed: bool) -> int | None:
+    """By how many samples a closed path is entered late, where that explains that it is `off`."""
+    if not closed:
+        return None
+    spectra = np.fft.rfft(model, axis=0) * np.conj(np.fft.rfft(command, axis=0))
+    agreement = np.fft.irfft(spectra, n=len(command), axis=0).sum(axis=1)
+    shift = int(-agreement.argmax() % len(command))
+    return shift if shift and _rms(np.roll(model, shift, axis=0) - command) < off / 4 else None
+
+
+def errors(run: Run, lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
+    """Followed minus commanded in each repetition (m, n, n_y), between samples that were read by a straight line, zero in channels
+    without a reading; and the share (n_y,) of the samples that were read."""
+    e = run.y - lifted.solution.command
+    known = np.isfinite(e)
+    share = known.mean(axis=(0, 1))
+    n, k = lifted.n, np.arange(lifted.n)
+    period = n if lifted.closed else None
+    for repetition, of in zip(e, known, strict=True):
+        for i in range(e.shape[2]):
+            read = np.flatnonzero(of[:, i])
+            if 0 < len(read) < n:
+                repetition[:, i] = np.interp(k, read, repetition[read, i], period=period)
+            elif not len(read):
+                repetition[:, i] = 0.0 if not share[i] else np.nanmean(run.y[:, :, i], axis=0) - lifted.solution.command[:, i]
+    return np.nan_to_num(e), np.where(share > 0, share, 1.0)
+
+
+def only(runs: Runs, count: int) -> Runs:
+    """The first `count` runs."""
+    return replace(runs, runs=runs.runs[:count])
