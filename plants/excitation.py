@@ -36,10 +36,14 @@ def powers_held_out() -> Array:
     return POWER / 2 * (1 + 0.8 * np.sin(turn * np.array(TURNS) + np.pi / 3 * np.arange(6)))
 
 
-def record(plant: MemsHexapod, folder: Path, seed: int = 1) -> int:
-    """Writes single.csv and together.csv with recording.toml into `folder`; the number of poses. Raises RuntimeError."""
+def record(plant: MemsHexapod, folder: Path, seed: int = 1, drawn: int | None = None) -> int:
+    """Writes fit.csv and hold_out.csv with recording.toml into `folder`; the number of poses. Of a short recording `drawn` poses at random
+    are all that there is to fit, and every third of the others is held out. Raises RuntimeError."""
     folder.mkdir(parents=True, exist_ok=True)
-    sets = {"fit": powers_to_fit(np.random.default_rng(seed)), "hold_out": powers_held_out()}
+    rng = np.random.default_rng(seed)
+    sets = {"fit": powers_to_fit(rng), "hold_out": powers_held_out()}
+    if drawn is not None:
+        sets = {"fit": rng.uniform(0.0, POWER, (drawn, 6)), "hold_out": powers_held_out()[::3]}
     for k, (role, powers) in enumerate(sets.items()):
         seen = plant.record(powers, 1.0, heat="steady", noise=NOISE, seed=seed + k)
         _within_limits(plant, seen.force, seen.temperature)
