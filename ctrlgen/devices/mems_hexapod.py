@@ -12,7 +12,16 @@ from pydantic import Field, model_validator
 from scipy.linalg import eigh
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import AxisSignal, BalancedPhysics, Device, DevicePhysics, InertialPhysics, Limit, Section, Signal
+from ctrlgen.devices.base import (
+    AxisSignal,
+    BalancedPhysics,
+    Device,
+    DevicePhysics,
+    InertialPhysics,
+    Limit,
+    Section,
+    Signal,
+)
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics.damping import modal_damping
 
@@ -307,7 +316,9 @@ class MemsHexapod(Device):
                 power=AxisSignal("heater power", "W", "P_", power_limit),
                 rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
                 force=lambda u, T, d: thermal_actuator.force(T, a),
-                tangent_compliance=lambda d: xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d),
+                tangent_compliance=lambda d: (
+                    xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d)
+                ),
                 loop_closure=lambda pose, d: hexapod.loop_closure(pose, d, h),
             )
         M = hexapod.mass(h, p.dynamics, J)
