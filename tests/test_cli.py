@@ -27,6 +27,7 @@ COMMANDS = (
     "workspace",
     "reproduce",
     "budget",
+    "learn",
     "example",
     "diagnose",
     "batch",

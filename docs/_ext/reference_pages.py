@@ -311,8 +311,8 @@ def results_page() -> str:
     folder = Path(reporting.__file__).parent / "schemas"
     lines = [
         GENERATED, "# Result files", "",
-        "`summary.json` (of `run` and `solve`), `build.json` (of `verify`), `diagnosis.json` (of `diagnose`) and `budget.json` (of "
-        "`budget`) hold every "
+        "`summary.json` (of `run` and `solve`), `build.json` (of `verify`), `diagnosis.json` (of `diagnose`), `budget.json` (of "
+        "`budget`) and `learning.json` (of `learn`) hold every "
         "result for programs. Each states the version of its schema, the program's version, the sha256 of its inputs and the "
         "seed. The JSON Schemas are shipped with the package in `ctrlgen/reporting/schemas/`.", "",
     ]  # fmt: skip
