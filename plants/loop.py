@@ -61,7 +61,7 @@ def close(out: Path, seed: int = 0) -> Loop:
     out.mkdir(parents=True, exist_ok=True)
     plant = MemsHexapod()
     step("solve the circle and generate its C from the device file as printed")
-    scenario = _scenario(out / "before", DEVICE)
+    scenario = scenario_of(out / "before", DEVICE)
     ctrlgen("run", str(scenario), "--out", str(out / "before" / "run"))
     step("that C drives the plant")
     before = _measured(plant, out / "before" / "run")
@@ -72,7 +72,7 @@ def close(out: Path, seed: int = 0) -> Loop:
     ctrlgen(*words, progress=sys.stderr.isatty())
     diagnosis = json.loads((out / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
     step("solve and generate again from device.next.toml")
-    scenario = _scenario(out / "after", out / "diagnosis" / "device.next.toml")
+    scenario = scenario_of(out / "after", out / "diagnosis" / "device.next.toml")
     ctrlgen("run", str(scenario), "--out", str(out / "after" / "run"))
     step("the new C drives the plant")
     after = _measured(plant, out / "after" / "run")
@@ -87,7 +87,7 @@ def _measured(plant: MemsHexapod, run: Path) -> Measured:
     return measure(case)
 
 
-def _scenario(folder: Path, device: Path) -> Path:
+def scenario_of(folder: Path, device: Path) -> Path:
     """The circle's scenario with a copy of `device` beside it; without its [[expect]], which the printed device alone meets."""
     text = (SCENARIO / "scenario.toml").read_text(encoding="utf-8").partition("# What must come out")[0]
     here = folder / SCENARIO.name
