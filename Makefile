@@ -48,7 +48,7 @@ mutants: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test,mutants]'
 	$(BIN)/python -m mutants --sample $(SAMPLE) --seed $(SEED) --out out/mutants
 
-# make schemas    writes the JSON Schemas of budget.json, build.json, diagnosis.json, fastest.json and summary.json from their models
+# make schemas    writes the JSON Schemas of the result files (budget.json and so on) from their models
 schemas: $(VENV)/installed
 	$(BIN)/python -m ctrlgen.app.result_schemas
 

@@ -28,6 +28,7 @@ COMMANDS = (
     "reproduce",
     "budget",
     "fastest",
+    "learn",
     "example",
     "diagnose",
     "batch",

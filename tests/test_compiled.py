@@ -74,3 +74,22 @@ def test_failing_compiler_leaves_the_virtual_machine(cache, monkeypatch):
         assert not broken.spent(LONG)
         assert not list(cache.glob("*.so"))
         assert not broken.spent(LONG)
+
+
+def test_a_long_function_is_compiled_in_parts_and_gives_the_same_bits(cache, monkeypatch):
+    """Three calls of it in one function: the part that only computes is cut, what calls it is left as it is."""
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    x = ca.SX.sym("x", 3)
+    y = x
+    for k in range(200):
+        y = ca.vertcat(ca.sin(y[1]) + y[2] / (k + 1), y[0] * y[1] - 0.5 * y[2], ca.cos(y[0] * y[0]))
+    step, at = ca.Function("step", [x], [y]), ca.MX.sym("at", 3)
+    whole = ca.Function("whole", [at], [step(step(at)) + step(2 * at)])
+    monkeypatch.setattr(compiled, "LARGE", 1000)
+    code = compiled._c_of(whole)
+    assert 2 <= code.count("__attribute__((noinline)) static void casadi_f") <= 10
+    long = Compilable(whole)
+    assert long.spent(LONG)
+    for point in np.random.default_rng(2).standard_normal((20, 3)):
+        assert np.array_equal(long.function(point).full(), whole(point).full())

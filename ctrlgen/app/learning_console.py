@@ -17,20 +17,21 @@ def print_learning(learning: Learning) -> None:
     from ctrlgen.reporting.learning_page import shown_error, verdict
 
     out.print(f"[bold]learning from runs: {escape(learning.solution.scenario.file.title)}[/bold]", soft_wrap=True)
-    heads = [(f"{g.name} {what}{f' [{g.unit}]' if what == 'measured' else ''}", "right")
-             for g in learning.groups for what in ("measured", "noise", "repeating", "predicted")]  # fmt: skip
-    table = table_of(("run", "left"), ("repetitions", "right"), *heads)  # type: ignore[arg-type]
+    table = table_of(
+        ("run", "left"), ("repetitions", "right"), ("rms error", "left"), ("measured", "right"), ("noise", "right"), ("repeating", "right"),
+        ("predicted", "right"),
+    )  # fmt: skip
     for k, run in enumerate(learning.runs):
-        cells = []
         for g in learning.groups:
-            cells += [f"{g.shown(run.rms[g.name]):.4g}", f"{g.shown(run.noise[g.name]):.3g}", shown_error(learning, run, g.name)]
-            cells.append("" if run.predicted is None else f"{g.shown(run.predicted[g.name]):.3g}")
-        table.add_row(escape(run.name), str(run.repeats), *cells, style="bold" if k == learning.base else None)
-    if not learning.stop:
-        cells = []
-        for g in learning.groups:
-            cells += ["", "", "", f"{g.shown(learning.predicted[g.name]):.3g}"]
-        table.add_row("next", "", *cells)
+            first = g is learning.groups[0]
+            table.add_row(
+                escape(run.name) if first else "", str(run.repeats) if first else "", g.name, f"{g.shown(run.rms[g.name]):.4g} {g.unit}",
+                f"{g.shown(run.noise[g.name]):.3g}", shown_error(learning, run, g.name),
+                "" if run.predicted is None else f"{g.shown(run.predicted[g.name]):.3g}", style="bold" if k == learning.base else None,
+            )  # fmt: skip
+    for g in learning.groups if not learning.stop else ():
+        then = f"{g.shown(learning.predicted[g.name]):.3g}"
+        table.add_row("next" if g is learning.groups[0] else "", "", g.name, "", "", "", then)
     show_table(table)
     if learning.response is not None:
         names = learning.solution.model.signals["drive"].channels

@@ -223,7 +223,8 @@ class SecondOrder:
             bodies = [ca.horzcat(T, T_2) for T, T_2 in zip(bodies, added, strict=True)]
             deformed = ca.horzcat(deformed, added[1] - added[0])
         load, (place, _, shape) = ca.mtimes(plain(e.stiffness), plain(deformed)), self.parts[k]
-        return Motions(c.frames[k], place, shape, *bodies, self._local(k, plain(deformed)), self._local(k, load))
+        first, second = bodies
+        return Motions(c.frames[k], place, shape, first, second, self._local(k, plain(deformed)), self._local(k, load))
 
     def _local(self, k: int, twist: Matrix) -> Matrix:
         """A twist or wrench at the global origin as it is at element k, in its frame."""
@@ -254,7 +255,7 @@ class SecondOrder:
             elif more is not None:
                 T = ca.horzcat(T, ca.DM(6, more[0].shape[1]) if body == GROUND else more[body])
             bodies.append(T)
-        return relative_motion(point, *bodies, a, b)
+        return relative_motion(point, bodies[0], bodies[1], a, b)
 
     def _travel(self, a: Sequence[int], b: Sequence[int], more: list[Matrix] | None = None) -> Matrix:
         """(n, m): what the rotations of bodies add to the travels of the actuators."""

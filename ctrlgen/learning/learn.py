@@ -27,7 +27,9 @@ from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, closest_margins, solve
 from ctrlgen.trajectory.violations import Before, violations
 
-FIRST_STEP = 0.2  # of the largest drive, by which the first step may change any: what the device answers is not known yet
+FIRST_STEP = (
+    0.2  # of the largest drive, by which the first step may change any: what the device answers is not known yet
+)
 MISMATCH = 0.1  # share of a change by which the device may answer otherwise than described, until runs have shown it
 LEAST_MISMATCH = 0.01
 WORSE = 3.0  # standard errors by which a run must be worse than the best one for the step to be lowered
@@ -40,8 +42,8 @@ MOST_HALVINGS = 6
 @dataclass(frozen=True, eq=False)
 class RunResult:
     """One run: mean error (n, n_y) [SI] over its repetitions and, by group, its root mean square length `rms`, that of its standard
-    error `noise`, what of it is `repeating`, rms^2 = repeating^2 + noise^2, with its `least` and `most` at 95 %, and the repeating error that
-    was `predicted` from the runs before; None for the first run. `cost` is the weighted sum of its squares, `cost_se` its standard error.
+    error `noise`, what of it is `repeating`, rms^2 = repeating^2 + noise^2, with its `least` and `most` at 95 %, and the repeating error
+    that was `predicted` from the runs before; None for the first run. `cost` is the weighted sum of its squares, `cost_se` its standard error.
     """
 
     name: str
@@ -125,11 +127,15 @@ def learn_from(
         raise InputError(source, [Fault(where, what) for where, what in answer.reasons.items()])
     results = tuple(job.result(j) for j in range(len(job.runs)))
     base = int(np.argmin([r.cost for r in results]))
-    worse = [r for r in results[base + 1 :] if r.cost - results[base].cost > WORSE * np.hypot(r.cost_se, results[base].cost_se)]
+    worse = [
+        r
+        for r in results[base + 1 :]
+        if r.cost - results[base].cost > WORSE * np.hypot(r.cost_se, results[base].cost_se)
+    ]
     step = 0.5 ** len(worse)
     progress("next drives")
     c, se = job.repeating(base)
-    kept = job.spectrum.shrinkage(c, se)
+    kept = job.spectrum.shrinkage(c, se, job.repeated[base].freedom)
     repeating = job.spectrum.samples(kept * c) * job.scale
     stop = job.nothing_left(base) or (job.stalled(base) if len(results) - 1 - base >= MOST_STALLS else "")
     now, u = results[base].drive, results[base].drive
@@ -201,16 +207,19 @@ class _Job:
         if not alone:
             return []
         return [
-            f"{', '.join(alone)}: one repetition alone cannot tell what repeats; its noise is taken from the recording's stated noise, or from "
-            "its highest frequencies. Record several periods or runs with the same drives."
+            f"{', '.join(alone)}: one repetition alone cannot tell what repeats; its noise is taken from the recording's stated noise, or "
+            "from its highest frequencies. Record several periods or runs with the same drives."
         ]
 
     def result(self, j: int) -> RunResult:
         """One run with its error beside the predicted one."""
         run, r = self.runs[j], self.repeated[j]
         predicted = None if j == 0 else self.predicted(j - 1, run.drive, self.mismatch(j))[0]
-        square, doubt = r.mean**2 - r.se**2, 2 * r.se**4 + 4 * np.maximum(r.mean**2 - r.se**2, 0.0) * r.se**2
-        bounds = {how: self._bounded(square, doubt, sign) for how, sign in (("repeating", 0), ("least", -1), ("most", 1))}
+        square = r.mean**2 - r.se**2
+        doubt = 2 * r.se**4 * (1 + 1 / r.freedom) + 4 * np.maximum(r.mean**2 - r.se**2, 0.0) * r.se**2
+        bounds = {
+            how: self._bounded(square, doubt, sign) for how, sign in (("repeating", 0), ("least", -1), ("most", 1))
+        }
         return RunResult(
             run.name, r.repeats, run.drive, self.spectrum.samples(r.mean) * self.scale, self._rms(r.mean**2), self._rms(r.se**2),
             **bounds, predicted=predicted, cost=float(np.sum(square)), cost_se=float(np.sqrt(np.sum(doubt))),
@@ -222,7 +231,9 @@ class _Job:
         found = {}
         for g in self.groups:
             si = self.scale[list(g.channels)] ** 2
-            total = np.sum(square[:, g.channels] * si) + sign * COVERAGE_FACTOR * np.sqrt(np.sum(doubt[:, g.channels] * si**2))
+            total = np.sum(square[:, g.channels] * si) + sign * COVERAGE_FACTOR * np.sqrt(
+                np.sum(doubt[:, g.channels] * si**2)
+            )
             found[g.name] = float(np.sqrt(max(total, 0.0) / self.lifted.n))
         return found
 
@@ -234,7 +245,7 @@ class _Job:
     def _left(self, j: int) -> tuple[np.ndarray, np.ndarray]:
         """The error of run j as far as it stands out of the noise, coefficients (n, n_y), and its variance."""
         r = self.repeated[j]
-        factor = self.spectrum.shrinkage(r.mean, r.se)
+        factor = self.spectrum.shrinkage(r.mean, r.se, r.freedom)
         return factor * r.mean, factor * r.se**2
 
     def predicted(self, j: int, u: np.ndarray, mismatch: float) -> tuple[dict[str, float], np.ndarray]:

@@ -120,7 +120,9 @@ class Lifted:
                 ]
             )
         tables = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]
-        return [t[:, :, 0] if of_sample.size2_out(i) == 1 and of_sample is self._values else t for i, t in enumerate(tables)]
+        return [
+            t[:, :, 0] if of_sample.size2_out(i) == 1 and of_sample is self._values else t for i, t in enumerate(tables)
+        ]
 
 
 def _function(name: str, S: ca.SX, u: ca.SX, *values: ca.SX) -> ca.Function:

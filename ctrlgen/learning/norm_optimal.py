@@ -146,7 +146,12 @@ def _unlimited(hessian: sp.csc_matrix, slope: np.ndarray, equations: sp.csc_matr
 
 
 def _keeps(
-    w: np.ndarray, extra: sp.csr_matrix, low: np.ndarray, high: np.ndarray, extra_low: np.ndarray, extra_high: np.ndarray
+    w: np.ndarray,
+    extra: sp.csr_matrix,
+    low: np.ndarray,
+    high: np.ndarray,
+    extra_low: np.ndarray,
+    extra_high: np.ndarray,
 ) -> bool:
     rows = extra @ w
     inside = (w >= low).all() and (w <= high).all()

@@ -5,6 +5,9 @@ transform (DCT-II). Repetitions of the run give each coefficient's mean and, poo
 What does not stand out of s is taken for noise, block by block (block James-Stein, T. T. Cai, Ann. Statist. 27 (1999) 898):
 
     c -> max(0, 1 - lambda L s^2 / sum_block c^2) c,   L coefficients in a block, lambda = 4.505.
+
+Where s itself is estimated from few repetitions, lambda is as much larger as keeps the probability with which noise alone passes: the
+quantile of F in place of that of chi-squared.
 """
 
 from __future__ import annotations
@@ -13,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import dct, idct, irfft, rfft
+from scipy.stats import chi2
+from scipy.stats import f as f_ratio
 
 LAMBDA = 4.50524  # the root of lambda - log(lambda) = 3: Cai 1999
 NORMAL_MAD = 0.6745  # median of |c| of a standard normal c
@@ -26,6 +31,11 @@ class Repeated:
     se: np.ndarray
     repeats: int
 
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the standard error of each coefficient in a block; infinite where it was stated."""
+        return self.repeats - 1 if self.repeats > 1 else np.inf
+
 
 class Spectrum:
     """Orthonormal real coefficients of n samples in blocks of neighbouring frequencies, about log(n) coefficients in each."""
@@ -33,7 +43,9 @@ class Spectrum:
     def __init__(self, n: int, periodic: bool) -> None:
         self.n, self.periodic = n, periodic
         k = np.arange(n)
-        harmonic = (k + 1) // 2  # of the Fourier series: constant, cos, sin, cos, sin; a cosine transform has half the step
+        harmonic = (
+            k + 1
+        ) // 2  # of the Fourier series: constant, cos, sin, cos, sin; a cosine transform has half the step
         self.block = harmonic // max(1, round(np.log(n) / 2))
         self.share = harmonic / max(1, harmonic[-1])  # of the highest frequency
 
@@ -70,21 +82,30 @@ class Spectrum:
         return mean[self.block]
 
     def repeated(self, errors: np.ndarray, stated: np.ndarray, measured: np.ndarray) -> Repeated:
-        """Of errors (m, n, n_y) of m repetitions. With one alone s is the `stated` noise (n_y,), where that is NaN the scatter of the
-        upper half of the frequencies that the `measured` share (n_y,) of the samples can hold, where a repeated motion has next to
-        nothing."""
-        c = self.coefficients(errors, axis=1)
+        """Of errors (m, n, n_y) of m repetitions, up to the highest frequency that the `measured` share (n_y,) of the samples can hold:
+        above it the straight lines between them make images of what is below. With one repetition alone s is the `stated` noise (n_y,),
+        where that is NaN the scatter of the upper half of these frequencies, where a repeated motion has next to nothing."""
+        held = self.share[:, None] <= measured
+        c = self.coefficients(errors, axis=1) * held
         m, mean = len(c), c.mean(axis=0)
         if m > 1:
             return Repeated(mean, np.sqrt(self.pooled(((c - mean) ** 2).sum(axis=0) / (m - 1)) / m), m)
-        upper = (self.share[:, None] > 0.5 * measured) & (self.share[:, None] <= measured)
+        upper = (self.share[:, None] > 0.5 * measured) & held
         found = np.nanmedian(np.where(upper, np.abs(mean), np.nan), axis=0) / NORMAL_MAD
         sd = np.where(np.isfinite(stated), stated / np.sqrt(measured), found)
-        return Repeated(mean, np.tile(sd, (self.n, 1)), 1)
+        return Repeated(mean, sd * held, 1)
 
-    def shrinkage(self, coefficients: np.ndarray, se: np.ndarray) -> np.ndarray:
+    def threshold(self, freedom: float) -> np.ndarray:
+        """(n,) lambda of each coefficient's block, for a standard error with `freedom` degrees of freedom a coefficient."""
+        count = np.bincount(self.block)
+        passes = chi2.sf(LAMBDA * count, count)
+        return (f_ratio.isf(passes, count, freedom * count) if np.isfinite(freedom) else np.full(len(count), LAMBDA))[
+            self.block
+        ]
+
+    def shrinkage(self, coefficients: np.ndarray, se: np.ndarray, freedom: float) -> np.ndarray:
         """(n, n_y) the factor of each coefficient, from 0 where a block is noise to 1."""
         energy, noise = self.pooled(coefficients**2), self.pooled(se**2)
         with np.errstate(divide="ignore", invalid="ignore"):
-            factor = 1 - LAMBDA * noise / energy
+            factor = 1 - self.threshold(freedom)[:, None] * noise / energy
         return np.where(energy > 0, np.clip(factor, 0.0, 1.0), 0.0)

@@ -6,8 +6,8 @@ regressed on that,
     y(u_2) - y(u_1) = sum_i g_i Y_i + e,
 
 by least squares over all samples and channels of all pairs of runs, with the standard error of g that holds for correlated e (W. K. Newey,
-K. D. West, Econometrica 55 (1987) 703). g_i = 1 is the device as described, -1 one that moves the other way. Learning with the sensitivities
-as described brings the error down only where 0 < g_i < 2.
+K. D. West, Econometrica 55 (1987) 703). g_i = 1 is the device as described, -1 one that moves the other way. Learning with the
+sensitivities as described brings the error down only where 0 < g_i < 2.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ def response(lifted: Lifted, changes: Sequence[Change]) -> Response | None:
     noise = sum(float(np.sum((c.sd / scale)[c.observed] ** 2)) * len(c.y) for c in changes)
     left = _left(X, seen, np.ones(len(size)))
     unexplained = max(left - noise, 0.0) / max(total - noise, 1e-300) if total > 2 * noise else 0.0
-    exchanged = _exchanged(lifted, changes, X, seen, np.where(moved, gain, 0.0), noise) if unexplained > UNEXPLAINED else None
+    exchanged = (
+        _exchanged(lifted, changes, X, seen, np.where(moved, gain, 0.0), noise) if unexplained > UNEXPLAINED else None
+    )
     return Response(gain, se, unexplained, exchanged, _reasons(lifted, gain, se, exchanged))
 
 
@@ -100,10 +102,16 @@ def _left(X: Sequence[np.ndarray], y: Sequence[np.ndarray], gain: np.ndarray) ->
 
 
 def _exchanged(
-    lifted: Lifted, changes: Sequence[Change], X: Sequence[np.ndarray], seen: Sequence[np.ndarray], gain: np.ndarray, noise: float
+    lifted: Lifted,
+    changes: Sequence[Change],
+    X: Sequence[np.ndarray],
+    seen: Sequence[np.ndarray],
+    gain: np.ndarray,
+    noise: float,
 ) -> tuple[int, int] | None:
     """The two actuators whose exchange explains what gains alone do not; None where none does."""
-    scale, best = np.array(lifted.signal.scale), (SWAPPED * max(_left(X, seen, gain) - noise, 0.0), None)
+    scale, found = np.array(lifted.signal.scale), None
+    least = SWAPPED * max(_left(X, seen, gain) - noise, 0.0)
     for pair in combinations(range(len(gain)), 2):
         order = np.arange(len(gain))
         order[list(pair)] = pair[::-1]
@@ -111,9 +119,9 @@ def _exchanged(
         for change, y in zip(changes, seen, strict=True):
             moved = lifted.run(change.then[:, order]) - lifted.run(change.u[:, order])
             left += float(np.sum((y - (moved / scale)[:, change.observed]) ** 2))
-        if left - noise < best[0]:
-            best = left - noise, pair
-    return best[1]
+        if left - noise < least:
+            least, found = left - noise, pair
+    return found
 
 
 def _reasons(lifted: Lifted, gain: np.ndarray, se: np.ndarray, exchanged: tuple[int, int] | None) -> dict[str, str]:
@@ -122,7 +130,8 @@ def _reasons(lifted: Lifted, gain: np.ndarray, se: np.ndarray, exchanged: tuple[
     if exchanged is not None:
         a, b = (names[i] for i in exchanged)
         found[f"drive.{a}, drive.{b}"] = (
-            f"the change from run to run is that of a device in which {a} and {b} are exchanged; check their wiring, or the columns of the recording"
+            f"the change from run to run is that of a device in which {a} and {b} are exchanged; check their wiring, or the columns of the "
+            "recording"
         )
         return found
     for name, g, s in zip(names, gain, se, strict=True):
@@ -130,9 +139,15 @@ def _reasons(lifted: Lifted, gain: np.ndarray, se: np.ndarray, exchanged: tuple[
             continue
         seen = f"from run to run it moved the pose by {g:.2f} ± {k * s:.2f} of what was predicted ({100 * CONFIDENCE:g} % confidence)"
         if g + k * s < -LEAST_GAIN:
-            found[f"drive.{name}"] = f"{seen}: it acts the other way; check its polarity, its wiring and the sign of the column"
+            found[f"drive.{name}"] = (
+                f"{seen}: it acts the other way; check its polarity, its wiring and the sign of the column"
+            )
         elif g + k * s < LEAST_GAIN:
-            found[f"drive.{name}"] = f"{seen}: it hardly acts, or the other way; check that it is connected, or describe what holds it"
+            found[f"drive.{name}"] = (
+                f"{seen}: it hardly acts, or the other way; check that it is connected, or describe what holds it"
+            )
         elif g - k * s > MOST_GAIN:
-            found[f"drive.{name}"] = f"{seen}: a step would overshoot and grow from run to run; correct its gain in the device file first"
+            found[f"drive.{name}"] = (
+                f"{seen}: a step would overshoot and grow from run to run; correct its gain in the device file first"
+            )
     return found

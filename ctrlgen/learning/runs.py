@@ -18,7 +18,8 @@ from ctrlgen.learning.lifted import Lifted
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 
-SAME_DRIVE = 1e-3  # of a drive's range: digits of a file, noise of a measured drive
+SAME_DRIVE = 1e-3  # of a drive's range, within a record: digits of a file, noise of a measured drive
+ALIKE = 3e-6  # of it, between records: more may be a step that was learnt
 RATE = 0.1  # sample times by which a run's rows may drift from the path's
 FEWEST_MEASURED = 20  # samples of a run at which a channel must have been read, or all
 WIDEST_GAP = 0.1  # of the run, between samples that were read
@@ -62,7 +63,9 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
     places, faults = _places(recording, lifted), list[Fault]()
     if lifted.static != (recording.kind == "poses"):
         what = (
-            "a row of separate equilibria: record its settled poses" if lifted.static else "a motion in time: record a series"
+            "a row of separate equilibria: record its settled poses"
+            if lifted.static
+            else "a motion in time: record a series"
         )
         raise InputError(source, [Fault("kind", f"{recording.kind!r} does not fit the scenario, which is {what}")])
     if all(place is None for place in places):
@@ -78,7 +81,12 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
             continue
         if runs and _alike(runs[-1].drive, found.drive, lifted):
             last = runs[-1]
-            runs[-1] = Run((*last.names, *found.names), last.drive, np.concatenate([last.y, found.y]), last.unsettled + found.unsettled)
+            runs[-1] = Run(
+                (*last.names, *found.names),
+                last.drive,
+                np.concatenate([last.y, found.y]),
+                last.unsettled + found.unsettled,
+            )
         else:
             runs.append(found)
     if faults:
@@ -89,7 +97,7 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
     observed = np.array([p is not None for p in places])
     notes = [note for note in recording.notes if "are missing (first at" not in note]
     notes += [
-        f"{run.name}: the first period differs from the others by more than they from each other, so it is taken as not settled and left out."
+        f"{run.name}: the first period differs from the others by more than they from each other; it had not settled and is left out."
         for run in runs if run.unsettled
     ]  # fmt: skip
     return Runs(tuple(runs), noise, observed, tuple(notes))
@@ -105,7 +113,7 @@ def _places(recording: Recording, lifted: Lifted) -> list[int | None]:
 
 
 def _alike(a: np.ndarray, b: np.ndarray, lifted: Lifted) -> bool:
-    return bool(np.all(np.abs(a - b) <= SAME_DRIVE * _range(lifted)))
+    return bool(np.all(np.abs(a - b) <= ALIKE * _range(lifted)))
 
 
 def _range(lifted: Lifted) -> np.ndarray:
@@ -118,17 +126,22 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted) -> Run:
     """A record folded into repetitions of the path. Raises ValueError with what is wrong."""
     n, every = lifted.n, _every(record, lifted)
     if record.linear and not lifted.static:
-        raise ValueError('between_samples = "linear", but a player holds each drive until the next sample; record it so, or leave the key out')
+        raise ValueError(
+            'between_samples = "linear", but a player holds each drive until the next sample; record it so, or leave the key out'
+        )
     rows = len(record.drive) // every
     m = rows // n if lifted.closed or lifted.static else min(1, rows // n)
     if not m:
         raise ValueError(
-            f"has {len(record.drive)} rows, which is less than one run: {n} samples of the path" + (f", {every} rows each" if every > 1 else "")
+            f"has {len(record.drive)} rows, which is less than one run: {n} samples of the path"
+            + (f", {every} rows each" if every > 1 else "")
         )
     used = record.drive[: m * n * every].reshape(m, n, every, -1)
     allowed = SAME_DRIVE * _range(lifted)
     if not np.all(np.ptp(used, axis=2) <= allowed):
-        raise ValueError(f"its drives change within a sample of {every} rows; let it begin at a sample of the path, by `rows`")
+        raise ValueError(
+            f"its drives change within a sample of {every} rows; let it begin at a sample of the path, by `rows`"
+        )
     periods = used.mean(axis=2)
     drive = periods.mean(axis=0)
     if not np.all(np.abs(periods - drive) <= allowed):
@@ -154,7 +167,9 @@ def _every(record: Record, lifted: Lifted) -> int:
     every = max(1, round(rows))
     if abs(rows / every - 1) * lifted.n > RATE:
         own, its = (show(1 / t, "Hz") for t in (lifted.sample_time, record.sample_time))
-        raise ValueError(f"was recorded at {its}, the path runs at {own}; record at that rate or a whole multiple, or resample it so")
+        raise ValueError(
+            f"was recorded at {its}, the path runs at {own}; record at that rate or a whole multiple, or resample it so"
+        )
     return every
 
 
@@ -165,7 +180,11 @@ def _too_few(measured: np.ndarray, lifted: Lifted) -> str:
         return f"was read at {len(read)} of {lifted.n} samples; {min(FEWEST_MEASURED, lifted.n)} or more are needed"
     if lifted.static:
         return "" if len(read) == lifted.n else f"was not read at pose {int(np.flatnonzero(~measured)[0])}"
-    gaps = np.diff(np.append(read, read[0] + lifted.n)) if lifted.closed else np.diff(np.concatenate([[0], read, [lifted.n - 1]]))
+    gaps = (
+        np.diff(np.append(read, read[0] + lifted.n))
+        if lifted.closed
+        else np.diff(np.concatenate([[0], read, [lifted.n - 1]]))
+    )
     if gaps.max() > WIDEST_GAP * lifted.n:
         return f"was not read for {gaps.max()} samples in a row; at most {int(WIDEST_GAP * lifted.n)} can be bridged"
     return ""
@@ -176,11 +195,11 @@ def _first_differs(y: np.ndarray) -> int:
     if len(y) < 3:
         return 0
     others = y[1:]
-    with np.errstate(invalid="ignore"):
-        spread = np.nanmean(others.var(axis=0, ddof=1), axis=0) if len(others) > 1 else np.nan
-        first = np.nanmean((y[0] - others.mean(axis=0)) ** 2, axis=0)
-        expected = spread * (1 + 1 / len(others))
-    return int(np.any(first > SETTLED * expected))
+    spread, first = others.var(axis=0, ddof=1), (y[0] - others.mean(axis=0)) ** 2
+    both = np.isfinite(first)  # samples read in every period
+    seen = both.any(axis=0)
+    expected = np.where(both, spread, 0.0).sum(axis=0) * (1 + 1 / len(others))
+    return int(np.any(np.where(both, first, 0.0).sum(axis=0)[seen] > SETTLED * expected[seen]))
 
 
 def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
@@ -201,10 +220,9 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
                 what = f"it begins {shift} samples after the path does; let it begin where the path begins, by `rows`"
             faults.append(Fault(run.name, what))
             continue
-        away = (np.nanmean(run.y, axis=0) - command) / scale if len(run.y) > 1 else (run.y[0] - command) / scale
+        away = errors(run, lifted)[0].mean(axis=0) / scale
         for channel, error in zip(lifted.signal.channels, away.T, strict=True):
-            far = _rms(error[np.isfinite(error)]) if np.isfinite(error).any() else 0.0
-            if far > FAR_READING * size:
+            if (far := _rms(error)) > FAR_READING * size:
                 what = f"its {channel} is {far / size:.0f} times the path's size away from it; check the column, its unit, sign and origin"
                 faults.append(Fault(run.name, what))
     if faults:
@@ -239,8 +257,8 @@ def errors(run: Run, lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
             if 0 < len(read) < n:
                 repetition[:, i] = np.interp(k, read, repetition[read, i], period=period)
             elif not len(read):
-                repetition[:, i] = 0.0 if not share[i] else np.nanmean(run.y[:, :, i], axis=0) - lifted.solution.command[:, i]
-    return np.nan_to_num(e), np.where(share > 0, share, 1.0)
+                repetition[:, i] = 0.0
+    return e, np.where(share > 0, share, 1.0)
 
 
 def only(runs: Runs, count: int) -> Runs:

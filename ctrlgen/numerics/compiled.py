@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -21,6 +22,10 @@ FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
 SECONDS_PER_CHARACTER = (
     4e-6  # of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod
 )
+LARGE = 400_000  # characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million
+PART = 500  # statements of a part
+FUNCTION = re.compile(r"^static int (?P<name>casadi_f\d+)\((?P<arguments>[^)]*)\) \{\n(?P<body>.*?)  return 0;\n\}\n", re.M | re.S)
+IN_WORK_VECTOR = re.compile(r"  (w\[\d+\]=|if \(res\[\d+\]!=0\) )")
 LONGEST = 4_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
 
 
@@ -62,11 +67,35 @@ def compiler() -> str | None:
 
 
 def _c_of(function: ca.Function) -> str:
+    code = _generated(function, avoid_stack=False)
+    return code if len(code) < LARGE else _in_parts(_generated(function, avoid_stack=True))
+
+
+def _generated(function: ca.Function, avoid_stack: bool) -> str:
     with tempfile.TemporaryDirectory() as folder:
-        generator = ca.CodeGenerator("step.c")
+        generator = ca.CodeGenerator("step.c", {"avoid_stack": avoid_stack})
         generator.add(function)
         generator.generate(f"{folder}/")
         return Path(folder, "step.c").read_text()
+
+
+def _in_parts(code: str) -> str:
+    """The generated C with long functions that only compute in the work vector cut into functions of `PART` statements, as a compiler's
+    time grows faster than the length of a function."""
+
+    def parts(found: re.Match[str]) -> str:
+        name, body = found["name"], found["body"].splitlines(keepends=True)
+        if len(body) <= PART or not all(IN_WORK_VECTOR.match(line) for line in body):
+            return found[0]
+        pieces = ["".join(body[k : k + PART]) for k in range(0, len(body), PART)]
+        head = "(const casadi_real** arg, casadi_real** res, casadi_real* w)"
+        defined = "".join(
+            f"__attribute__((noinline)) static void {name}_{k}{head} {{\n{piece}}}\n\n" for k, piece in enumerate(pieces)
+        )
+        calls = "".join(f"  {name}_{k}(arg, res, w);\n" for k in range(len(pieces)))
+        return f"{defined}static int {name}({found['arguments']}) {{\n{calls}  return 0;\n}}\n"
+
+    return FUNCTION.sub(parts, code)
 
 
 def _library(code: str) -> Path:

@@ -130,27 +130,34 @@ def draw_runs(learning: Learning) -> Figure:
     """A panel a group: the repeating error of each run with its 95 % interval, what was predicted, and the noise."""
     figure, panels = plt.subplots(1, len(learning.groups), figsize=(8.2, 3.2), squeeze=False)
     k = np.arange(1, len(learning.runs) + 1)
+    last = len(learning.runs)
     for axes, g in zip(panels[0], learning.groups, strict=True):
         reached, least, most, noise = (
             np.array([g.shown(getattr(run, part)[g.name]) for run in learning.runs]) for part in ("repeating", "least", "most", "noise")
         )  # fmt: skip
         told = least > 0
         axes.errorbar(
-            k[told], reached[told], [(reached - least)[told], (most - reached)[told]], fmt="o", color=COLOURS[0], capsize=3, label="reached"
+            k[told],
+            reached[told],
+            [(reached - least)[told], (most - reached)[told]],
+            fmt="o",
+            color=COLOURS[0],
+            capsize=3,
+            label="reached",
         )
         if (~told).any():
             axes.plot(k[~told], most[~told], "v", color=COLOURS[0], mfc="none", label="reached, upper end of 95 %")
-        predicted = [(i, run.predicted) for i, run in zip(k, learning.runs, strict=True) if run.predicted]
+        predicted = [(i, run.predicted) for i, run in enumerate(learning.runs, 1) if run.predicted]
         if not learning.stop:
-            predicted.append((len(k) + 1, learning.predicted))
+            predicted.append((last + 1, learning.predicted))
         if predicted:
             at, values = zip(*((i, g.shown(p[g.name])) for i, p in predicted), strict=True)
             axes.plot(at, values, "_", ms=16, mew=2, color=COLOURS[2], label="predicted")
         if noise.any():
             axes.plot(k, noise, ":", marker=".", color="#888888", label="standard error of the mean")
         axes.set_yscale("log")
-        axes.set_xticks(np.arange(1, len(k) + (1 if learning.stop else 2)))
-        axes.set_xlim(0.5, len(k) + (0.5 if learning.stop else 1.5))
+        axes.set_xticks(np.arange(1, last + (1 if learning.stop else 2)))
+        axes.set_xlim(0.5, last + (0.5 if learning.stop else 1.5))
         axes.set_xlabel("run")
         axes.set_ylabel(f"error, {g.name}, rms [{g.unit}]")
     panels[0, 0].legend(fontsize=8)
@@ -159,7 +166,9 @@ def draw_runs(learning: Learning) -> Figure:
 
 def draw_along(learning: Learning) -> Figure:
     """A panel a group: the length of the mean error of each run along the path, and that predicted for the next one."""
-    figure, panels = plt.subplots(len(learning.groups), 1, figsize=(8.2, 2.4 * len(learning.groups)), squeeze=False, sharex=True)
+    figure, panels = plt.subplots(
+        len(learning.groups), 1, figsize=(8.2, 2.4 * len(learning.groups)), squeeze=False, sharex=True
+    )
     solution = learning.solution
     static = solution.scenario.sample_time is None
     at = np.arange(len(solution.command)) if static else solution.trace.time
@@ -167,10 +176,23 @@ def draw_along(learning: Learning) -> Figure:
     shown = list(enumerate(learning.runs, 1))[first:]
     for axes, g in zip(panels[:, 0], learning.groups, strict=True):
         for (k, run), colour in zip(shown, _shades(len(shown)), strict=True):
-            axes.plot(at, difference(np.linalg.norm(run.error[:, g.channels], axis=1), g.unit), color=colour, lw=1, label=f"run {k}")
+            axes.plot(
+                at,
+                difference(np.linalg.norm(run.error[:, g.channels], axis=1), g.unit),
+                color=colour,
+                lw=1,
+                label=f"run {k}",
+            )
         if not learning.stop:
             length = np.linalg.norm(learning.predicted_error[:, g.channels], axis=1)
-            axes.plot(at, difference(length, g.unit), color=COLOURS[2], lw=1.2, ls="--", label="predicted for the next, without noise")
+            axes.plot(
+                at,
+                difference(length, g.unit),
+                color=COLOURS[2],
+                lw=1.2,
+                ls="--",
+                label="predicted for the next, without noise",
+            )
         axes.set_yscale("log")
         axes.set_ylabel(f"|error|, {g.name} [{g.unit}]")
     panels[-1, 0].set_xlabel("sample" if static else "time [s]")
@@ -201,5 +223,5 @@ def draw_drives(learning: Learning) -> Figure:
 
 def _shades(count: int) -> list[tuple[float, float, float, float]]:
     """Shades of one colour, the last one full."""
-    rgb = tuple(int(COLOURS[0][i : i + 2], 16) / 255 for i in (1, 3, 5))
-    return [(*rgb, float(a)) for a in np.linspace(FAINTEST if count > 1 else 1.0, 1.0, count)]
+    red, green, blue = (int(COLOURS[0][i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return [(red, green, blue, float(a)) for a in np.linspace(FAINTEST if count > 1 else 1.0, 1.0, count)]

@@ -40,7 +40,9 @@ class ActuatorEntry(Keys):
     """How one actuator answered from run to run."""
 
     drive: str = Field(description="Its channel.")
-    gain: Number = Field(description="Observed change of the signal over the predicted one; null where it did not move.")
+    gain: Number = Field(
+        description="Observed change of the signal over the predicted one; null where it did not move."
+    )
     standard_error: Number = Field(description="Of the gain.")
 
 

@@ -312,7 +312,7 @@ def results_page() -> str:
     lines = [
         GENERATED, "# Result files", "",
         "`summary.json` (of `run` and `solve`), `build.json` (of `verify`), `diagnosis.json` (of `diagnose`), `budget.json` (of "
-        "`budget`) and `fastest.json` (of `fastest`) hold every "
+        "`budget`), `fastest.json` (of `fastest`) and `learning.json` (of `learn`) hold every "
         "result for programs. Each states the version of its schema, the program's version, the sha256 of its inputs and the "
         "seed. The JSON Schemas are shipped with the package in `ctrlgen/reporting/schemas/`.", "",
     ]  # fmt: skip

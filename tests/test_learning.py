@@ -1,0 +1,379 @@
+"""Learning from runs: its algebra against dense references, its statistics against closed forms, its judgement on simulated benches."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import ctrlgen
+from conftest import SCENARIOS
+from result_files import faults
+from scipy.optimize import lsq_linear
+
+from ctrlgen import InputError, build_model, learn, load_scenario, simulate, solve
+from ctrlgen.core.units import base_unit
+from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.learning.lifted import Lifted
+from ctrlgen.learning.norm_optimal import STEP_WEIGHT, Wanted, _drive_scale, _solve, next_drives
+from ctrlgen.learning.repeatability import Spectrum
+from ctrlgen.trajectory.solution import Solution
+from ctrlgen.trajectory.violations import violations
+
+NOISE = np.repeat([1e-5, 2e-8], 3)  # rad, m: of a sample
+WRONG = {"actuator.expansion_slope": 3.6e-9}  # 20 % more: 3.6 % of the circle, as on the independent plant
+
+
+def shortened(text: str, folder: Path, **keys: str) -> Path:
+    """A shipped scenario with other lines, without what it expects."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = (SCENARIOS / text / "scenario.toml").read_text().partition("[[expect]]")[0].splitlines()
+    lines = [next((f'{k} = "{v}"' for k, v in keys.items() if line.startswith(f"{k} =")), line) for line in lines]
+    lines = [
+        f'device = "{SCENARIOS / text / line.split(chr(34))[1]}"' if line.startswith("device =") else line
+        for line in lines
+    ]
+    (folder / "scenario.toml").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def solved(folder: Path) -> Solution:
+    scenario = load_scenario(folder)
+    return solve(scenario, build_model(scenario.device))
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory) -> Solution:
+    """The circle in 40 samples, small enough for dense matrices."""
+    folder = tmp_path_factory.mktemp("small")
+    return solved(shortened("circle20", folder / "circle20", sample_rate="100 Hz", duration="0.4 s"))
+
+
+@pytest.fixture(scope="module")
+def hundred(tmp_path_factory) -> Solution:
+    """The circle in 200 samples."""
+    folder = tmp_path_factory.mktemp("hundred")
+    return solved(shortened("circle20", folder / "circle20", sample_rate="200 Hz", duration="1 s"))
+
+
+class Bench:
+    """A simulated bench: the device with other numbers, and drives that reach it as `wired` says."""
+
+    def __init__(
+        self, solution: Solution, folder: Path, wired=lambda u: u, periods: int = 6, noise: float = 1.0
+    ) -> None:
+        self.solution, self.folder, self.wired, self.periods, self.noise = solution, folder, wired, periods, noise
+        self.model = build_model(changed(solution.model.device, WRONG))
+        self.runs: list[Path] = []
+
+    def reached(self, u: np.ndarray) -> np.ndarray:
+        """(n, 6) [rad, m] in the second of two periods."""
+        s, h, u = self.solution, self.solution.scenario.sample_time, self.wired(u)
+        trace = simulate(self.model, np.vstack([u, u]), h, s.trace.x[0], s.trace.z[0])
+        return trace.signals["pose"][len(u) : 2 * len(u)]
+
+    def run(self, u: np.ndarray, **changes) -> Path:
+        """A recording of `periods` periods; its folder."""
+        y = np.tile(self.reached(u), (self.periods, 1))
+        y = y + self.noise * NOISE * np.random.default_rng(len(self.runs)).standard_normal(y.shape)
+        folder = self.folder / f"run{len(self.runs)}"
+        write(folder, self.solution, np.tile(u, (self.periods, 1)), y, **changes)
+        self.runs.append(folder)
+        return folder
+
+    def error(self, u: np.ndarray) -> float:
+        """[m] rms length of the error of translation, without noise."""
+        e = (self.reached(u) - self.solution.command)[:, 3:]
+        return float(np.sqrt(np.mean(np.sum(e**2, axis=1))))
+
+
+def refused(call) -> list[str]:
+    """The faults with which it is refused."""
+    with pytest.raises(InputError) as error:
+        call()
+    return [str(fault) for fault in error.value.faults]
+
+
+def write(
+    folder: Path, solution: Solution, u: np.ndarray, y: np.ndarray, rate: float | None = None, **keys: str
+) -> Path:
+    """run.csv and recording.toml of drives and readings of what is followed [SI]; the folder."""
+    folder.mkdir(parents=True)
+    m, kind, follow = solution.model, keys.get("kind", "series"), solution.scenario.file.follow
+    drive, signal = m.signals["drive"], m.signals[follow]
+    header = ",".join([*(f"u_{d}" for d in drive.channels), *signal.channels])
+    np.savetxt(folder / "run.csv", np.hstack([u, y]), delimiter=",", header=header, comments="", fmt="%.17g")
+    lines = ['title = "a run"', f'device = "{m.device.name}"', f'kind = "{kind}"', "[[record]]"]
+    lines += ['file = "run.csv"', 'role = "fit"', keys.get("record", "")]
+    if kind == "series":
+        lines.append(f'sample_rate = "{rate or 1 / solution.scenario.sample_time:.9g} Hz"')
+    lines.append("[columns]")
+    for channel, unit in zip(drive.channels, drive.units, strict=True):
+        given = keys.get("drive_unit", base_unit(unit))
+        lines.append(f'"drive.{channel}" = {{ column = "u_{channel}", unit = "{given}" }}')
+    for channel, unit in zip(signal.channels, signal.units, strict=True):
+        given = keys.get("length_unit", "m") if base_unit(unit) == "m" else base_unit(unit)
+        role = "reading" if follow == "pose" else follow
+        lines.append(f'"{role}.{channel}" = {{ column = "{channel}", unit = "{given}" }}')
+    (folder / "recording.toml").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def dense(lifted: Lifted, u: np.ndarray, step: float) -> np.ndarray:
+    """(n n_y, n n_u) the derivative of a run by its drives, by central differences."""
+    columns = []
+    for k in range(u.size):
+        du = np.zeros(u.size)
+        du[k] = step
+        ends = [lifted.run(u + sign * du.reshape(u.shape)).ravel() for sign in (1, -1)]
+        columns.append((ends[0] - ends[1]) / (2 * step))
+    return np.stack(columns, axis=1)
+
+
+@pytest.mark.long
+def test_the_sparse_programme_is_the_dense_least_squares_of_the_lifted_system(small):
+    """Without limits by the normal equations, with bounds of drives that are active by scipy's bounded least squares."""
+    lifted = Lifted(small)
+    at, W = lifted.linearise(small.drive), 1 / np.array(lifted.signal.scale)
+    scale = _drive_scale(at, W)
+    G = np.tile(W, lifted.n)[:, None] * dense(lifted, small.drive, 1e-5) * np.tile(scale, lifted.n)
+    turn = 2 * np.pi * np.arange(lifted.n) / lifted.n
+    for size, active in ((2e-7, False), (2.4e-5, True)):
+        d = np.zeros(small.command.shape)
+        d[:, 3], d[:, 5] = size * np.cos(2 * turn), size
+        wanted = Wanted(small.command - d, W, small.drive)
+        found, _ = _solve(lifted, at, wanted, scale, np.zeros(at.limited.shape, bool))
+        A = np.vstack([G, STEP_WEIGHT * np.eye(G.shape[1])])
+        b = np.concatenate([-(W * d).ravel(), np.zeros(G.shape[1])])
+        low, high = (np.tile(bound, (lifted.n, 1)) - small.drive for bound in small.model.u_bounds)
+        best = lsq_linear(
+            A, b, ((low / scale).ravel(), (high / scale).ravel()), method="bvls" if active else "trf", tol=1e-12
+        )
+        assert bool((best.active_mask != 0).any()) == active
+        change = (found - small.drive) / scale
+        # of the largest change: the differences' truncation, and IPOPT's barrier on an active bound
+        assert change == pytest.approx(best.x.reshape(change.shape), abs=2e-3 * np.abs(best.x).max())
+
+
+def test_the_linearised_run_is_the_derivative_of_the_run(small, rng):
+    lifted = Lifted(small)
+    at, du = lifted.linearise(small.drive), 1e-6 * rng.standard_normal(small.drive.shape)
+    dv, dS = lifted.held(du), np.zeros(at.S.shape[1])
+    for _ in range(3):  # until a closed path repeats
+        dy = []
+        for k in range(lifted.n):
+            dS = at.A[k] @ dS + at.B[k] @ dv[k]
+            dy.append(at.C[k] @ dS + at.D[k] @ dv[k])
+    change = (lifted.run(small.drive + du) - lifted.run(small.drive - du)) / 2
+    assert np.array(dy) / lifted.signal.scale == pytest.approx(change / lifted.signal.scale, abs=1e-9)
+
+
+def test_what_is_out_of_reach_is_followed_as_near_as_the_limits_allow(small):
+    """30 um higher than the circle no drive holds: the stage's stroke ends before. Every limit of the device is kept."""
+    lifted = Lifted(small)
+    d = np.zeros(small.command.shape)
+    d[:, 5] = -3e-5
+    u = next_drives(lifted, Wanted(small.command - d, 1 / np.array(lifted.signal.scale), small.drive))
+    S = lifted.states(u)
+    x, z = np.split(S, [small.model.x.numel()], axis=1)
+    broken = [v for v in violations(small.model, x, z, u) if v.share > 1e-4]  # the last programme's curvature
+    assert not broken
+    assert lifted.run(u)[:, 5].mean() > small.command[:, 5].mean() + 5e-6
+
+
+@pytest.mark.parametrize("n", [2, 7, 40, 41])
+@pytest.mark.parametrize("periodic", [True, False])
+def test_coefficients_keep_the_sum_of_squares_and_give_the_samples_back(n, periodic, rng):
+    spectrum, x = Spectrum(n, periodic), rng.standard_normal((n, 2))
+    c = spectrum.coefficients(x)
+    assert np.sum(c**2) == pytest.approx(np.sum(x**2)) and spectrum.samples(c) == pytest.approx(x)
+
+
+def test_the_standard_error_is_that_of_the_mean_of_repetitions(rng):
+    spectrum = Spectrum(1000, True)
+    found = spectrum.repeated(3.0 * rng.standard_normal((8, 1000, 1)), np.array([np.nan]), np.ones(1))
+    assert np.sqrt(np.mean(found.se**2)) == pytest.approx(3 / np.sqrt(8), rel=0.05)  # 7000 degrees of freedom: 0.8 %
+
+
+def test_noise_of_one_repetition_is_read_off_its_highest_frequencies(rng):
+    spectrum, k = Spectrum(1000, True), np.arange(1000)
+    motion = 1e3 * np.sin(2 * np.pi * k / 1000)[:, None]
+    found = spectrum.repeated((motion + 3 * rng.standard_normal((1000, 1)))[None], np.array([np.nan]), np.ones(1))
+    assert found.se == pytest.approx(3, rel=0.15)  # the median of 500
+
+
+@pytest.mark.parametrize("repetitions", [2, 3, 10])
+def test_noise_passes_the_shrinkage_as_rarely_however_few_repetitions_there_are(repetitions, rng):
+    """By Cai's threshold a block of six passes once in 7000; a line of ten standard errors passes nearly whole."""
+    spectrum, passed, blocks = Spectrum(1000, True), 0, 0
+    for _ in range(20):
+        found = spectrum.repeated(rng.standard_normal((repetitions, 1000, 1)), np.array([np.nan]), np.ones(1))
+        factor = spectrum.shrinkage(found.mean, found.se, found.freedom)
+        passed, blocks = passed + len(np.unique(spectrum.block[factor[:, 0] > 0])), blocks + spectrum.block[-1] + 1
+    assert passed <= 6  # 0.5 expected of 3340
+    mean = found.mean.copy()
+    mean[1] = 30 * found.se[1, 0]
+    assert spectrum.shrinkage(mean, found.se, np.inf)[1] > 0.95
+
+
+@pytest.mark.long
+def test_learning_brings_a_wrong_device_down_to_what_noise_allows(hundred, tmp_path):
+    """From 360 nm to a few in two steps, and then it says that what is left is noise or not worth a run."""
+    bench, u, seen = Bench(hundred, tmp_path), hundred.drive, []
+    for _ in range(4):
+        bench.run(u)
+        found = learn(hundred.scenario, bench.runs)
+        seen.append((bench.error(u), found))
+        u = found.next.drive
+        if found.stop:
+            break
+    errors = [error for error, _ in seen]
+    assert errors[0] > 300e-9 and errors[1] < errors[0] / 10 and errors[2] < 6e-9
+    assert seen[-1][1].stop
+    last = seen[-1][1]
+    for error, run in zip(errors, last.runs, strict=True):  # what is reported is what was there
+        assert run.least["translation"] <= error + 2e-9 and run.most["translation"] >= error - 2e-9
+
+
+@pytest.mark.long
+def test_a_worse_run_is_not_gone_on_from_and_the_step_is_halved(hundred, tmp_path):
+    bench = Bench(hundred, tmp_path)
+    bench.run(hundred.drive)
+    bench.run(np.clip(hundred.drive * 0.93, 0, None))  # a run that somebody else's drives made worse
+    found = learn(hundred.scenario, bench.runs)
+    assert found.base == 0 and found.step == 0.5 and not found.stop
+    full = np.abs(learn(hundred.scenario, bench.runs[:1]).next.drive - hundred.drive).max()
+    assert 0.3 * full < np.abs(found.next.drive - hundred.drive).max() < 0.7 * full
+
+
+def exchanged(u: np.ndarray) -> np.ndarray:
+    return u[:, [0, 3, 2, 1, 4, 5]]
+
+
+def unplugged(u: np.ndarray) -> np.ndarray:
+    return np.where(np.arange(6) == 4, 0.1, u)
+
+
+def backward(u: np.ndarray) -> np.ndarray:
+    return np.where(np.arange(6) == 0, 0.16 - u, u)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("wired", "names", "says"),
+    [
+        (exchanged, "drive.1Y, drive.2Y", "exchanged"),
+        (unplugged, "drive.3X", "hardly acts"),
+        (backward, "drive.1X", "the other way"),
+    ],
+)
+def test_an_actuator_that_answers_otherwise_is_named_once_a_second_run_shows_it(hundred, tmp_path, wired, names, says):
+    bench = Bench(hundred, tmp_path, wired)
+    bench.run(hundred.drive)
+    found = learn(hundred.scenario, bench.runs)  # one run says nothing of the answer
+    step = np.abs(found.next.drive - hundred.drive).max()
+    assert 0 < step <= 0.2 * hundred.drive.max() * (1 + 1e-9)
+    bench.run(found.next.drive)
+    (fault,) = refused(lambda: learn(hundred.scenario, bench.runs))
+    assert names in fault and says in fault
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"rate": 150.0}, "the path runs at 200 Hz"),
+        (
+            {"length_unit": "um"},
+            None,
+        ),  # a millionth of the path: the error is the whole path, which is no more than a dead stage's
+        ({"length_unit": "km"}, "check the column, its unit"),
+        ({"drive_unit": "mW"}, "of another scenario"),
+        ({"record": "rows = [0, 150]"}, "less than one run"),
+        ({"record": "rows = [50, 450]"}, "begins 50 samples after"),
+        ({"record": 'between_samples = "linear"'}, "holds each drive"),
+        ({"kind": "poses"}, "record a series"),
+    ],
+)
+def test_a_recording_that_is_not_of_the_path_is_refused(hundred, tmp_path, changes, says):
+    bench = Bench(hundred, tmp_path)
+    bench.run(hundred.drive, **changes)
+    if says is None:
+        assert learn(hundred.scenario, bench.runs).next
+        return
+    assert any(says in fault for fault in refused(lambda: learn(hundred.scenario, bench.runs)))
+
+
+def test_drives_that_do_not_repeat_are_refused(hundred, tmp_path):
+    n = len(hundred.drive)
+    u = np.vstack([hundred.drive, 0.9 * hundred.drive])
+    write(tmp_path / "run", hundred, u, np.vstack([hundred.command, hundred.command]))
+    (fault,) = refused(lambda: learn(hundred.scenario, tmp_path / "run"))
+    assert f"do not repeat after {n} samples" in fault
+
+
+def test_readings_at_a_part_of_the_samples_and_a_multiple_of_the_rate_are_taken(hundred, tmp_path):
+    """Recorded at twice the rate, and read at every fourth row alone."""
+    bench = Bench(hundred, tmp_path, periods=3)
+    y = np.repeat(np.tile(bench.reached(hundred.drive), (3, 1)), 2, axis=0)
+    y = y + NOISE * np.random.default_rng(1).standard_normal(y.shape)
+    y[np.arange(len(y)) % 4 != 0] = np.nan
+    write(tmp_path / "fast", hundred, np.repeat(np.tile(hundred.drive, (3, 1)), 2, axis=0), y, rate=400.0)
+    (run,) = learn(hundred.scenario, tmp_path / "fast").runs
+    assert run.repeats == 3 and run.repeating["translation"] == pytest.approx(bench.error(hundred.drive), rel=0.05)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["raster", "rrr_circle", "xy_stage_force"])
+def test_open_paths_more_devices_and_settled_poses_are_learnt(name, tmp_path):
+    """The described device with a disturbance that repeats: after one step the model's own run ends where it is cancelled."""
+    keys = {"raster": {"sample_rate": "100 Hz"}, "rrr_circle": {"sample_rate": "1 kHz"}}.get(name, {})
+    solution = solved(shortened(name, tmp_path / name, **keys))
+    lifted, n = Lifted(solution), len(solution.command)
+    scale = np.array(lifted.signal.scale)
+    bump = 1e-3 * np.abs(solution.command).max(axis=0) * np.sin(np.pi * np.arange(n) / n)[:, None] ** 4
+    static = solution.scenario.sample_time is None
+    times = 3 if static or lifted.closed else 1
+    y, u = (np.tile(values, (times, 1)) for values in (lifted.run(solution.drive) + bump, solution.drive))
+    folder = write(tmp_path / "run", solution, u, y, kind="poses" if static else "series")
+    found = learn(solution.scenario, folder)
+    assert not found.stop
+    after = (lifted.run(found.next.drive) + bump - solution.command) / scale
+    assert np.sqrt(np.mean(after**2)) < 0.1 * np.sqrt(np.mean((bump / scale) ** 2))
+
+
+@pytest.mark.long
+def test_the_command_writes_a_page_drives_and_the_player_and_its_json_keeps_to_the_schema(hundred, tmp_path):
+    bench = Bench(hundred, tmp_path)
+    bench.run(hundred.drive)
+    out = tmp_path / "out"
+    done = ctrlgen("learn", hundred.scenario.path, *bench.runs, "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert "next" in done.stdout and "translation" in done.stdout
+    record = json.loads((out / "learning.json").read_text())
+    assert not faults(record, "learning")
+    rows = (out / "drives.csv").read_text().splitlines()
+    assert rows[0].startswith("time [s],") and len(rows) == 1 + len(hundred.drive)
+    assert list((out / "c").glob("*_player_f64.c")) and "<svg" in (out / "learning.html").read_text()
+    names = list(record["drives"])
+    table = np.array([row.split(",") for row in rows[1:]], float)[:, 1:]
+    assert table == pytest.approx(np.array([record["drives"][name] for name in names]).T, rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "Missing argument"),
+        (("nowhere",), "nowhere"),
+        (("SCENARIO",), "describes a scenario"),
+    ],
+)
+def test_wrong_words_get_one_message(words, says):
+    folder = SCENARIOS / "circle20"
+    done = ctrlgen("learn", folder, *(folder / "scenario.toml" if word == "SCENARIO" else word for word in words))
+    assert done.returncode and says in done.stderr and "Traceback" not in done.stderr
+
+
+def test_nothing_is_learnt_from_none():
+    with pytest.raises(InputError):
+        learn(SCENARIOS / "circle20", [])
