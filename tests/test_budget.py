@@ -14,7 +14,7 @@ from conftest import SCENARIOS
 from result_files import faults
 
 from ctrlgen import InputError, SolverError, build_model, error_budget, load_scenario, simulate, solve
-from ctrlgen.budget.error_budget import _agreement, budget_of
+from ctrlgen.budget.error_budget import agreement, budget_of
 from ctrlgen.budget.limits import margins, slopes_of_limits
 from ctrlgen.budget.linear import propagate
 from ctrlgen.budget.uncertain_path import UncertainPath
@@ -265,7 +265,7 @@ def test_draws_far_off_are_counted_and_named(circle, tmp_path, turned):
     columns[7] = -2 * number(circle, "actuator.thermal_resistance") if turned else columns[7]
     drawn = replace(found.drawn, pose=pose, columns=columns)
     path = UncertainPath(circle, given)
-    far = replace(found, agreements=tuple(_agreement(g, found.combined, drawn, path) for g in found.groups))
+    far = replace(found, agreements=tuple(agreement(g, found.combined, drawn, path) for g in found.groups))
     assert far.agreements[0].outlying == 1 and "more than 10 standard uncertainties off" in far.reasons[0]
     assert ("actuator.thermal_resistance has the other sign" in far.reasons[0]) == turned
 

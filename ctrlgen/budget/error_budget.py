@@ -231,7 +231,7 @@ def budget_of(
             )
     rows = safeties(path, found, slopes, drawn, critical, probability)
     lines = _lines(path, linear, combined, groups, drawn)
-    agreements = () if drawn is None else tuple(_agreement(g, combined, drawn, path) for g in groups)
+    agreements = () if drawn is None else tuple(agreement(g, combined, drawn, path) for g in groups)
     return ErrorBudget(
         solution, stated, groups, lines, combined, linear, drawn, agreements, rows, probability, draws, seed
     )
@@ -352,7 +352,8 @@ def _by_step(path: UncertainPath, linear: Propagated, name: str, own: np.ndarray
     return "1 LSB" if name == "converter" else "rounding", pose - linear.nominal["pose"]
 
 
-def _agreement(group: Group, combined: np.ndarray, drawn: Drawn, path: UncertainPath) -> Agreement:
+def agreement(group: Group, combined: np.ndarray, drawn: Drawn, path: UncertainPath) -> Agreement:
+    """How the draws of one group agree with its combined standard uncertainty (n, channels) along `path`, to first order."""
     linear = combined[drawn.kept][:, group.channels]
     deviations = drawn.pose[:, :, group.channels]
     sd, mean = deviations.std(axis=0, ddof=1), deviations.mean(axis=0)
