@@ -16,7 +16,7 @@ from ctrlgen import InputError, build_model, learn, load_scenario, simulate, sol
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.learning.lifted import Lifted
-from ctrlgen.learning.norm_optimal import STEP_WEIGHT, Wanted, _drive_scale, _solve, next_drives
+from ctrlgen.learning.norm_optimal import STEP_WEIGHT, Wanted, drive_scale, linear_programme, next_drives
 from ctrlgen.learning.repeatability import Spectrum
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.violations import violations
@@ -136,14 +136,14 @@ def test_the_sparse_programme_is_the_dense_least_squares_of_the_lifted_system(sm
     """Without limits by the normal equations, with bounds of drives that are active by scipy's bounded least squares."""
     lifted = Lifted(small)
     at, W = lifted.linearise(small.drive), 1 / np.array(lifted.signal.scale)
-    scale = _drive_scale(at, W)
+    scale = drive_scale(at, W)
     G = np.tile(W, lifted.n)[:, None] * dense(lifted, small.drive, 1e-5) * np.tile(scale, lifted.n)
     turn = 2 * np.pi * np.arange(lifted.n) / lifted.n
     for size, active in ((2e-7, False), (2.4e-5, True)):
         d = np.zeros(small.command.shape)
         d[:, 3], d[:, 5] = size * np.cos(2 * turn), size
         wanted = Wanted(small.command - d, W, small.drive)
-        found, _ = _solve(lifted, at, wanted, scale, np.zeros(at.limited.shape, bool))
+        found, _ = linear_programme(lifted, at, wanted, scale, np.zeros(at.limited.shape, bool))
         A = np.vstack([G, STEP_WEIGHT * np.eye(G.shape[1])])
         b = np.concatenate([-(W * d).ravel(), np.zeros(G.shape[1])])
         low, high = (np.tile(bound, (lifted.n, 1)) - small.drive for bound in small.model.u_bounds)
@@ -324,7 +324,7 @@ def test_readings_at_a_part_of_the_samples_and_a_multiple_of_the_rate_are_taken(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["raster", "rrr_circle", "xy_stage_force"])
+@pytest.mark.parametrize("name", ["raster", "rrr_circle", "xy_stage_force", "flexure_axis_line"])
 def test_open_paths_more_devices_and_settled_poses_are_learnt(name, tmp_path):
     """The described device with a disturbance that repeats: after one step the model's own run ends where it is cancelled."""
     keys = {"raster": {"sample_rate": "100 Hz"}, "rrr_circle": {"sample_rate": "1 kHz"}}.get(name, {})

@@ -45,7 +45,7 @@ def next_drives(lifted: Lifted, wanted: Wanted) -> np.ndarray:
     """The drives (n, n_u) of the next run. Raises SolverError where IPOPT finds none."""
     u = np.clip(wanted.now, *lifted.model.u_bounds)
     along = lifted.linearise(u)
-    scale = _drive_scale(along, wanted.weights)
+    scale = drive_scale(along, wanted.weights)
     cost = _cost(along.y, u, wanted, scale)
     for _ in range(MOST_PROGRAMMES):
         full, share = _programme(lifted, along, wanted, scale), 1.0
@@ -70,7 +70,7 @@ def _cost(y: np.ndarray, u: np.ndarray, wanted: Wanted, scale: np.ndarray) -> fl
     return float(np.sum(off**2) + np.sum(step**2))
 
 
-def _drive_scale(along: Linearised, weights: np.ndarray) -> np.ndarray:
+def drive_scale(along: Linearised, weights: np.ndarray) -> np.ndarray:
     """(n_u,) the drive that, held, moves the weighted signal by one: the median along the path."""
     n_s = along.A.shape[1]
     held = np.linalg.lstsq
@@ -86,7 +86,7 @@ def _programme(lifted: Lifted, at: Linearised, wanted: Wanted, scale: np.ndarray
     """The drives (n, n_u) that are best for the linearised run; composite limits are added until all are kept."""
     rows = np.zeros(at.limited.shape, bool)
     while True:
-        full, limited = _solve(lifted, at, wanted, scale, rows)
+        full, limited = linear_programme(lifted, at, wanted, scale, rows)
         low, high = _composite_bounds(lifted)
         near = ADDED_WITHIN * np.where(np.isfinite(high - low), high - low, np.maximum(np.abs(low), np.abs(high)))
         near = np.where(np.isfinite(near), near, 0.0)
@@ -105,7 +105,7 @@ def _composite_bounds(lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
     return np.array(low), np.array(high)
 
 
-def _solve(
+def linear_programme(
     lifted: Lifted, at: Linearised, wanted: Wanted, scale: np.ndarray, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """One quadratic programme in w = (dv, dS), scaled; with the composite limits of `rows` (n, n_l). The drives, and the limited
