@@ -12,7 +12,7 @@ from conftest import SCENARIOS
 from result_files import faults
 from scipy.optimize import lsq_linear
 
-from ctrlgen import InputError, build_model, learn, load_scenario, simulate, solve
+from ctrlgen import InputError, build_model, learn, load_scenario, simulate, solve, user_device
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.learning.lifted import Lifted
@@ -180,6 +180,25 @@ def test_what_is_out_of_reach_is_followed_as_near_as_the_limits_allow(small):
     broken = [v for v in violations(small.model, x, z, u) if v.share > 1e-4]  # the last programme's curvature
     assert not broken
     assert lifted.run(u)[:, 5].mean() > small.command[:, 5].mean() + 5e-6
+
+
+def test_a_drive_changes_no_faster_than_it_may(tmp_path):
+    """A stage without memory that is to make up for a jump: its drives ramp at the rate that is allowed."""
+    device = user_device(
+        "stage", parameters={"gain": "0.2 N/V", "k": "1 N/um"}, drive={"x": ("0 V", "150 V"), "y": ("0 V", "150 V")},
+        axes={"x": ("-1 um", "30 um"), "y": ("-1 um", "30 um")}, force=lambda u, p: p.gain * u.vector,
+        restoring_force=lambda d, p: p.k * d.vector, drive_rate={"x": "4000 V/s"},
+    )  # fmt: skip
+    path = 'kind = "circle"\ndiameter = "10 um"\ncentre = { x = "10 um", y = "10 um" }\nplane = ["x", "y"]\n'
+    (tmp_path / "scenario.toml").write_text(
+        f'title = "t"\ndevice = "stage"\nsample_rate = "1 kHz"\nduration = "0.1 s"\n[path]\n{path}'
+    )
+    solution = solve(load_scenario(tmp_path, device), build_model(device))
+    lifted = Lifted(solution)
+    d = np.where(np.arange(100)[:, None] < 50, 2e-6, 0.0) * np.ones(solution.command.shape[1])
+    u = next_drives(lifted, Wanted(solution.command - d, 1 / np.array(lifted.signal.scale), solution.drive))
+    fastest = np.abs(np.diff(np.vstack([u[-1:], u]), axis=0)).max(axis=0) * 1e3
+    assert fastest[0] == pytest.approx(4000, rel=1e-6) and fastest[1] > 8000
 
 
 @pytest.mark.parametrize("n", [2, 7, 40, 41])
