@@ -24,7 +24,8 @@ MAY_IMPORT = {  # package -> packages; every module may import its own package a
     "trajectory": PHYSICS, "recordings": PHYSICS,
     "budget": f"{PHYSICS} trajectory",
     "firmware": f"{PHYSICS} trajectory", "verification": f"{PHYSICS} trajectory firmware",
-    "reporting": f"{PHYSICS} trajectory budget firmware verification",
+    "calibration": f"{DIAGNOSIS} trajectory budget firmware",
+    "reporting": f"{PHYSICS} trajectory budget calibration firmware verification",
     "diagnosis.settings": "",
     "diagnosis.hypotheses": f"{PHYSICS} diagnosis.settings",
     "diagnosis.estimation": f"{PHYSICS} recordings diagnosis.settings diagnosis.hypotheses",
@@ -34,7 +35,7 @@ MAY_IMPORT = {  # package -> packages; every module may import its own package a
     "diagnosis.report": f"{DIAGNOSIS} reporting diagnosis.shares diagnosis.selection",
     "diagnosis": f"{DIAGNOSIS} diagnosis.shares diagnosis.selection diagnosis.evidence diagnosis.report",
     "reproduce": STAGES,
-    "app": f"{STAGES} budget reproduce diagnosis diagnosis.hypotheses diagnosis.selection diagnosis.evidence diagnosis.report",
+    "app": f"{STAGES} budget calibration reproduce diagnosis diagnosis.hypotheses diagnosis.selection diagnosis.evidence diagnosis.report",
 }  # fmt: skip
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

@@ -9,11 +9,13 @@ from pydantic import BaseModel
 from ctrlgen.core.files import write_text
 from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
 from ctrlgen.reporting.budget_schema import BudgetRecord
+from ctrlgen.reporting.calibration_schema import CalibrationRecord
 from ctrlgen.reporting.result_schemas import SCHEMAS, BuildRecord, Summary, schema_text
 
 RESULTS: dict[str, type[BaseModel]] = {
     "budget": BudgetRecord,
     "build": BuildRecord,
+    "constants": CalibrationRecord,
     "diagnosis": DiagnosisRecord,
     "summary": Summary,
 }

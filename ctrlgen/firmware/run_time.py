@@ -15,6 +15,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.firmware.c_constants import Derived
+from ctrlgen.firmware.constants_file import CRC_POLYNOMIAL, MAGIC, OVERHEAD, VERSION
 from ctrlgen.firmware.cprint import Printer
 from ctrlgen.firmware.expression_graph import Node, reached
 from ctrlgen.firmware.real import Real
@@ -83,6 +84,8 @@ def start_context(controller: Controller, printer: Printer) -> dict[str, Any]:
     return {
         "given": [_described(c, real) for c in constants], "given_numbers": len(constants) + len(_assigned(members)), "derived": members, "derive": derive,
         "assigned": _assigned(members), "changing": changing, "refused": FIRST,
+        "magic": int.from_bytes(MAGIC, "little"), "layout": VERSION + (len(constants) << 16), "crc_polynomial": CRC_POLYNOMIAL,
+        "overhead": OVERHEAD,
     }  # fmt: skip
 
 
