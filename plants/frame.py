@@ -225,10 +225,10 @@ class Frame:
         self.springs.append(Spring(start, end, np.asarray(K, dtype=float)))
         return self.springs[-1]
 
-    def load(self, node: Node, at: Pose) -> int:
-        """A force at `at`, turning with `node`; returns the load's place in `solve(forces)`. Zero until then."""
+    def load(self, node: Node, at: Pose, turns: bool = True) -> int:
+        """A force at `at`, which turns with `node` or keeps its direction; returns the load's place in `solve(forces)`. Zero until then."""
         load = self._mbs.AddLoad(
-            eii.Force(markerNumber=self._marker(node, at), loadVector=[0.0, 0.0, 0.0], bodyFixed=True)
+            eii.Force(markerNumber=self._marker(node, at), loadVector=[0.0, 0.0, 0.0], bodyFixed=turns)
         )
         self._loads.append(int(load))
         return len(self._loads) - 1

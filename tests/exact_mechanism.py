@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import exudyn.itemInterface as eii
 import numpy as np
 from mechanism_files import dm
 from scipy.spatial.transform import Rotation
@@ -70,10 +69,7 @@ class ExactMechanism:
             frame.fix(bodies[1], start)
         for a in device.placed_actuators:
             if a.section.kind == "force":  # its direction stays, while the body turns
-                marker = frame._marker(self.bodies[a.second], Pose(WORLD @ dm(c.point(a)).ravel() * UM, WORLD))
-                frame._loads.append(
-                    frame._mbs.AddLoad(eii.Force(markerNumber=marker, loadVector=[0.0] * 3, bodyFixed=False))
-                )
+                frame.load(self.bodies[a.second], Pose(WORLD @ dm(c.point(a)).ravel() * UM, WORLD), turns=False)
         self.directions = [WORLD @ dm(n).ravel() for n in c.directions]
         self.points = [dm(c.point(a)).ravel() for a in device.placed_actuators if a.section.kind == "force"]
         frame.assemble(tolerance=1e-3)  # N um: rounding in the stiff directions of a blade leaves 1e-4

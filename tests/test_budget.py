@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from conftest import SCENARIOS
 from result_files import faults
 
 from ctrlgen import InputError, SolverError, build_model, error_budget, load_scenario, simulate, solve
-from ctrlgen.budget.error_budget import budget_of
+from ctrlgen.budget.error_budget import agreement, budget_of
 from ctrlgen.budget.limits import margins, slopes_of_limits
 from ctrlgen.budget.linear import propagate
 from ctrlgen.budget.uncertain_path import UncertainPath
@@ -255,11 +256,18 @@ def test_where_first_order_and_draws_differ_it_is_said_why(circle, tmp_path):
     assert any("actuator.beam_width" in reason and "not linear" in reason for reason in found.reasons)
 
 
-def test_draws_far_off_are_counted_and_named(tmp_path):
-    text = 'title = "loose"\n[numbers]\n"mechanics.stiffness" = { sd = "30 %", source = "not measured" }\n'
-    (tmp_path / "loose.toml").write_text(text)  # of 2000 draws one or two have a stiffness below zero
-    found = error_budget(SCENARIOS / "flexure_axis_line", tmp_path / "loose.toml", draws=2000)
-    assert found.agreements[0].outlying > 0 and "standard uncertainties off" in found.reasons[0]
+@pytest.mark.parametrize("turned", [False, True])
+def test_draws_far_off_are_counted_and_named(circle, tmp_path, turned):
+    given = stated(circle, '[numbers]\n"actuator.thermal_resistance" = { sd = "5 %", source = "chosen" }', tmp_path)
+    found = budget_of(circle, given, draws=200)
+    pose, columns = found.drawn.pose.copy(), found.drawn.columns.copy()
+    pose[7] *= 1e4  # as of a draw that grows
+    columns[7] = -2 * number(circle, "actuator.thermal_resistance") if turned else columns[7]
+    drawn = replace(found.drawn, pose=pose, columns=columns)
+    path = UncertainPath(circle, given)
+    far = replace(found, agreements=tuple(agreement(g, found.combined, drawn, path) for g in found.groups))
+    assert far.agreements[0].outlying == 1 and "more than 10 standard uncertainties off" in far.reasons[0]
+    assert ("actuator.thermal_resistance has the other sign" in far.reasons[0]) == turned
 
 
 def test_sds_with_which_a_draw_is_no_device_are_refused(circle, tmp_path):

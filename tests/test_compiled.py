@@ -87,7 +87,7 @@ def test_a_long_function_is_compiled_in_parts_and_gives_the_same_bits(cache, mon
     step, at = ca.Function("step", [x], [y]), ca.MX.sym("at", 3)
     whole = ca.Function("whole", [at], [step(step(at)) + step(2 * at)])
     monkeypatch.setattr(compiled, "LARGE", 1000)
-    code = compiled._c_of(whole)
+    code = compiled.c_code(whole)
     assert 2 <= code.count("__attribute__((noinline)) static void casadi_f") <= 10
     long = Compilable(whole)
     assert long.spent(LONG)

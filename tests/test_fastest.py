@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import ctrlgen
 from ctrlgen import InputError, SolverError, build_model, load_scenario, solve, user_device
 from ctrlgen.path_timing.curve import Curve
-from ctrlgen.path_timing.drive_law import InertialLaw
+from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
 from ctrlgen.path_timing.optimum import Optimiser
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.paths import Poses
@@ -118,6 +118,7 @@ def test_at_every_place_one_limit_binds(circle20):
     assert all(not b.side.upper and b.side.limit.unit == "W" for b in circle20.bindings)
 
 
+@pytest.mark.long
 def test_a_circle_as_large_as_a_frequency_allows_takes_just_that_long():
     """0.2 %: scales are searched to 0.1 %."""
     found = ctrlgen.fastest(SCENARIOS / "circle20", sample_rate="10 kHz", frequency="50 Hz")
@@ -186,6 +187,13 @@ def test_the_derivatives_of_a_target_follow_from_those_of_the_path():
     a = place[1] * speed[1] + place[2] * speed[0] ** 2
     *_, u = law.at(ca.SX(place), ca.SX(speed))
     assert float(u) == pytest.approx((0.5 * a + 30 * v + 0.2e6 * place[0]) / 10, rel=1e-12)
+
+
+def test_the_fourth_derivative_of_a_composition_is_faa_di_brunos():
+    """B_4,1 ... B_4,4 = w4, 4 w1 w3 + 3 w2^2, 6 w1^2 w2, w1^4."""
+    a, b, c, d = 0.7, -1.3, 2.1, 0.4
+    found = ca.DM(bell_polynomials(4, ca.SX([a, b, c, d]))).full().ravel()
+    assert found == pytest.approx([d, 4 * a * c + 3 * b**2, 6 * a**2 * b, a**4])
 
 
 def test_a_tripod_on_its_cone_is_faster_than_at_even_speed_and_keeps_its_currents():
@@ -318,6 +326,18 @@ def test_a_periodic_list_of_poses_has_the_derivatives_of_its_curve():
 
 
 def test_the_command_writes_page_figures_numbers_scenario_and_player(tmp_path):
+    done = run("fastest", AXIS, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "commanded drive" in done.stdout and "at even speed" in done.stdout
+    record = json.loads((tmp_path / "out" / "fastest.json").read_text())
+    assert faults(record, "fastest") == [] and record["times"]["even_speed"] is None
+    assert (tmp_path / "out" / "fastest.html").read_text().count("<svg") == 3
+    assert (tmp_path / "out" / "player" / "flexure_axis_line_fastest_player_f64.c").is_file()
+    assert load_scenario(tmp_path / "out" / "scenario" / "flexure_axis_line_fastest.toml").sample_time == 5e-5
+
+
+@pytest.mark.long
+def test_the_command_says_how_large_a_circle_a_frequency_allows(tmp_path):
     done = run("fastest", SCENARIOS / "circle20", "--frequency", "50 Hz", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "largest circle at 50 Hz" in done.stdout and "commanded heater power" in done.stdout
@@ -347,6 +367,8 @@ def test_the_command_writes_page_figures_numbers_scenario_and_player(tmp_path):
         ("circle20", {"sample_rate": "0 Hz"}, "is not above zero"),
         ("circle20", {"frequency": "20 ms"}, "wrong unit"),
         ("circle20", {"frequency": "400 Hz"}, "2.5 samples"),
+        ("circle20", {"frequency": "1 mHz"}, "give a lower --sample-rate"),
+        ("circle20", {"sample_rate": "1e300 Hz"}, "give a lower one"),
         ("circle20", {"sample_rate": "100 Hz"}, "is too low"),
     ],
 )

@@ -25,7 +25,8 @@ MAY_IMPORT = {  # package -> packages; every module may import its own package a
     "budget": f"{PHYSICS} trajectory", "path_timing": f"{PHYSICS} trajectory",
     "learning": f"{PHYSICS} trajectory recordings budget",
     "firmware": f"{PHYSICS} trajectory", "verification": f"{PHYSICS} trajectory firmware",
-    "reporting": f"{PHYSICS} trajectory budget path_timing learning firmware verification",
+    "calibration": f"{DIAGNOSIS} trajectory budget firmware",
+    "reporting": f"{PHYSICS} trajectory budget path_timing learning calibration firmware verification",
     "diagnosis.settings": "",
     "diagnosis.hypotheses": f"{PHYSICS} diagnosis.settings",
     "diagnosis.estimation": f"{PHYSICS} recordings diagnosis.settings diagnosis.hypotheses",
@@ -35,8 +36,8 @@ MAY_IMPORT = {  # package -> packages; every module may import its own package a
     "diagnosis.report": f"{DIAGNOSIS} reporting diagnosis.shares diagnosis.selection",
     "diagnosis": f"{DIAGNOSIS} diagnosis.shares diagnosis.selection diagnosis.evidence diagnosis.report",
     "reproduce": STAGES,
-    "app": f"{STAGES} budget path_timing learning reproduce diagnosis diagnosis.hypotheses diagnosis.selection diagnosis.evidence "
-    "diagnosis.report",
+    "app": f"{STAGES} budget path_timing learning calibration reproduce diagnosis diagnosis.hypotheses diagnosis.selection "
+    "diagnosis.evidence diagnosis.report",
 }  # fmt: skip
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

@@ -12,11 +12,11 @@ from conftest import SCENARIOS
 from result_files import faults
 from scipy.optimize import lsq_linear
 
-from ctrlgen import InputError, build_model, learn, load_scenario, simulate, solve
+from ctrlgen import InputError, build_model, learn, load_scenario, simulate, solve, user_device
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.learning.lifted import Lifted
-from ctrlgen.learning.norm_optimal import STEP_WEIGHT, Wanted, _drive_scale, _solve, next_drives
+from ctrlgen.learning.norm_optimal import STEP_WEIGHT, Wanted, drive_scale, linear_programme, next_drives
 from ctrlgen.learning.repeatability import Spectrum
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.violations import violations
@@ -136,14 +136,14 @@ def test_the_sparse_programme_is_the_dense_least_squares_of_the_lifted_system(sm
     """Without limits by the normal equations, with bounds of drives that are active by scipy's bounded least squares."""
     lifted = Lifted(small)
     at, W = lifted.linearise(small.drive), 1 / np.array(lifted.signal.scale)
-    scale = _drive_scale(at, W)
+    scale = drive_scale(at, W)
     G = np.tile(W, lifted.n)[:, None] * dense(lifted, small.drive, 1e-5) * np.tile(scale, lifted.n)
     turn = 2 * np.pi * np.arange(lifted.n) / lifted.n
     for size, active in ((2e-7, False), (2.4e-5, True)):
         d = np.zeros(small.command.shape)
         d[:, 3], d[:, 5] = size * np.cos(2 * turn), size
         wanted = Wanted(small.command - d, W, small.drive)
-        found, _ = _solve(lifted, at, wanted, scale, np.zeros(at.limited.shape, bool))
+        found, _ = linear_programme(lifted, at, wanted, scale, np.zeros(at.limited.shape, bool))
         A = np.vstack([G, STEP_WEIGHT * np.eye(G.shape[1])])
         b = np.concatenate([-(W * d).ravel(), np.zeros(G.shape[1])])
         low, high = (np.tile(bound, (lifted.n, 1)) - small.drive for bound in small.model.u_bounds)
@@ -180,6 +180,25 @@ def test_what_is_out_of_reach_is_followed_as_near_as_the_limits_allow(small):
     broken = [v for v in violations(small.model, x, z, u) if v.share > 1e-4]  # the last programme's curvature
     assert not broken
     assert lifted.run(u)[:, 5].mean() > small.command[:, 5].mean() + 5e-6
+
+
+def test_a_drive_changes_no_faster_than_it_may(tmp_path):
+    """A stage without memory that is to make up for a jump: its drives ramp at the rate that is allowed."""
+    device = user_device(
+        "stage", parameters={"gain": "0.2 N/V", "k": "1 N/um"}, drive={"x": ("0 V", "150 V"), "y": ("0 V", "150 V")},
+        axes={"x": ("-1 um", "30 um"), "y": ("-1 um", "30 um")}, force=lambda u, p: p.gain * u.vector,
+        restoring_force=lambda d, p: p.k * d.vector, drive_rate={"x": "4000 V/s"},
+    )  # fmt: skip
+    path = 'kind = "circle"\ndiameter = "10 um"\ncentre = { x = "10 um", y = "10 um" }\nplane = ["x", "y"]\n'
+    (tmp_path / "scenario.toml").write_text(
+        f'title = "t"\ndevice = "stage"\nsample_rate = "1 kHz"\nduration = "0.1 s"\n[path]\n{path}'
+    )
+    solution = solve(load_scenario(tmp_path, device), build_model(device))
+    lifted = Lifted(solution)
+    d = np.where(np.arange(100)[:, None] < 50, 2e-6, 0.0) * np.ones(solution.command.shape[1])
+    u = next_drives(lifted, Wanted(solution.command - d, 1 / np.array(lifted.signal.scale), solution.drive))
+    fastest = np.abs(np.diff(np.vstack([u[-1:], u]), axis=0)).max(axis=0) * 1e3
+    assert fastest[0] == pytest.approx(4000, rel=1e-6) and fastest[1] > 8000
 
 
 @pytest.mark.parametrize("n", [2, 7, 40, 41])
@@ -324,7 +343,7 @@ def test_readings_at_a_part_of_the_samples_and_a_multiple_of_the_rate_are_taken(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["raster", "rrr_circle", "xy_stage_force"])
+@pytest.mark.parametrize("name", ["raster", "rrr_circle", "xy_stage_force", "flexure_axis_line"])
 def test_open_paths_more_devices_and_settled_poses_are_learnt(name, tmp_path):
     """The described device with a disturbance that repeats: after one step the model's own run ends where it is cancelled."""
     keys = {"raster": {"sample_rate": "100 Hz"}, "rrr_circle": {"sample_rate": "1 kHz"}}.get(name, {})

@@ -19,6 +19,7 @@ from mechanism_files import (
     dm,
     hinged,
     loaded,
+    mems_hexapod_text,
     number,
     place,
     vector,
@@ -33,45 +34,9 @@ from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.meso_hexapod import matrices as meso_matrices
 from ctrlgen.devices.rrr_stage import stage
 from ctrlgen.model.assembly import movable
-from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics import meso_hexapod as meso
+from ctrlgen.physics import thermal_actuator, xy_stage
 from ctrlgen.physics.flexure import rectangular_section
-
-
-def mems_hexapod_text(device) -> str:
-    """S1's hexapod: three stages of [C^XY] whose strokes are prescribed, six struts, the platform."""
-    p = device.values()
-    h, g = p.hexapod, hexapod.geometry(p.hexapod)
-    C = ca.DM(xy_stage.stage_compliance(p.stage, p.actuator)).full()
-    lines = [HEAD, f'[[material]]\nname = "tungsten"\nyoung = {number(h.young, "Pa")}\npoisson = "{h.poisson}"\n']
-    lines += [f'[[body]]\nname = "{name}"\n' for name in ("platform", "stage1", "stage2", "stage3")]
-    for j in range(3):
-        R = dm(g.rotation[j])
-        rows = ", ".join(vector(row) for row in C)
-        lines.append(
-            f'[[element]]\nkind = "matrix"\nname = "xy{j + 1}"\nfrom = "ground"\nto = "stage{j + 1}"\nat = {place(dm(g.centre[j]))}\n'
-            f"along = {vector(R[:, 0])}\nacross = {vector(R[:, 1])}\ncompliance_si = [{rows}]\n"
-        )
-    for i in range(6):
-        span = dm(g.platform[i] - g.base[i]).ravel()
-        lines.append(
-            f'[[element]]\nkind = "strut"\nname = "strut{i + 1}"\nfrom = "stage{hexapod.STAGE_OF_STRUT[i] + 1}"\nto = "platform"\n'
-            f"at = {place(dm(g.platform[i]))}\nalong = {vector(span)}\nacross = [0, 0, 1]\nlength = {number(np.linalg.norm(span), 'm')}\n"
-            f"wire_length = {number(h.wire_length, 'm')}\nwire_diameter = {number(h.wire_diameter, 'm')}\n"
-            f'rod_diameter = {number(h.rod_diameter, "m")}\nmaterial = "tungsten"\n'
-        )
-    for j in range(3):
-        for c, axis in enumerate("XY"):
-            lines.append(
-                f'[[actuator]]\nname = "a{j + 1}{axis}"\nkind = "displacement"\non = "xy{j + 1}"\n'
-                f"along = {vector(dm(g.rotation[j])[:, c])}\n"
-                'gain = "1 um/V"\nlow = "0 V"\nhigh = "50 V"\ntravel = "50 um"\n'
-            )
-    lines.append(
-        '[output]\nbody = "platform"\nat = ["0 m", "0 m", "0 m"]\n'
-        'channels = ["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]\n'
-    )
-    return "\n".join(lines)
 
 
 def test_the_mems_hexapod_as_a_mechanism_has_the_papers_jacobian(tmp_path):

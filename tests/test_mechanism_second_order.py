@@ -7,8 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICE
-from mechanism_files import PARALLELOGRAM, TWO_BODIES, blade, dm, loaded, spring, with_values
-from test_mechanism import mems_hexapod_text
+from mechanism_files import PARALLELOGRAM, TWO_BODIES, blade, dm, loaded, mems_hexapod_text, spring, with_values
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, run, solve
 from ctrlgen.devices.mechanism_model import Condensed
@@ -42,7 +41,7 @@ class Expanded:
         self.s = SecondOrder(self.c)
         x = ca.SX.sym("d", len(self.c.directions))
         point = self.c.output_point
-        seen = self.s._seen(-1, device.bodies.index(device.output.body), point)
+        seen = self.s.seen(-1, device.bodies.index(device.output.body), point)
         self.K, self.J = dm(self.c.stiffness), dm(self.c.output_motion)
         self.second = ca.Function("second", [x], [ca.mtimes(seen, self.s.products(x))])
         self.force = ca.Function("force", [x], [self.s.restoring_force(x, stiffening=False)])

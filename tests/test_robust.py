@@ -180,7 +180,7 @@ def test_of_a_hundred_thousand_draws_as_few_break_limits_as_is_stated():
     share, _ = broken(solve(scenario, model), 100_000)
     assert share <= RISK
     # the same where the path cannot be moved and its reserve is used up: as far up as it holds
-    held = solve(replace(without(scenario, home=()), home={"delta_z": -2.5e-6}), model)
+    held = solve(replace(without(scenario, home=()), home={"delta_z": -1.8e-6}), model)
     share, _ = broken(held, 100_000)
     assert RISK / 30 < share <= RISK
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from ctrlgen.core.files import write_text
 from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
 from ctrlgen.reporting.budget_schema import BudgetRecord
+from ctrlgen.reporting.calibration_schema import CalibrationRecord
 from ctrlgen.reporting.fastest_schema import FastestRecord
 from ctrlgen.reporting.learning_schema import LearningRecord
 from ctrlgen.reporting.result_schemas import SCHEMAS, BuildRecord, Summary, schema_text
@@ -16,6 +17,7 @@ from ctrlgen.reporting.result_schemas import SCHEMAS, BuildRecord, Summary, sche
 RESULTS: dict[str, type[BaseModel]] = {
     "budget": BudgetRecord,
     "build": BuildRecord,
+    "constants": CalibrationRecord,
     "diagnosis": DiagnosisRecord,
     "fastest": FastestRecord,
     "learning": LearningRecord,

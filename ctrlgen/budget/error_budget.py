@@ -77,7 +77,7 @@ class BudgetLine:
 class Agreement:
     """First order against the draws for one group, SI: largest combined standard uncertainty by both, largest relative difference
     along the path of the standard deviation and of the half width of the 95 % interval, and the largest mean of the draws; how many draws
-    are `outlying`."""
+    are `outlying`, and the numbers that have `turned` their sign in all of these."""
 
     group: Group
     linear: float
@@ -86,6 +86,7 @@ class Agreement:
     difference_of_interval: float
     mean: float
     outlying: int
+    turned: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -147,7 +148,13 @@ class ErrorBudget:
                 a.group,
                 a.difference_of_interval if a.outlying else max(a.difference, a.difference_of_interval),
             )
-            if a.outlying and not a.passed:
+            if a.outlying and not a.passed and a.turned:
+                found.append(
+                    f"{group.name}: {a.outlying} of {self.draws} draws lie more than {OUTLYING:g} standard uncertainties off and make "
+                    f"the sd of the draws: in all of them {' and '.join(a.turned)} has the other sign, as a normal distribution with so "
+                    "large an sd reaches; state a smaller sd, or compare the 95 % intervals"
+                )
+            elif a.outlying and not a.passed:
                 found.append(
                     f"{group.name}: {a.outlying} of {self.draws} draws lie more than {OUTLYING:g} standard uncertainties off and make "
                     "the sd of the draws: the device is near a pole or resonates, or the simulation grows, whose steps are exact for the "
@@ -225,7 +232,7 @@ def budget_of(
             )
     rows = safeties(path, found, slopes, drawn, critical, probability)
     lines = _lines(path, linear, combined, groups, drawn)
-    agreements = () if drawn is None else tuple(_agreement(g, combined, drawn) for g in groups)
+    agreements = () if drawn is None else tuple(agreement(g, combined, drawn, path) for g in groups)
     return ErrorBudget(
         solution, stated, groups, lines, combined, linear, drawn, agreements, rows, probability, draws, seed
     )
@@ -346,7 +353,8 @@ def _by_step(path: UncertainPath, linear: Propagated, name: str, own: np.ndarray
     return "1 LSB" if name == "converter" else "rounding", pose - linear.nominal["pose"]
 
 
-def _agreement(group: Group, combined: np.ndarray, drawn: Drawn) -> Agreement:
+def agreement(group: Group, combined: np.ndarray, drawn: Drawn, path: UncertainPath) -> Agreement:
+    """How the draws of one group agree with its combined standard uncertainty (n, channels) along `path`, to first order."""
     linear = combined[drawn.kept][:, group.channels]
     deviations = drawn.pose[:, :, group.channels]
     sd, mean = deviations.std(axis=0, ddof=1), deviations.mean(axis=0)
@@ -357,7 +365,13 @@ def _agreement(group: Group, combined: np.ndarray, drawn: Drawn) -> Agreement:
     def off(values: np.ndarray, against: np.ndarray) -> float:
         return float(np.abs(values[compared] / against[compared] - 1).max(initial=0.0))
 
+    far = (np.abs(deviations) > OUTLYING * np.where(compared, linear, np.inf)).any(axis=(1, 2))
+    values, turned = {name: number.si for name, number in path.model.device.quantities()}, list[str]()
+    columns = [(name, line.kind) for line in path.uncertainties.lines for name in line.paths]
+    for i, (name, kind) in enumerate(columns):
+        if kind == "number" and far.any() and np.all((values[name] + drawn.columns[far, i]) * values[name] < 0):
+            turned.append(name)
     return Agreement(
         group, float(linear.max()), float(sd.max()), off(sd, linear), off((high - low) / 2, expected), float(np.abs(mean).max()),
-        int((np.abs(deviations) > OUTLYING * np.where(compared, linear, np.inf)).any(axis=(1, 2)).sum()),
+        int(far.sum()), tuple(turned),
     )  # fmt: skip

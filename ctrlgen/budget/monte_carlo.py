@@ -65,9 +65,7 @@ def draw(
     """
     rng, stated, pose = np.random.default_rng(seed), path.uncertainties, linear.nominal["pose"]
     m = len(stated.sds)
-    deviations = (
-        rng.multivariate_normal(np.zeros(m), stated.covariance, draws, method="eigh") if m else np.zeros((draws, 0))
-    )
+    deviations = rng.standard_normal((draws, m)) @ _square_root(stated.covariance)
     one_by_one = np.diag(stated.sds)
     columns = np.vstack([deviations, one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
     q, gain = _numbers(path, columns)
@@ -96,6 +94,13 @@ def draw(
         kept, found[:draws][good], limits[:draws][good], deviations[good],
         (found[draws:-1] - found[-1]).reshape(2, m, *found.shape[1:]), int((~good).sum()), broken[good],
     )  # fmt: skip
+
+
+def _square_root(covariance: np.ndarray) -> np.ndarray:
+    """(m, m) the symmetric one, which is the same with every library, as the signs of eigenvectors are not."""
+    scale = np.sqrt(np.diag(covariance))  # stiffnesses and angles differ by many powers of ten
+    sizes, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray((vectors * np.sqrt(np.maximum(sizes, 0.0))) @ vectors.T * scale)
 
 
 def _numbers(path: UncertainPath, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

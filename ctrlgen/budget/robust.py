@@ -90,7 +90,7 @@ class _RobustPath:
 
     def solved(self) -> Solution:
         """The solution. Raises Unreachable where it keeps the limits of the device as described alone."""
-        home = self._home() if self.robust.home else {}
+        home = self._home() if self.robust.home else dict(self.scenario.home)
         scenario = replace(self.scenario, home=home)
         try:
             solution = described.solve(scenario, self.model, self.progress)

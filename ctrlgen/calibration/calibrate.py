@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -29,10 +30,10 @@ from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
 from ctrlgen.diagnosis.estimation.robust_covariance import widening
 from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
 from ctrlgen.diagnosis.settings import DISCREPANCY, NOISE_UPDATE, SIMULATION, STATISTICS
-from ctrlgen.model.assembly import build_model, movable
+from ctrlgen.model.assembly import build_model, movable, symbolic_model
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.reader import load_recordings
-from ctrlgen.recordings.recording import Recording
+from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.trajectory.scenario import Input
 
 TOLD = (
@@ -157,10 +158,30 @@ class _Search:
             self.notes.append(
                 "the recorded ambient temperature is not used: a constant of [run_time] holds for the whole recording"
             )
-        recording = replace(recording, records=tuple(replace(r, ambient=None) for r in recording.records))
         progress("noise")
         settling = settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time))
+        recording = replace(
+            recording, records=tuple(self._settled(replace(r, ambient=None), settling) for r in recording.records)
+        )
         self.fitter = Fitter(recording, estimate_noise(recording, settling))
+
+    def _settled(self, record: Record, settling: float) -> Record:
+        """A record whose rows count from when its start is forgotten, where the state of rest depends on a constant: a simulation
+        begins at the rest of the file."""
+        free = [c.path for c in self.device.given_at_start]
+        rests = symbolic_model(self.device, free).rest_formula
+        if not ca.symvar(rests) or not np.isfinite(record.sample_time):
+            return record
+        rows = int(np.ceil(settling / record.sample_time))
+        if rows >= len(record.time):
+            what = f"lasts no longer than {settling:.3g} s, in which its start is forgotten; record longer"
+            raise InputError(record.name, [Fault("record", what)])
+        self.notes.append(
+            f"{record.name}: the first {settling:.3g} s are not used, because the state of rest depends on a constant"
+        )
+        valid = record.valid.copy()
+        valid[:rows] = False
+        return replace(record, valid=valid)
 
     def run(self, inputs: dict[str, Input]) -> Calibration:
         """Fits what the recording determines."""

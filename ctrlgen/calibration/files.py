@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
+from ctrlgen.core.files import write_text
 from ctrlgen.firmware.constants_file import MAGIC, VERSION
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import comment
@@ -68,10 +69,12 @@ def inside(row: CalibratedConstant, real: Real) -> float:
     """The value as the arithmetic holds it, not beyond a bound by the rounding."""
     kind = np.float32 if real is Real.FLOAT else np.float64
     low, value, high = (kind(v) for v in (row.constant.low, row.value, row.constant.high))
+    low = np.nextafter(low, high) if float(low) < row.constant.low else low
+    high = np.nextafter(high, low) if float(high) > row.constant.high else high
     return float(min(max(value, low), high))
 
 
 def write_constants(out: Path, calibration: Calibration) -> None:
     """Writes constants.h and constants.bin into the folder `out`."""
-    (out / HEADER).write_text(c_header(calibration), encoding="utf-8")
+    write_text(out / HEADER, c_header(calibration))
     (out / BINARY).write_bytes(binary(calibration))

@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ctrlgen.devices.base import Device, DevicePhysics
+from ctrlgen.devices.mechanism_copies import Copied, Placed
 from ctrlgen.devices.mechanism_dynamics import guyan_modes, inertia_remarks
 from ctrlgen.devices.mechanism_elements import (
     TWIST,
@@ -23,9 +24,7 @@ from ctrlgen.devices.mechanism_elements import (
     CircularHinge,
     Compliance,
     ComplianceMatrix,
-    Copied,
     Flexible,
-    Placed,
     Strut,
     Wire,
 )

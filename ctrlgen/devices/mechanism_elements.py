@@ -389,23 +389,3 @@ class ComplianceMatrix(Joining):
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6)."""
         return ca.DM(np.array(self.compliance_si))
-
-
-@dataclass(frozen=True, eq=False)  # a matrix has no truth value that a comparison could use
-class Copied:
-    """One copy of a body, element or actuator: which table of the file it is, its name, its number in the pattern (0: it has none)
-    and the rotation (3, 3) by which it is turned."""
-
-    section: Any
-    index: int
-    name: str
-    copy: int
-    turn: Matrix
-
-
-@dataclass(frozen=True, eq=False)
-class Placed(Copied):
-    """A copy of an element or actuator and the numbers of the bodies between which it acts, `GROUND` for none."""
-
-    first: int
-    second: int

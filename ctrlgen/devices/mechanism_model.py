@@ -10,7 +10,8 @@ from typing import Any, Protocol
 import casadi as ca
 import numpy as np
 
-from ctrlgen.devices.mechanism_elements import TWIST, Copied, Direction, Placed
+from ctrlgen.devices.mechanism_copies import Copied, Placed
+from ctrlgen.devices.mechanism_elements import TWIST, Direction
 from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND, Element

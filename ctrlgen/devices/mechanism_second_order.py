@@ -12,7 +12,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ctrlgen.devices.mechanism_elements import TWIST, Placed
+from ctrlgen.devices.mechanism_copies import Placed
+from ctrlgen.devices.mechanism_elements import TWIST
 from ctrlgen.devices.mechanism_model import Condensed
 from ctrlgen.physics import mechanism
 from ctrlgen.physics.mechanism import GROUND
@@ -117,7 +118,7 @@ class SecondOrder:
         """(channels, m): second order of the pose per product."""
         device = self.c.device
         body = device.bodies.index(device.output.body)
-        moved = self._seen(GROUND, body, self.c.output_point)[[TWIST.index(name) for name in device.output.channels], :]
+        moved = self.seen(GROUND, body, self.c.output_point)[[TWIST.index(name) for name in device.output.channels], :]
         return self._without_rounding(moved, device.channel_scale)
 
     @cached_property
@@ -128,7 +129,7 @@ class SecondOrder:
             at = self.c.p.reading[r.index].at
             point = ca.DM.zeros(3) if at is None else ca.mtimes(r.turn, ca.vertcat(*at))
             direction = row[:, :3] if at is None else row[:, 3:]
-            seen = self._seen(r.first, r.second, point)
+            seen = self.seen(r.first, r.second, point)
             rows.append(ca.mtimes(direction, seen[:3, :] if at is None else seen[3:, :]))
         return self._without_rounding(ca.vertcat(*rows), self.c.device.reading_scale)
 
@@ -233,7 +234,7 @@ class SecondOrder:
     def _global(self, k: int, twist: Matrix) -> Matrix:
         return ca.mtimes(adjoint(self.c.frames[k], self.parts[k][0]), twist)
 
-    def _seen(self, first: int, second: int, point: Matrix) -> Matrix:
+    def seen(self, first: int, second: int, point: Matrix) -> Matrix:
         """(6, m): second order of the rotation of a body and the displacement of its point, seen from another one."""
         seen = self._relative(point, first, second, self.I, self.J)
         at = inverse_adjoint(None, point)

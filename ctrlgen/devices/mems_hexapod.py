@@ -320,8 +320,7 @@ class MemsHexapod(Device):
                     xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d)
                 ),
             )
-        M = hexapod.mass(h, p.dynamics, J)
-        D = modal_damping(M, home_stiffness(lambda d: xy_stage.force(d, s, a)), p.dynamics.damping_ratio)
+        M, D = self._inertia()
         return InertialPhysics(
             **common,
             mass=M,
@@ -329,8 +328,18 @@ class MemsHexapod(Device):
                 thermal_actuator.force(T, a),
                 thermal_actuator.temperature_rate(T, heating_power(u), a),
             ),
-            damping_force=lambda v: ca.mtimes(D, v),
+            damping_force=lambda v: p.dynamics.damping_ratio * ca.mtimes(D, v),
         )
+
+    def _inertia(self) -> tuple[ca.DM, ca.DM]:
+        """(6, 6) mass and damping, that by the damping ratio, of the stated numbers: their formulas would be a thousand times those of the
+        statics."""
+        p = self.values()
+        assert p.dynamics is not None
+        J = hexapod.jacobian(p.hexapod, xy_stage.stage_compliance(p.stage, p.actuator))
+        M = hexapod.mass(p.hexapod, p.dynamics, J)
+        D = modal_damping(M, home_stiffness(lambda d: xy_stage.force(d, p.stage, p.actuator)), 1.0)
+        return ca.DM(ca.evalf(ca.SX(M))), ca.DM(ca.evalf(ca.SX(D)))
 
 
 def home_stiffness(force: Callable[[ca.SX], ca.SX]) -> ca.SX:

@@ -72,7 +72,7 @@ class Constants:
         return f"{DERIVED}->{self._member(tuple(nodes), name).name}"
 
     def _member(self, nodes: tuple[Node, ...], name: str = "") -> Derived:
-        key = tuple(node.number for node in nodes)
+        key = tuple((node.source or node).number for node in nodes)
         if key not in self.derived:
             formula = next((node.formula for node in nodes if node.source and node.formula), "")
             taken = {member.name.upper() for member in self.derived.values()} | {

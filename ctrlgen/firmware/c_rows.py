@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from ctrlgen.firmware.c_constants import Constants
 from ctrlgen.firmware.c_expression import PLACE, SCALAR, Call, Linear, Text, text_of
-from ctrlgen.firmware.expression_graph import Node, reached
+from ctrlgen.firmware.expression_graph import Node, reached, same_number
 from ctrlgen.firmware.real import Real
 
 DIVISORS = (2, 3, 4, 6)  # of a loop's index, where several rows read the same element
@@ -154,7 +154,8 @@ class Rows:
 
     def _constant(self, nodes: Sequence[Node]) -> str:
         if any(node.source for node in nodes):
-            return self.named(nodes[0]) if len({node.number for node in nodes}) == 1 else f"{self.array(nodes)}[i]"
+            same = len({same_number(node, self.real.literal(node.value)) for node in nodes}) == 1
+            return self.named(nodes[0]) if same else f"{self.array(nodes)}[i]"
         literals = [self.real.literal(node.value) for node in nodes]
         if len(set(literals)) == 1:
             return self.named(nodes[0])

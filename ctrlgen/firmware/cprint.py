@@ -20,9 +20,9 @@ import numpy as np
 from ctrlgen.firmware.c_constants import DERIVED, WIDTH, Constants, Derived
 from ctrlgen.firmware.c_expression import PLACE, Call, Linear, Text, text_of
 from ctrlgen.firmware.c_rows import Rows, bare
-from ctrlgen.firmware.expression_graph import GIVEN, Graph, Node, reached
-from ctrlgen.numerics.interval_arithmetic import Interval
+from ctrlgen.firmware.expression_graph import GIVEN, Graph, Node, reached, same_number
 from ctrlgen.firmware.real import Real
+from ctrlgen.numerics.interval_arithmetic import Interval
 
 Ranges = Mapping[str, tuple[np.ndarray, np.ndarray]]
 FEWEST_OPERATIONS = 3  # of a law that is a function of its own
@@ -79,13 +79,14 @@ class Law:
 class Printer:
     """Prints the functions of one file. `ranges`: low and high of arguments by name; `numbers`: value and formula of each element of
     the arguments that are constants of the device; `laws`: what may be a function of its own; `given`: path and range of the numbers
-    that the C is given when it starts; `derived_type`: the C type of the structure of what follows from them."""
+    that the C is given when it starts, `given_numbers` as `numbers` of functions in terms of these alone; `derived_type`: the C type of the structure of what follows from them."""
 
     real: Real
     ranges: Ranges
     numbers: Mapping[str, Sequence[tuple[float, str]]] = field(default_factory=dict)
     laws: Sequence[Law] = ()
     given: Mapping[str, Interval] = field(default_factory=dict)
+    given_numbers: Mapping[str, Sequence[tuple[float, str]]] = field(default_factory=dict)
     derived_type: str = ""
 
     def __post_init__(self) -> None:
@@ -100,8 +101,8 @@ class Printer:
         return list(self._constants.derived.values())
 
     def table(self, function: ca.Function) -> list[Node]:
-        """The rows of a `function` of `numbers` alone."""
-        return self._graph.rows(function, self.ranges, self.numbers)
+        """The rows of a `function` of `given_numbers` alone."""
+        return self._graph.rows(function, self.ranges, self.given_numbers)
 
     def member(self, node: Node) -> str:
         """A number outside the kernels: a literal, or a member of the structure of what is computed at the start."""
@@ -148,9 +149,7 @@ class Printer:
         self, function: ca.Function, named: ca.Function | None, renamed: Mapping[str, str] | None = None
     ) -> list[Node]:
         """The rows of `function`, with the formulas of `named`, the same function in terms of parameters."""
-        if named is not None and self.given:
-            return self._graph.rows(named, self.ranges, self.numbers, renamed)
-        rows = self._graph.rows(function, self.ranges, None, renamed)
+        rows = self._graph.rows(function, self.ranges, self.given_numbers, renamed)
         if named is None:
             return rows
         return self._graph.with_formulas(rows, self._graph.rows(named, self.ranges, self.numbers, renamed))
@@ -163,13 +162,12 @@ class Printer:
                 return {}
             texts.append(text_of(node, {}, linear, self.real))
         same = {
-            (text.shape, tuple(c.number if c.source else self.real.literal(c.value) for c in text.constants))
-            for text in texts
+            (text.shape, tuple(same_number(c, self.real.literal(c.value)) for c in text.constants)) for text in texts
         }
         if len(same) > 1 or texts[0].operations < FEWEST_OPERATIONS:
             return {}
         by_name = {read.array: read for read in texts[0].reads}
-        given = tuple(dict.fromkeys(node for node in texts[0].constants if node.source))
+        given = tuple({node.source.number: node for node in texts[0].constants if node.source}.values())
         found = {}
         for i, node in enumerate(nodes):
             reads = tuple(self._graph.read(array, i) for array in by_name)
@@ -213,10 +211,10 @@ class Printer:
         Raises CtrlgenError for an operation C has no counterpart of.
         """
         rows = self._rows(function, named)
-        laws = self._calls({a: function.numel_in(a) for a in function.name_in()}, rows)
+        laws = self._calls({a: function.numel_in(a) for a in function.name_in() if a not in self.given_numbers}, rows)
         body = Rows(rows, self.real, self._constants, [steps[0]] if steps else may_be_result, laws).run()
         body.lines = self._with_derived(body.lines)
-        sizes = {a: function.size1_in(a) for a in function.name_in()}
+        sizes = {a: function.size1_in(a) for a in function.name_in() if a not in self.given_numbers}
         parts = [(name, about, body.lines)]
         if steps:
             parts = _iterated(name, about, body, *steps, sizes)

@@ -78,7 +78,7 @@ class Graph:
 
     def constant(self, value: float, formula: str = "", source: Node | None = None) -> Node:
         """A number, and the formula of parameters that it comes from; with a `source` the value is that of the device file."""
-        key = (CONSTANT, value, formula) if source is None else (CONSTANT, source.number)
+        key = (CONSTANT, value, formula) if source is None else (CONSTANT, source.number, formula)
         within = (value, value) if source is None else source.within
         return self._nodes.get(key) or self._make(
             key, CONSTANT, within=within, value=value, formula=formula, source=source
@@ -140,7 +140,7 @@ class Graph:
             result: Node | None = None
             if a.constant and b.constant:
                 near = abs(a.value - b.value) <= SAME_NUMBER * abs(a.value)
-                result = self.constant(a.value, b.formula) if near else None
+                result = self.constant(a.value, b.formula or a.formula, a.source) if near else None
             elif a.leaf or b.leaf:
                 result = a if a is b else None
             elif a.operation == b.operation and len(a.operands) == len(b.operands) and None not in parts:
@@ -213,7 +213,7 @@ class Graph:
         factor = self._folded(op, [c, d])
         size = max(abs(v) for v in PRODUCT[op](x.within, y.within))
         factors = [abs(v) for v in factor.within]
-        if not (1 / TRUSTED < size < TRUSTED and 1 / TRUSTED < min(factors) and max(factors) < TRUSTED):
+        if not (1 / TRUSTED < size < TRUSTED and min(factors) > 1 / TRUSTED and max(factors) < TRUSTED):
             return self._operation(op, a, b)
         if x.constant:  # c/(d y) = (c/d)/y
             return self._operation(op, factor, y)
@@ -315,9 +315,9 @@ def reached(roots: Iterable[Node], ends: Iterable[Node] = ()) -> list[Node]:
     return [seen[number] for number in sorted(seen)]
 
 
-def given_later(rows: Iterable[Node]) -> bool:
-    """Whether rows need a number that is known only when the program starts."""
-    return any(node.source for node in reached(rows))
+def same_number(node: Node, literal: str) -> object:
+    """Equal for numbers that are the same in C, where `literal` is how this one is written."""
+    return literal if node.source is None else node.source.number
 
 
 def _one(node: Node) -> bool:

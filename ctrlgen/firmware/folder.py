@@ -44,6 +44,9 @@ class CFolder:
     compression: dict[Real, Compression]
     operations: int
     worst_operations: int
+    given_numbers: int = (
+        0  # in the controller's state, behind its own: constants of the start and what follows from them
+    )
 
     def sources(self, real: Real) -> list[Path]:
         """The C of the library in one arithmetic."""
@@ -99,7 +102,7 @@ def generate(
     pieces = names if played else names | {"player": {}}
     return CFolder(
         out, scenario.name, pieces["online"], pieces["player"], pieces["selftest"], pieces["vectors"], compression,
-        operations=cost["step"], worst_operations=cost["worst"],
+        operations=cost["step"], worst_operations=cost["worst"], given_numbers=contexts[Real.FLOAT]["given_numbers"],
     )  # fmt: skip
 
 

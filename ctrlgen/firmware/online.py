@@ -52,15 +52,18 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "z": model.z_bounds, "wanted": model.z_bounds, "x": x_range, "state": s_range, "drive": u_range,
     }  # fmt: skip
     inverses, given = controller.named, given_ranges(controller)
+    own = controller.given  # kernels in terms of the constants of the start, where there are some
+    static, moving = (own.static, own.moving) if own else (controller.static, controller.moving)
+    laws = printed_laws(own.model if own else model, inverses.model)
     printer = Printer(
-        real, ranges, {"p": inverses.numbers}, printed_laws(model, inverses.model), given, f"{prefix}_derived"
+        real, ranges, {"p": inverses.numbers}, laws, given, {"p": own.numbers} if own else {}, f"{prefix}_derived"
     )
     printed = _Kernels(printer, kernel_comments(controller))
 
     modes: list[dict[str, Any]] = []
     for name, inverse, formulas, z in (
-        ("settle", controller.static, inverses.static, "out->displacement"),
-        ("step", controller.moving, inverses.moving, "state->z"),
+        ("settle", static, inverses.static, "out->displacement"),
+        ("step", moving, inverses.moving, "state->z"),
     ):
         if inverse is not None:
             named = {
@@ -89,7 +92,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         }
     iterated = ("z", controller.newton_steps) if controller.newton_steps > 1 else None
     balance = printed.kernel(
-        controller.static.newton, "balance", ("balance_displacement",), steps=iterated, named=inverses.static.newton
+        static.newton, "balance", ("balance_displacement",), steps=iterated, named=inverses.static.newton
     )
     shares = bound = None
     if controller.guarded_limits:
@@ -182,7 +185,7 @@ def printed_laws(model: Model, symbolic: Model) -> list[Law]:
             ca.Function(
                 law.name, [m.x, m.z, m.u, *([m.p] if more else [])], [part.expr], ["x", "z", "drive", *more], ["force"]
             )
-            for m, part, more in ((model, law, ()), (symbolic, named, ("p",)))
+            for m, part, more in ((model, law, ("p",) if model.p.numel() else ()), (symbolic, named, ("p",)))
         ]
         found.append(Law(law.name, about, *functions))
     return found

@@ -15,6 +15,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.firmware.c_constants import Derived
+from ctrlgen.firmware.constants_file import CRC_POLYNOMIAL, MAGIC, OVERHEAD, VERSION
 from ctrlgen.firmware.cprint import Printer
 from ctrlgen.firmware.expression_graph import Node, reached
 from ctrlgen.firmware.real import Real
@@ -28,11 +29,7 @@ class Tables:
     """Tables of limits as C: of numbers that are known now, or members of the state that follow from the constants of the start."""
 
     def __init__(self, controller: Controller, printer: Printer) -> None:
-        self._printer, self._real, self._model = (
-            printer,
-            printer.real,
-            controller.named.model if printer.given else None,
-        )
+        self._printer, self._real, self._model = printer, printer.real, controller.given and controller.given.model
 
     def rows(self, formula: Callable[[Any], ca.SX], values: np.ndarray) -> list[Node] | None:
         """The rows of a table as nodes, where one of them follows from the constants; else None. `formula` of the symbolic model."""
@@ -74,7 +71,7 @@ def start_context(controller: Controller, printer: Printer) -> dict[str, Any]:
     device, real = controller.model.device, printer.real
     constants = device.given_at_start
     if not constants:
-        return {"given": (), "derived": (), "derive": None, "changing": None}
+        return {"given": (), "given_numbers": 0, "derived": (), "derive": None, "changing": None}
     members = printer.derived
     _check(controller, members, constants)
     changing = None
@@ -85,8 +82,10 @@ def start_context(controller: Controller, printer: Printer) -> dict[str, Any]:
         changing = {"constant": own, "kernel": kernel, "assigned": _assigned(some)}
     derive = printer.starting(members, "derive", "What follows from the constants that the controller is given.")
     return {
-        "given": [_described(c, real) for c in constants], "derived": members, "derive": derive,
+        "given": [_described(c, real) for c in constants], "given_numbers": len(constants) + len(_assigned(members)), "derived": members, "derive": derive,
         "assigned": _assigned(members), "changing": changing, "refused": FIRST,
+        "magic": int.from_bytes(MAGIC, "little"), "layout": VERSION + (len(constants) << 16), "crc_polynomial": CRC_POLYNOMIAL,
+        "overhead": OVERHEAD,
     }  # fmt: skip
 
 

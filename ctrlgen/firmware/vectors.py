@@ -25,7 +25,8 @@ UNUSABLE = 3  # NaN, infinity, minus infinity: each in every channel of the targ
 def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
     """Targets with the drives and the status that the model answers, and the tolerance of the drives.
 
-    The tolerance is the change of drive that four roundings of displacement and actuator state cause.
+    The tolerance is the change of drive that four roundings of displacement and actuator state cause, or one of a number of a target
+    that a limit on stress or rotation scales.
     """
     controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     rng = np.random.default_rng(0)
@@ -48,6 +49,13 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
         rows.append({"target": target, "drive": step.drive, "status": int(step.status), "how": how, "exact": exact})
         if exact and not step.status & ControllerStatus.INPUT:
             tolerance = max(tolerance, controller.drive_rounding(before, target, step, call.settle, rounding))
+            if (
+                step.status & ControllerStatus.COMPOSITE
+            ):  # scaled from far away, it moves by the rounding of what it was scaled from
+                for unit in np.eye(len(target)):
+                    near = controller.step(before, target * (1 + rounding / 4 * unit), settle=call.settle)
+                    if near.status == step.status:
+                        tolerance = max(tolerance, float(np.max(np.abs(near.drive - step.drive))))
     tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
     return {
         "rows": rows, "tolerance": tolerance, "unusable": UNUSABLE * command.shape[1], "beyond": min(len(command), VECTORS),

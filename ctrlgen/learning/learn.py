@@ -43,8 +43,8 @@ MOST_HALVINGS = 6
 class RunResult:
     """One run: mean error (n, n_y) [SI] over its repetitions and, by group, its root mean square length `rms`, that of its standard
     error `noise`, what of it is `repeating`, rms^2 = repeating^2 + noise^2, with its `least` and `most` at 95 %, and the repeating error
-    that was `predicted` from the runs before; None for the first run. `cost` is the weighted sum of its squares, `cost_se` its standard error.
-    """
+    that was `predicted` from the runs before; None for the first run. `cost` is the weighted sum of its squares, without the noise in it,
+    `cost_se` its standard error."""
 
     name: str
     repeats: int

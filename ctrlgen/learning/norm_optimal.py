@@ -45,7 +45,7 @@ def next_drives(lifted: Lifted, wanted: Wanted) -> np.ndarray:
     """The drives (n, n_u) of the next run. Raises SolverError where IPOPT finds none."""
     u = np.clip(wanted.now, *lifted.model.u_bounds)
     along = lifted.linearise(u)
-    scale = _drive_scale(along, wanted.weights)
+    scale = drive_scale(along, wanted.weights)
     cost = _cost(along.y, u, wanted, scale)
     for _ in range(MOST_PROGRAMMES):
         full, share = _programme(lifted, along, wanted, scale), 1.0
@@ -70,7 +70,7 @@ def _cost(y: np.ndarray, u: np.ndarray, wanted: Wanted, scale: np.ndarray) -> fl
     return float(np.sum(off**2) + np.sum(step**2))
 
 
-def _drive_scale(along: Linearised, weights: np.ndarray) -> np.ndarray:
+def drive_scale(along: Linearised, weights: np.ndarray) -> np.ndarray:
     """(n_u,) the drive that, held, moves the weighted signal by one: the median along the path."""
     n_s = along.A.shape[1]
     held = np.linalg.lstsq
@@ -86,7 +86,7 @@ def _programme(lifted: Lifted, at: Linearised, wanted: Wanted, scale: np.ndarray
     """The drives (n, n_u) that are best for the linearised run; composite limits are added until all are kept."""
     rows = np.zeros(at.limited.shape, bool)
     while True:
-        full, limited = _solve(lifted, at, wanted, scale, rows)
+        full, limited = linear_programme(lifted, at, wanted, scale, rows)
         low, high = _composite_bounds(lifted)
         near = ADDED_WITHIN * np.where(np.isfinite(high - low), high - low, np.maximum(np.abs(low), np.abs(high)))
         near = np.where(np.isfinite(near), near, 0.0)
@@ -105,7 +105,7 @@ def _composite_bounds(lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
     return np.array(low), np.array(high)
 
 
-def _solve(
+def linear_programme(
     lifted: Lifted, at: Linearised, wanted: Wanted, scale: np.ndarray, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """One quadratic programme in w = (dv, dS), scaled; with the composite limits of `rows` (n, n_l). The drives, and the limited
@@ -222,35 +222,37 @@ def _bounds(
 def _rows(
     lifted: Lifted, at: Linearised, v: np.ndarray, rows: np.ndarray, scale: np.ndarray, size: np.ndarray
 ) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
-    """Composite limits at `rows` (n, n_l), and the limits on rates of drives."""
-    m, n = lifted.model, lifted.n
-    n_u, width = len(scale), len(scale) + len(size)
-    low, high = _composite_bounds(lifted)
-    k, i = np.nonzero(rows)
+    """Composite limits at `rows` (n, n_l), and the limits on rates of drives: matrix, lower and upper bounds."""
+    parts = [_composite_rows(lifted, at, rows, scale, size)]
+    if lifted.model.rate_limits and not lifted.static:
+        parts.append(_rate_rows(lifted, v, scale, len(scale) + len(size)))
+    matrices, lows, highs = zip(*parts, strict=True)
+    # what is beyond already must not go further
+    return sp.vstack(matrices, format="csr"), np.minimum(np.concatenate(lows), 0), np.maximum(np.concatenate(highs), 0)
+
+
+def _composite_rows(
+    lifted: Lifted, at: Linearised, rows: np.ndarray, scale: np.ndarray, size: np.ndarray
+) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
+    width, (low, high), (k, i) = len(scale) + len(size), _composite_bounds(lifted), np.nonzero(rows)
     values = np.hstack([at.G[k, i] * scale, at.E[k, i] * size])
-    unit = np.maximum(np.abs(values).max(axis=1, initial=0.0), 1e-300) if len(k) else np.ones(0)
-    matrix = sp.csr_matrix(
-        ((values / unit[:, None]).ravel(), (np.repeat(np.arange(len(k)), width), (k[:, None] * width + np.arange(width)).ravel())),
-        shape=(len(k), n * width),
-    )  # fmt: skip
-    lows = [np.minimum((low[i] - at.limited[k, i]) / unit, 0.0)]
-    highs = [np.maximum((high[i] - at.limited[k, i]) / unit, 0.0)]
-    parts = [matrix]
-    if m.rate_limits and not lifted.static:
-        h, places = lifted.sample_time, np.array(m.rate_places)
-        first = 0 if lifted.closed else 1
-        k = np.arange(first, n)
-        change = (v[k] - v[k - 1])[:, places]
-        r, count = np.arange(len(k) * len(places)), len(places)
-        of, of_before = (((kk[:, None]) * width + places).ravel() for kk in (k, (k - 1) % n))
-        parts.append(
-            sp.csr_matrix(
-                (np.concatenate([np.ones(len(r)), -np.ones(len(r))]), (np.tile(r, 2), np.concatenate([of, of_before]))),
-                shape=(len(r), n * width),
-            )
-        )
-        low_r, high_r = (np.tile(b[places], (len(k), 1)) * h - change for b in m.rate_bounds)
-        lows.append(np.minimum(low_r / np.tile(scale[places], (len(k), 1)), 0.0).ravel())
-        highs.append(np.maximum(high_r / np.tile(scale[places], (len(k), 1)), 0.0).ravel())
-        assert count * len(k) == len(r) and n_u <= width
-    return sp.vstack(parts, format="csr"), np.concatenate(lows), np.concatenate(highs)
+    unit = np.maximum(np.abs(values).max(axis=1, initial=0.0), 1e-300)
+    places = np.repeat(np.arange(len(k)), width), (k[:, None] * width + np.arange(width)).ravel()
+    matrix = sp.csr_matrix(((values / unit[:, None]).ravel(), places), shape=(len(k), lifted.n * width))
+    return matrix, (low[i] - at.limited[k, i]) / unit, (high[i] - at.limited[k, i]) / unit
+
+
+def _rate_rows(
+    lifted: Lifted, v: np.ndarray, scale: np.ndarray, width: int
+) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
+    """Each limited drive minus itself one sample before."""
+    m, n, drives = lifted.model, lifted.n, np.array(lifted.model.rate_places)
+    k = np.arange(0 if lifted.closed else 1, n)
+    change = (v[k] - v[k - 1])[:, drives]
+    now, before = ((samples[:, None] * width + drives).ravel() for samples in (k, (k - 1) % n))
+    row = np.arange(change.size)
+    ones = np.ones(change.size)
+    places = np.tile(row, 2), np.concatenate([now, before])
+    matrix = sp.csr_matrix((np.concatenate([ones, -ones]), places), shape=(change.size, n * width))
+    low, high = (((bound[drives] * lifted.sample_time - change) / scale[drives]).ravel() for bound in m.rate_bounds)
+    return matrix, low, high

@@ -7,7 +7,7 @@ more repetitions. A record of something else is refused: another rate, other row
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +140,8 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted) -> Run:
     allowed = SAME_DRIVE * _range(lifted)
     if not np.all(np.ptp(used, axis=2) <= allowed):
         raise ValueError(
-            f"its drives change within a sample of {every} rows; let it begin at a sample of the path, by `rows`"
+            f"its drives change within a sample of the path, which is {every} rows: it is of another path, or must begin at a sample, "
+            "by `rows`"
         )
     periods = used.mean(axis=2)
     drive = periods.mean(axis=0)
@@ -259,8 +260,3 @@ def errors(run: Run, lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
             elif not len(read):
                 repetition[:, i] = 0.0
     return e, np.where(share > 0, share, 1.0)
-
-
-def only(runs: Runs, count: int) -> Runs:
-    """The first `count` runs."""
-    return replace(runs, runs=runs.runs[:count])

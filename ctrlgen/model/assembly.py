@@ -68,8 +68,11 @@ def movable(device: Device) -> tuple[str, ...]:
     return tuple(path for path in paths if path in model.moved_by)
 
 
-def symbolic_model(device: Device) -> Model:
-    """The model of `device` with every number free that is no count and not zero, or given when the C starts: its numbers as formulas."""
+def symbolic_model(device: Device, only: Sequence[str] | None = None) -> Model:
+    """The model of `device` with its numbers as formulas: those `only`, or every number that is no count and not zero, or given when
+    the C starts."""
+    if only is not None:
+        return _assemble(device, only, NO_RISE, sample_time=None, per_record=False)
     given = {constant.path for constant in device.given_at_start}
     paths = [path for path, number in device.quantities() if not number.whole and (number.si != 0 or path in given)]
     return _assemble(device, paths, NO_RISE, sample_time=None, per_record=False)

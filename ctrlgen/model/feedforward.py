@@ -20,7 +20,7 @@ from ctrlgen.model.composite_bound import composite_bound
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
 from ctrlgen.model.lost_state import Groups, is_beyond, plausible_sums
 from ctrlgen.model.model import Limit, Model, Signal
-from ctrlgen.model.named_inverse import NamedInverses, named_inverses
+from ctrlgen.model.named_inverse import NamedInverses, given_inverses, named_inverses
 from ctrlgen.model.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.model.run_time import choices, with_constants
 from ctrlgen.numerics.interval_arithmetic import bounds
@@ -67,6 +67,12 @@ class Controller:
     def named(self) -> NamedInverses:
         """The same kernels with their numbers as formulas of the device's parameters."""
         return named_inverses(self.model.device, self.follow, self.sample_time)
+
+    @cached_property
+    def given(self) -> NamedInverses | None:
+        """The same kernels in terms of the run-time constants; None for a device without."""
+        device = self.model.device
+        return given_inverses(device, self.follow, self.sample_time) if device.given_at_start else None
 
     def at(self, values: dict[str, float]) -> Controller:
         """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them."""

@@ -24,7 +24,15 @@ class NamedInverses:
 
 def named_inverses(device: Device, follow: str, sample_time: float | None) -> NamedInverses:
     """The inverses of `device` for the signal named `follow` with formulas."""
-    model = symbolic_model(device)
+    return _inverses(symbolic_model(device), follow, sample_time)
+
+
+def given_inverses(device: Device, follow: str, sample_time: float | None) -> NamedInverses:
+    """The inverses in terms of the numbers alone that the C is given when it starts, `Device.given_at_start`."""
+    return _inverses(symbolic_model(device, [c.path for c in device.given_at_start]), follow, sample_time)
+
+
+def _inverses(model: Model, follow: str, sample_time: float | None) -> NamedInverses:
     next_sample = None if sample_time is None else invert(model, follow, sample_time, symbolic=True)
     paths = [symbol.name() for symbol in ca.vertsplit(model.p)]
     numbers = list(zip(model.p_nominal.tolist(), paths, strict=True))

@@ -45,7 +45,8 @@ def check_run_time(controller: Controller) -> None:
 
 def _compiled_in(controller: Controller, variant: Controller, values: dict[str, float]) -> str:
     """What of a `controller` does not become that of its `variant` when the constants take `values`; empty where all does."""
-    m, other, named = controller.nominal, variant.nominal, controller.named
+    m, other, named = controller.nominal, variant.nominal, controller.given
+    assert named is not None  # a device without run-time constants has no variants
     p = np.array([values.get(path, number) for number, path in named.numbers])
     for what, symbol, bounds in (("states", m.x, other.x_bounds), ("drives", m.u, other.u_bounds)):
         given = {"states": named.model.x, "drives": named.model.u}[what]

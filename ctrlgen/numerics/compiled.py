@@ -22,9 +22,13 @@ FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
 SECONDS_PER_CHARACTER = (
     4e-6  # of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod
 )
-LARGE = 400_000  # characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million
+LARGE = (
+    400_000  # characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million
+)
 PART = 500  # statements of a part
-FUNCTION = re.compile(r"^static int (?P<name>casadi_f\d+)\((?P<arguments>[^)]*)\) \{\n(?P<body>.*?)  return 0;\n\}\n", re.M | re.S)
+FUNCTION = re.compile(
+    r"^static int (?P<name>casadi_f\d+)\((?P<arguments>[^)]*)\) \{\n(?P<body>.*?)  return 0;\n\}\n", re.M | re.S
+)
 IN_WORK_VECTOR = re.compile(r"  (w\[\d+\]=|if \(res\[\d+\]!=0\) )")
 LONGEST = 4_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
 
@@ -46,7 +50,7 @@ class Compilable:
         if self._code is None:
             if self.seconds < 0.2:  # what hardly runs need not be written as C
                 return False
-            self._code = _c_of(self.function)
+            self._code = c_code(self.function)
         price = len(self._code) * SECONDS_PER_CHARACTER
         path = _library(self._code)
         if not path.exists() and (self.seconds < price or len(self._code) > LONGEST):
@@ -66,7 +70,8 @@ def compiler() -> str | None:
     return next((found for name in (os.environ.get("CC"), "cc", "gcc") if name and (found := shutil.which(name))), None)
 
 
-def _c_of(function: ca.Function) -> str:
+def c_code(function: ca.Function) -> str:
+    """C of `function` with CasADi's interface, in parts where it is long."""
     code = _generated(function, avoid_stack=False)
     return code if len(code) < LARGE else _in_parts(_generated(function, avoid_stack=True))
 
@@ -90,7 +95,8 @@ def _in_parts(code: str) -> str:
         pieces = ["".join(body[k : k + PART]) for k in range(0, len(body), PART)]
         head = "(const casadi_real** arg, casadi_real** res, casadi_real* w)"
         defined = "".join(
-            f"__attribute__((noinline)) static void {name}_{k}{head} {{\n{piece}}}\n\n" for k, piece in enumerate(pieces)
+            f"__attribute__((noinline)) static void {name}_{k}{head} {{\n{piece}}}\n\n"
+            for k, piece in enumerate(pieces)
         )
         calls = "".join(f"  {name}_{k}(arg, res, w);\n" for k in range(len(pieces)))
         return f"{defined}static int {name}({found['arguments']}) {{\n{calls}  return 0;\n}}\n"

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.paths import Poses
 from ctrlgen.trajectory.scenario import Scenario
@@ -65,7 +66,12 @@ class Curve:
     def _length(self) -> tuple[np.ndarray, np.ndarray]:
         """Shares, corners among them, and the length up to each, in typical sizes of the channels."""
         share = np.unique(np.concatenate([np.linspace(0, 1, DENSE), *self.pieces]))
-        step = np.diff(self.samples(share), axis=0) / self.model.signals[self.scenario.file.follow].scale
+        signal = self.model.signals[self.scenario.file.follow]
+        sizes = [
+            max(size for size, own in zip(signal.scale, signal.units, strict=True) if same_dimension(own, unit))
+            for unit in signal.units
+        ]  # alike for channels of one dimension, so that a circle is evenly round
+        step = np.diff(self.samples(share), axis=0) / sizes
         return share, np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))])
 
     def evenly(self, intervals: int) -> np.ndarray:

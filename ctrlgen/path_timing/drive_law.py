@@ -144,7 +144,8 @@ class InertialLaw:
         """x, z, u at a `place` (the target and its derivatives by s) under the derivatives `speed` (order,) of s by time, symbolic."""
         by_share = ca.reshape(place, self._channels, self.order + 1)
         target = ca.horzcat(
-            by_share[:, 0], *(ca.mtimes(by_share[:, 1 : k + 1], _bell(k, speed)) for k in range(1, self.order + 1))
+            by_share[:, 0],
+            *(ca.mtimes(by_share[:, 1 : k + 1], bell_polynomials(k, speed)) for k in range(1, self.order + 1)),
         )
         x, z, u = self.dynamics.kernel(target)
         return x, z, u
@@ -155,7 +156,7 @@ class InertialLaw:
         return self._channels * (self.order + 1)
 
 
-def _bell(k: int, w: ca.SX) -> ca.SX:
+def bell_polynomials(k: int, w: ca.SX) -> ca.SX:
     """(k,) the partial Bell polynomials B_k,1 ... B_k,k of w: B_k,j = sum_i C(k-1, i-1) w_i B_k-i,j-1."""
     table: dict[tuple[int, int], ca.SX] = {(0, 0): ca.SX(1)}
     for a in range(1, k + 1):

@@ -22,13 +22,14 @@ from ctrlgen.path_timing.binding import Binding, bindings
 from ctrlgen.path_timing.confirmed import Followed, fewest
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.optimum import Optimiser, Optimum
-from ctrlgen.path_timing.repetition import Repetition, at_frequency
+from ctrlgen.path_timing.repetition import Repetition, at_frequency, check_frequency
 from ctrlgen.trajectory.path_inverse import count_faults
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, check_feasibility, solve
 
 FEWEST = 8  # samples of the fastest motion: of fewer, nothing says where between them a limit is kept
 COARSE = 32  # samples of a path, below which its set-points are few
+HIGHEST_RATE = 1e8  # Hz, of set-points: no controller is faster
 HELD_POINTS = 400  # at which it is looked at whether a path can be held
 
 
@@ -92,6 +93,8 @@ def fastest(
     model = model_of(scenario)
     rate = _rate(scenario, sample_rate)
     wanted = None if frequency is None else _quantity("--frequency", frequency)
+    if wanted is not None:
+        check_frequency(rate, wanted)
     curve = Curve(scenario, model)
     if model.clocks:
         what = "changes with time by itself, so that the fastest path depends on when it begins; leave the effect out"
@@ -127,7 +130,10 @@ def fastest(
 
 def _rate(scenario: Scenario, given: str | None) -> Quantity:
     if given is not None:
-        return _quantity("--sample-rate", given)
+        rate = _quantity("--sample-rate", given)
+        if rate.si > HIGHEST_RATE:
+            raise InputError("--sample-rate", [Fault(given, f"is above {show(HIGHEST_RATE, 'MHz')}; give a lower one")])
+        return rate
     if scenario.file.sample_rate is None:
         what = 'is missing: the fastest path is a motion in time; write sample_rate and duration, or give --sample-rate "1 kHz"'
         raise InputError(scenario.path, [Fault("sample_rate", what)])

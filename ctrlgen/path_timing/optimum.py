@@ -27,6 +27,7 @@ from ctrlgen.path_timing.speed_bound import landed, largest_speeds, largest_step
 from ctrlgen.path_timing.timing_law import TimingLaw
 from ctrlgen.trajectory.path_inverse import PathInverse
 from ctrlgen.trajectory.paths import smooth_step
+from ctrlgen.trajectory.scenario import MOST_SAMPLES
 
 NODES = 800  # of all pieces together, at which the speed is bounded
 FEWEST_NODES = 60  # of a piece
@@ -144,6 +145,10 @@ class Optimiser:
         speed = np.where(np.isfinite(speeds), speeds, np.max(speeds[np.isfinite(speeds)], initial=0.0))
         distances = self.distances.map(len(share))(path.places(share).T, speed[None])[0].full().T
         steps = None
+        if sampled and time[-1] > MOST_SAMPLES * self.sample_time:
+            raise SolverError(
+                f"the path takes more than {MOST_SAMPLES} set-points at this sample rate; give a lower one"
+            )
         if sampled:
             steps = np.minimum(
                 largest_steps(path, share, speeds, self.sample_time, inverse.moving.drive),

@@ -18,6 +18,7 @@ SMALLEST = 1e-3  # of the path: below, it is no longer the same
 LARGEST = 1e3
 CLOSE = 1e-3  # of a scale, to which it is found
 FEWEST = 4  # samples of a period
+MOST = 20_000  # samples of a period: each scale that is tried is followed through all of them
 IMPOSSIBLE = 10.0  # periods, as their logarithm, for a path that cannot be followed
 
 
@@ -37,12 +38,21 @@ class Repetition:
         return None if scale is None or self.diameter is None else float(from_si(self.diameter * scale, self.unit))
 
 
+def check_frequency(rate: Quantity, frequency: Quantity) -> None:
+    """Raises InputError for a frequency whose period has too few or too many samples at the sample `rate`."""
+    samples = rate.si / frequency.si
+    if samples < FEWEST:
+        what = f"leaves {samples:.3g} samples for a period at {rate.text}; give a higher --sample-rate or a lower frequency"
+    elif samples > MOST:
+        what = f"is {samples:.6g} samples for a period at {rate.text}, more than {MOST}; give a lower --sample-rate"
+    else:
+        return
+    raise InputError("--frequency", [Fault(frequency.text, what)])
+
+
 def at_frequency(followed: Followed, optimiser: Optimiser, frequency: Quantity, known: Optimum) -> Repetition:
-    """The largest scales at a `frequency`. Raises InputError for one that samples cannot show."""
+    """The largest scales at a `frequency`; `known` is the optimum at the scale 1."""
     period, h = 1 / frequency.si, followed.sample_time
-    if period < FEWEST * h:
-        what = f"leaves {period / h:.3g} samples for a period at {followed.rate.text}; give a higher --sample-rate or a lower frequency"
-        raise InputError("--frequency", [Fault(frequency.text, what)])
     n = int(period / h * (1 + 1e-9))
 
     def behind(log_scale: float) -> float:

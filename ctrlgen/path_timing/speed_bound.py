@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
+from scipy.optimize import brentq
 
 from ctrlgen.path_timing.drive_law import BalancedPath
 from ctrlgen.trajectory.scenario import MOST_SAMPLES
@@ -111,16 +112,18 @@ def landed(share: np.ndarray, steps: np.ndarray, more: int = 0) -> np.ndarray:
     """The places (N + 1,) from the first to the last share in as few samples as the largest `steps` (n,) from there allow, and in some
     `more`: all steps are shortened by one factor so that the last one ends there."""
 
-    def walk(factor: float, most: int) -> np.ndarray:
+    def walk(factor: float, count: int) -> np.ndarray:
+        """The places after up to `count` samples, no further than the first beyond the end where that is the factor one."""
         places = [float(share[0])]
-        while places[-1] < share[-1] and len(places) <= most:
+        while len(places) <= count and (factor < 1 or places[-1] < share[-1]):
             places.append(places[-1] + factor * float(np.interp(places[-1], share, steps)))
         return np.array(places)
 
     count = len(walk(1.0, MOST_SAMPLES)) - 1 + more
-    low, high = 0.0, 1.0  # the factor: too small, enough
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if walk(middle, count)[-1] >= share[-1] else (middle, high)
-    places = walk(high, count)
-    return np.append(places[:count], share[-1]) if len(places) == count + 1 else np.append(places[:-1], share[-1])
+
+    def beyond(factor: float) -> float:
+        return float(walk(factor, count)[-1] - share[-1])
+
+    most = float(np.nextafter(1.0, 0.0))
+    factor = most if beyond(most) <= 0 else float(brentq(beyond, 0.0, most, xtol=1e-15))
+    return np.append(walk(factor, count)[:count], share[-1])

@@ -22,6 +22,7 @@ from ctrlgen.reporting.result_schemas import origin
 SHOWN = 12  # limits in the figures
 SHOWN_RUNS = 4  # runs of a limit in a table
 UNBOUND = "#bbbbbb"
+EVEN = 800  # places along the path at which even speed is drawn
 FLAT = 1e-9  # of the largest extent, below which a channel does not move
 ROOM = 1.15  # of the largest speed, up to which speeds are shown
 
@@ -201,24 +202,32 @@ def _draw_path(found: FastestPath) -> Figure:
 
 def _draw_speed(axes: Axes, found: FastestPath, alike: list[int], unit: str) -> None:
     """Over the share of the path, in the channels `alike`: the fastest law, the bound of each place, even speed."""
-    _, share, speed, bound = found.optimum.law()
+    top, even = 0.0, None if found.even is None else found.curve.evenly(EVEN)
 
     def shown(at: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        slope = np.linalg.norm(found.curve.derivatives(at, 1)[1][:, alike], axis=1)
+        slope = np.linalg.norm(found.curve.derivatives(at, 1, ends)[1][:, alike], axis=1)
         return np.asarray(difference(np.where(np.isfinite(rate), rate, np.nan) * slope, unit))
 
-    if np.isfinite(bound).any() and not np.allclose(bound, speed):
-        axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls="--", label="bound of each place alone")
-    axes.plot(100 * share, shown(share, speed), color="#333333", lw=1, label="fastest law of time")
-    top = np.nanmax(shown(share, speed))
-    for binding, colour in reversed(_colours(found)):
-        for a, b in binding.runs:
-            own = (share >= a) & (share <= b)
-            axes.plot(100 * share[own], shown(share[own], speed[own]), color=colour, lw=2.2, solid_capstyle="butt")
-    if found.even is not None:
-        even = found.curve.evenly(len(share))
-        rate = np.gradient(even, np.linspace(0, found.even, len(even)))
-        axes.plot(100 * even, shown(even, rate), color="#888888", lw=1, ls=":", label="even speed, no faster")
+    for k, (ends, piece) in enumerate(zip(found.curve.pieces, found.optimum.pieces, strict=True)):
+        share, speed, bound = piece.share, piece.speed, piece.bound
+
+        def labelled(text: str, first: bool = k == 0) -> str:
+            return text if first else "_"  # each once
+
+        if bound is not None and not np.allclose(bound, speed):
+            label = labelled("bound of each place alone")
+            axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls="--", label=label)
+        axes.plot(100 * share, shown(share, speed), color="#333333", lw=1, label=labelled("fastest law of time"))
+        top = max(top, float(np.nanmax(shown(share, speed))))
+        for binding, colour in reversed(_colours(found)):
+            for a, b in binding.runs:
+                own = (share >= a) & (share <= b)
+                axes.plot(100 * share[own], shown(share[own], speed[own]), color=colour, lw=2.2, solid_capstyle="butt")
+        if even is not None and found.even is not None:
+            own = (even >= ends[0]) & (even <= ends[1])
+            rate = np.gradient(even[own], found.even / (len(even) - 1))
+            label = labelled("even speed, no faster")
+            axes.plot(100 * even[own], shown(even[own], rate), color="#888888", lw=1, ls=":", label=label)
     axes.set_xlabel("share of the path [%]")
     axes.set_ylabel(f"speed along the path [{unit}/s]")
     axes.set_ylim(0, ROOM * top)

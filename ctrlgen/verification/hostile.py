@@ -86,6 +86,8 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "n": len(nominal.axes), "nx": nominal.x.numel(), "n_s": nominal.n_states, "m": len(controller.input_limits),
         "rate": scenario.sample_time is not None, "bits": int(bits),
         "input_limits": controller.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
+        # limits that follow from constants of the start are computed by the C, to a few of its roundings
+        "drive_room": 4 * real.epsilon if controller.given else 0.0,
         "u_safe": controller.safe_drive, "z_typical": nominal.z_scale, "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
         "samples": samples, "duration": samples * (scenario.sample_time or 0.0),
     }  # fmt: skip

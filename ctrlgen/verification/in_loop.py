@@ -164,7 +164,8 @@ def _sequences(
     """What is run, its answers, and this computer's."""
     online, real, machine = folder.online[host.real], host.real, machines["online"]
     n, n_s, m = len(ref.model.axes), ref.model.n_states, ref.random.shape[1]
-    state, target, out = (machine.reserve(count, real) for count in (ref.model.x.numel() + n + 1, m, 2 * n + n_s))
+    numbers = ref.model.x.numel() + n + 1 + folder.given_numbers
+    state, target, out = (machine.reserve(count, real) for count in (numbers, m, 2 * n + n_s))
 
     def answers(function: str, targets: np.ndarray) -> Answers:
         for wanted in targets:

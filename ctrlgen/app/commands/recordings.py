@@ -1,4 +1,4 @@
-"""Recordings: diagnose, batch."""
+"""Recordings: diagnose, calibrate, batch."""
 
 from __future__ import annotations
 
@@ -88,6 +88,63 @@ def diagnose(
     if replicates is not None:
         print_bootstrap(found.extra["bootstrap"])
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+
+
+@app.command()
+def calibrate(
+    device: DevicePath,
+    recording: Annotated[
+        list[Path],
+        typer.Argument(help="A recording.toml, or the folder that holds one; several are joined.", show_default=False),
+    ],
+    out_folder: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Folder for constants.h, constants.bin, constants.json and calibration.html; without it only tables are printed.",
+            show_default=False,
+        ),
+    ] = None,
+    scenario: Annotated[
+        Path | None,
+        typer.Option(
+            help="A scenario whose error budget is drawn up before and after; its device is DEVICE.", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Fit the constants of one specimen to a short recording of it, for the C that is given them when it starts.
+
+    The numbers that the device file names in \[run_time] are fitted, within their bounds, and no others:
+
+    \b
+      \[run_time]
+      constants = [
+          "actuator.time_constant",
+          { number = "actuator.thermal_resistance", low = "450 K/W", high = "650 K/W" },
+      ]
+
+    A constant that the recording does not determine keeps its default. Leaves in --out: constants.h (a C initialiser), constants.bin (with
+    a check sum, for a memory written apart from the program), constants.json, calibration.html. Where the readings disagree whatever
+    the constants, ctrlgen diagnose says what the device file leaves out.
+
+    Example:  ctrlgen calibrate scenarios/devices/mems_hexapod_run_time.toml scenarios/hexapod_specimen --out out/specimen
+    """
+    from ctrlgen.app.calibration_console import print_calibration
+    from ctrlgen.calibration.budgets import budgets
+    from ctrlgen.calibration.calibrate import calibrate as calibrated
+    from ctrlgen.core.files import whole_folder
+    from ctrlgen.reporting.calibration_page import write_calibration
+
+    with progress() as advance:
+        found = calibrated(device, recording, advance)
+        both = None if scenario is None else budgets(found, scenario, device, advance)
+        if out_folder is not None:
+            advance("report")
+            with whole_folder(out_folder) as draft:
+                write_calibration(draft, found, both)
+    print_calibration(found, both)
+    if out_folder is not None:
+        out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'calibration.html'))}", soft_wrap=True)
 
 
 @app.command()
