@@ -183,7 +183,7 @@ def _solve_static(scenario: Scenario, model: Model, progress: Callable[[str], No
             f"without inertia feedforward the stage overshoots its limits ({names}); shape the path, slow it down, or leave out "
             'feedforward = "static"'
         )
-    margins = tuple(_margins(model, samples.x, samples.z, u, before))
+    margins = tuple(closest_margins(model, samples.x, samples.z, u, before))
     between = error_between_samples(scenario, model, samples, u)
     return Solution(scenario, model, command, samples, u, margins, iterations, (), between)
 
@@ -245,7 +245,7 @@ def unlimited(scenario: Scenario, model: Model) -> Solution:
 def judged_by(solution: Solution, scenario: Scenario, model: Model) -> Solution:
     """The same drives with the margins that the limits of `model` leave; those on rates stay."""
     trace, rates = solution.trace, {limit.name for limit in model.rate_limits}
-    margins = _margins(model, trace.x, trace.z, solution.drive, None)
+    margins = closest_margins(model, trace.x, trace.z, solution.drive, None)
     kept = [m for m in solution.margins if m.limit.name in rates]
     return replace(solution, scenario=scenario, model=model, margins=(*margins, *kept))
 
