@@ -7,7 +7,19 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICE
-from mechanism_files import PARALLELOGRAM, TWO_BODIES, blade, dm, loaded, mems_hexapod_text, spring, with_values
+from mechanism_files import (
+    HEAD,
+    PARALLELOGRAM,
+    REST,
+    SPRING,
+    TWO_BODIES,
+    blade,
+    dm,
+    loaded,
+    mems_hexapod_text,
+    spring,
+    with_values,
+)
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, run, solve
 from ctrlgen.devices.mechanism_model import Condensed
@@ -142,6 +154,22 @@ def test_what_a_mirror_turns_round_has_no_second_order(tmp_path):
     assert np.abs(moved[odd] / expanded.J.ravel()[odd]).max() < 1e-10 * 100e-6
     assert abs(moved[0]) > 1e-7 and moved[4] < -0.5 * 100e-6**2 / LENGTH
     assert np.abs(expanded.force([100e-6]).full()).max() < 1e-9 * expanded.K.max() * 100e-6
+
+
+def test_a_point_flexure_is_the_same_from_both_of_its_ends(tmp_path):
+    """Its stiffness holds in the axes halfway between its bodies: written from the plate to the ground it moves the plate alike."""
+    first = SPRING.format(name="joint", first="ground", to="plate", x=0, c=5)
+    second = SPRING.format(name="joint", first="plate", to="ground", x=0, c=5) + "along = [-1, 0, 0]\n"
+    text = (
+        HEAD
+        + '[[body]]\nname = "plate"\n{}'
+        + REST.replace("[1, 0, 0]", "[0.3, 1, 0.2]").replace('"0 mm", "0 mm", "0 mm"', '"9 mm", "4 mm", "2 mm"')
+    )
+    one, two = (Expanded(loaded(tmp_path, text.format(e))) for e in (first, second))
+    d = [200e-6]
+    assert pytest.approx(one.J, rel=1e-9, abs=1e-12) == two.J
+    assert two.pose(d) == pytest.approx(one.pose(d), rel=1e-7) and np.abs(one.pose(d)[:3]).min() > 1e-8
+    assert float(two.force(d)) == pytest.approx(float(one.force(d)), rel=1e-7)
 
 
 def test_the_effect_of_finite_rotation_adds_what_the_file_states_always(tmp_path):
