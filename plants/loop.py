@@ -158,8 +158,8 @@ def _expected(path: Path) -> Expected:
 
 
 def _constant(row: dict) -> str:
-    low, high = row["interval"]
-    return f"{row['number']} = {row['value']:.4g} {row['unit']} ({low:.4g} ... {high:.4g})"
+    low, high = row["interval95"]
+    return f"{row['path']} = {row['value']:.4g} {row['unit']} ({low:.4g} ... {high:.4g})"
 
 
 def _played(chip: MemsHexapod, run: Path) -> Measured:

@@ -124,7 +124,8 @@ def calibrate(
       ]
 
     A constant that the recording does not determine keeps its default. Leaves in --out: constants.h (a C initialiser), constants.bin (with
-    a check sum, for a memory written apart from the program), constants.json, calibration.html. Where the readings disagree whatever
+    a check sum, for a memory written apart from the program), constants.json, calibration.html, and
+    device.calibrated.toml, the device file with these numbers. Where the readings disagree whatever
     the constants, ctrlgen diagnose says what the device file leaves out.
 
     Example:  ctrlgen calibrate scenarios/devices/mems_hexapod_run_time.toml scenarios/hexapod_specimen --out out/specimen
@@ -132,6 +133,7 @@ def calibrate(
     from ctrlgen.app.calibration_console import print_calibration
     from ctrlgen.calibration.budgets import budgets
     from ctrlgen.calibration.calibrate import calibrate as calibrated
+    from ctrlgen.calibration.device_file import NAME, write_calibrated_device
     from ctrlgen.core.files import whole_folder
     from ctrlgen.reporting.calibration_page import write_calibration
 
@@ -142,6 +144,7 @@ def calibrate(
             advance("report")
             with whole_folder(out_folder) as draft:
                 write_calibration(draft, found, both)
+                write_calibrated_device(found, device, draft / NAME)
     print_calibration(found, both)
     if out_folder is not None:
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'calibration.html'))}", soft_wrap=True)

@@ -8,16 +8,15 @@ fit predicts with, and beside it the empirical terms, whose own errors the comme
 from __future__ import annotations
 
 import os
-import re
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tomlkit
-from tomlkit.items import AoT, Item, Table
+from tomlkit.items import AoT
 
+from ctrlgen.core.edited_toml import DIGITS, inline_table, replace_quantity, sd_text, toml_text, value_text
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.python_file import as_toml
@@ -38,8 +37,6 @@ from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
 from ctrlgen.version import program
 
-DIGITS = 12  # nine would round by 5e-9, more than the predictions may differ by
-SD_DIGITS = 3
 WIDTH = 110
 MOVED = 1e-12  # relative change below which a parameter is left as it is
 
@@ -63,7 +60,7 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
     effects = _effects(diagnosis, found)
     if effects and "effect" in document and not isinstance(document["effect"], AoT):
         for table in effects:  # effect = [{ ... }] in one line cannot be continued by [[effect]]
-            document["effect"].append(_inline(table))
+            document["effect"].append(inline_table(table))
         effects = []
     text = document.as_string().rstrip("\n") + "\n"
     if changed or effects or diagnosis.findings or diagnosis.empirical_terms:
@@ -85,35 +82,11 @@ def _change_numbers(
         word = "refitted to" if cause is None else "diagnosed from"
         old = known[unknown.path]
         was = f"was {old.text}" + (f", {old.source}" if old.source else "")
-        fields = {"value": _written(value, unknown.unit), "sd": _written_sd(sd, unknown.unit)}
+        fields = {"value": value_text(value, unknown.unit), "sd": sd_text(sd, unknown.unit)}
         fields["source"] = f"{word} {diagnosis.recording.title}; {was}"
-        _replace(document, unknown.path, {k: v for k, v in fields.items() if v})
+        replace_quantity(document, unknown.path, {k: v for k, v in fields.items() if v})
         changed.append(unknown.path)
     return changed
-
-
-def _replace(document: Any, path: str, fields: dict[str, str]) -> None:
-    """The quantity at a dotted path such as `hexapod.platform_angles[3]` with other fields."""
-    parts = [int(p) if p.isdigit() else p for p in re.findall(r"[^.\[\]]+", path)]
-    node = document
-    for part in parts[:-1]:
-        node = node[part]
-    if isinstance(node[parts[-1]], Table):
-        node[parts[-1]].update(fields)
-    else:
-        node[parts[-1]] = _inline(fields)
-
-
-def _inline(fields: dict[str, Any]) -> Item:
-    """{ key = "value", ... } as an item of a document."""
-    return tomlkit.parse(f"q = {_toml(fields)}")["q"]
-
-
-def _toml(value: str | dict[str, Any]) -> str:
-    """A text in quotes, or an inline table with the spaces that device files have."""
-    if isinstance(value, dict):
-        return f"{{ {', '.join(f'{key} = {_toml(member)}' for key, member in value.items())} }}"
-    return tomlkit.string(value).as_string()
 
 
 def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
@@ -127,7 +100,7 @@ def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, f
             table[name] = number.text
             if (path := f"effect[{k}].{name}") in fitted:
                 unknown, value, sd = fitted[path]
-                shown, spread = _within(value, unknown), _written_sd(sd, unknown.unit)
+                shown, spread = _within(value, unknown), sd_text(sd, unknown.unit)
                 table[name] = {"value": shown, "sd": spread} if spread else shown
         tables.append(table)
     return tables
@@ -136,11 +109,7 @@ def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, f
 def _table(fields: dict[str, Any]) -> str:
     """[[effect]] with one line for each key."""
     width = max(map(len, fields))
-    return "\n[[effect]]\n" + "".join(f"{key:{width}} = {_toml(value)}\n" for key, value in fields.items())
-
-
-def _written(si: float, unit: str, digits: int = DIGITS) -> str:
-    return f"{from_si(si, unit):.{digits}g} {'' if unit == '1' else unit}".strip()
+    return "\n[[effect]]\n" + "".join(f"{key:{width}} = {toml_text(value)}\n" for key, value in fields.items())
 
 
 def _within(si: float, unknown: FreeParameter) -> str:
@@ -150,15 +119,6 @@ def _within(si: float, unknown: FreeParameter) -> str:
         if unknown.low <= to_si(float(shown), unknown.unit) <= unknown.high:
             break
     return f"{shown} {'' if unknown.unit == '1' else unknown.unit}".strip()
-
-
-def _written_sd(sd: float, unit: str) -> str:
-    """A standard deviation as text in `unit`; empty where the recording does not determine the parameter."""
-    if not np.isfinite(sd) or sd == 0:
-        return ""
-    scale = from_si(sd, unit) - from_si(0.0, unit)
-    name = {"degC": "delta_degC", "degF": "delta_degF", "1": ""}.get(unit, unit)
-    return f"{scale:.{SD_DIGITS}g} {name}".strip()
 
 
 def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
