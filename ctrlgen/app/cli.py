@@ -18,11 +18,12 @@ from ctrlgen.app.commands import (  # noqa: F401, they register their commands
     learning,
     recordings,
 )
-from ctrlgen.app.commands.app import app
+from ctrlgen.app.commands.app import PANELS, app
 from ctrlgen.app.console import CHECK, complain, err, shows_warnings
 from ctrlgen.core.errors import CtrlgenError, Unreachable
 from ctrlgen.core.files import explained
 
+app.registered_commands.sort(key=lambda command: PANELS.index(command.rich_help_panel))
 for command in app.registered_commands:  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
     command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback) or "")
 

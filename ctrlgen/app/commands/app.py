@@ -9,6 +9,11 @@ import typer
 
 from ctrlgen.version import program
 
+# the parts of `ctrlgen --help`, in their order
+PANELS = SCENARIO_PANEL, ACCURACY_PANEL, DEVICE_PANEL, RECORDING_PANEL = (
+    "Drives and C of a scenario", "How well and how fast", "Devices", "Recordings of the real stage",
+)  # fmt: skip
+
 app = typer.Typer(
     name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
     help="Describe a flexure nanopositioner once; solve its trajectories, generate its C and prove that the C is right, and "

@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 
 from ctrlgen.app.budget_console import print_budget
-from ctrlgen.app.commands.app import OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
 from ctrlgen.app.console import out, progress
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import read_probability
@@ -17,7 +17,7 @@ from ctrlgen.core.units import read_probability
 DRAWS = 10_000  # as in ctrlgen.budget.error_budget, which is imported when it is needed
 
 
-@app.command()
+@app.command(rich_help_panel=ACCURACY_PANEL)
 def budget(
     scenario: ScenarioPath,
     out_folder: Annotated[

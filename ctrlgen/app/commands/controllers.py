@@ -8,12 +8,12 @@ import typer
 from rich.markup import escape
 
 from ctrlgen.app import pipeline
-from ctrlgen.app.commands.app import OtherDevice, OutFolder, ScenarioPath, app
+from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, OutFolder, ScenarioPath, app
 from ctrlgen.app.console import out, print_build, print_comparison, print_solution, progress
 from ctrlgen.trajectory.scenario import load_scenario
 
 
-@app.command()
+@app.command(rich_help_panel=SCENARIO_PANEL)
 def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
     """Solve a scenario, generate its C, compare the C with the model, and report.
 
@@ -30,7 +30,7 @@ def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = Non
     _exit(outcome)
 
 
-@app.command()
+@app.command(rich_help_panel=SCENARIO_PANEL)
 def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
     """Solve a scenario for its drives (IPOPT) and report the margin to every limit; no C.
 
@@ -43,7 +43,7 @@ def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = N
     _exit(outcome)
 
 
-@app.command()
+@app.command(rich_help_panel=SCENARIO_PANEL)
 def generate(
     scenario: ScenarioPath,
     out_folder: OutFolder,
@@ -72,7 +72,7 @@ def generate(
     out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
 
 
-@app.command()
+@app.command(rich_help_panel=SCENARIO_PANEL)
 def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
     """Generate the C, build it with every compiler present, and compare it with the model; keeps nothing.
 
@@ -84,7 +84,7 @@ def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
     _exit(outcome)
 
 
-@app.command()
+@app.command(rich_help_panel=SCENARIO_PANEL)
 def verify(
     scenario: ScenarioPath,
     out_folder: OutFolder,
@@ -114,7 +114,7 @@ def verify(
         raise typer.Exit(1)
 
 
-@app.command()
+@app.command(rich_help_panel=SCENARIO_PANEL)
 def fmu(
     scenario: ScenarioPath,
     out_folder: OutFolder,

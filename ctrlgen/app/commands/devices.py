@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ctrlgen.app import pipeline
-from ctrlgen.app.commands.app import DevicePath, OutFolder, app
+from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app
 from ctrlgen.app.console import err, out, print_recording, print_reproduced, print_shaper, print_workspace, progress
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
@@ -27,7 +27,7 @@ from ctrlgen.trajectory.scenario import load_scenario, model_of
 from ctrlgen.trajectory.solution import check_feasibility, check_motion, check_static
 
 
-@app.command()
+@app.command(rich_help_panel=DEVICE_PANEL)
 def check(
     file: Annotated[
         Path,
@@ -133,7 +133,7 @@ def _picture(option: str, path: Path) -> Path:
     return path
 
 
-@app.command()
+@app.command(rich_help_panel=DEVICE_PANEL)
 def bode(
     device: DevicePath,
     picture: Annotated[Path, typer.Option("--out", help="The picture to write, .svg or .png.", show_default=False)],
@@ -152,7 +152,7 @@ def bode(
     out.print(str(picture), soft_wrap=True, markup=False)
 
 
-@app.command()
+@app.command(rich_help_panel=DEVICE_PANEL)
 def workspace(
     device: DevicePath,
     out_folder: OutFolder,
@@ -174,7 +174,7 @@ def workspace(
     out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
 
 
-@app.command()
+@app.command(rich_help_panel=DEVICE_PANEL)
 def reproduce(
     source: Annotated[
         list[str] | None, typer.Argument(help="S0, S1, S2, S3; all by default.", show_default=False)

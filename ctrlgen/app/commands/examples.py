@@ -8,13 +8,13 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import app
+from ctrlgen.app.commands.app import DEVICE_PANEL, app
 from ctrlgen.app.console import out, show_table, table_of
 from ctrlgen.app.examples import copy_examples, examples
 from ctrlgen.core.errors import Fault, InputError
 
 
-@app.command()
+@app.command(rich_help_panel=DEVICE_PANEL)
 def example(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]...", help="Examples to copy.", show_default=False)

@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
 from ctrlgen.app.console import out, progress
 from ctrlgen.app.fastest_console import print_fastest
 
 
-@app.command()
+@app.command(rich_help_panel=ACCURACY_PANEL)
 def fastest(
     scenario: ScenarioPath,
     out_folder: Annotated[

@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
 from ctrlgen.app.console import out, progress
 from ctrlgen.app.learning_console import print_learning
 
 
-@app.command()
+@app.command(rich_help_panel=ACCURACY_PANEL)
 def learn(
     scenario: ScenarioPath,
     recordings: Annotated[

@@ -8,7 +8,15 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import BootstrapCount, DevicePath, JobCount, OutFolder, SchedulerAddress, app
+from ctrlgen.app.commands.app import (
+    RECORDING_PANEL,
+    BootstrapCount,
+    DevicePath,
+    JobCount,
+    OutFolder,
+    SchedulerAddress,
+    app,
+)
 from ctrlgen.app.console import (
     complain,
     counted,
@@ -22,7 +30,7 @@ from ctrlgen.app.console import (
 from ctrlgen.core.errors import InputError
 
 
-@app.command()
+@app.command(rich_help_panel=RECORDING_PANEL)
 def diagnose(
     device: DevicePath,
     recording: Annotated[
@@ -90,7 +98,7 @@ def diagnose(
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
 
 
-@app.command()
+@app.command(rich_help_panel=RECORDING_PANEL)
 def calibrate(
     device: DevicePath,
     recording: Annotated[
@@ -150,7 +158,7 @@ def calibrate(
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'calibration.html'))}", soft_wrap=True)
 
 
-@app.command()
+@app.command(rich_help_panel=RECORDING_PANEL)
 def batch(
     list_: Annotated[
         Path, typer.Argument(metavar="JOBS.toml", help="The list of diagnoses, see above.", show_default=False)
