@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ctrlgen.app.batch import load_batch, run_batch
     from ctrlgen.app.pipeline import Outcome, run, verify
     from ctrlgen.budget.error_budget import ErrorBudget, error_budget
+    from ctrlgen.calibration.calibrate import Calibration, calibrate
     from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user import user_device
@@ -45,6 +46,10 @@ _EXPORTS = {
     "budget.error_budget": (
         "ErrorBudget",
         "error_budget",
+    ),
+    "calibration.calibrate": (
+        "Calibration",
+        "calibrate",
     ),
     "core.errors": (
         "CtrlgenError",
@@ -119,6 +124,7 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "Build",
     "CFolder",
+    "Calibration",
     "Comparison",
     "Controller",
     "ControllerStatus",
@@ -147,6 +153,7 @@ __all__ = [
     "Workspace",
     "__version__",
     "build_model",
+    "calibrate",
     "compare",
     "diagnose",
     "error_budget",

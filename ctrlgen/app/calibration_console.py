@@ -26,7 +26,9 @@ def print_calibration(calibration: Calibration, budgets: tuple[ErrorBudget, Erro
         remark = row.remark if row.determined else f"default kept: {row.remark}"
         table.add_row(escape(c.path), c.shown(c.default), c.shown(row.value), interval, remark)
     show_table(table)
-    table = table_of(("held-out error, rms", "left"), ("device file", "right"), ("specimen", "right"), ("noise", "right"))
+    table = table_of(
+        ("held-out error, rms", "left"), ("device file", "right"), ("specimen", "right"), ("noise", "right")
+    )
     for e in calibration.errors:
         cells = [f"{difference(v, e.unit):.4g} {e.unit}" for v in (e.before, e.after, e.noise)]
         table.add_row(escape(e.channel), *cells)

@@ -36,7 +36,10 @@ from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.trajectory.scenario import Input
 
-TOLD = 0.5  # of the standard deviation that its bounds alone give a constant: above, the recording does not determine it
+TOLD = (
+    0.5  # of the standard deviation that its bounds alone give a constant: above, the recording does not determine it
+)
+BEYOND = "at its bound: the specimen lies beyond it, or the device file leaves something out; run ctrlgen diagnose"
 AT_BOUND = 1e-4  # of the range: a value so near its end was held there
 
 
@@ -97,9 +100,7 @@ class _Specimen(Structure):
     held: tuple[RunTimeConstant, ...]
 
     @classmethod
-    def of(
-        cls, device: Device, chosen: Sequence[RunTimeConstant], held: Sequence[RunTimeConstant] = ()
-    ) -> _Specimen:
+    def of(cls, device: Device, chosen: Sequence[RunTimeConstant], held: Sequence[RunTimeConstant] = ()) -> _Specimen:
         """With these constants free."""
         found = cls(device)
         object.__setattr__(found, "chosen", tuple(chosen))
@@ -138,7 +139,10 @@ def calibrate(
     progress("reading")
     paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
     recording = load_recordings(paths, build_model(described))
-    inputs = {name: Input(path, read_text(path)) for name, path in zip(("device", "device_code"), files_of(Path(device)), strict=False)}
+    inputs = {
+        name: Input(path, read_text(path))
+        for name, path in zip(("device", "device_code"), files_of(Path(device)), strict=False)
+    }
     # A trial value may lead nowhere, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _Search(described, recording, progress).run(inputs)
@@ -152,10 +156,14 @@ class _Search:
         ambient = [r for r in recording.records if r.ambient is not None]
         self.notes = list(recording.notes)
         if ambient:
-            self.notes.append("the recorded ambient temperature is not used: a constant of [run_time] holds for the whole recording")
+            self.notes.append(
+                "the recorded ambient temperature is not used: a constant of [run_time] holds for the whole recording"
+            )
         progress("noise")
         settling = settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time))
-        recording = replace(recording, records=tuple(self._settled(replace(r, ambient=None), settling) for r in recording.records))
+        recording = replace(
+            recording, records=tuple(self._settled(replace(r, ambient=None), settling) for r in recording.records)
+        )
         self.fitter = Fitter(recording, estimate_noise(recording, settling))
 
     def _settled(self, record: Record, settling: float) -> Record:
@@ -169,7 +177,9 @@ class _Search:
         if rows >= len(record.time):
             what = f"lasts no longer than {settling:.3g} s, in which its start is forgotten; record longer"
             raise InputError(record.name, [Fault("record", what)])
-        self.notes.append(f"{record.name}: the first {settling:.3g} s are not used, because the state of rest depends on a constant")
+        self.notes.append(
+            f"{record.name}: the first {settling:.3g} s are not used, because the state of rest depends on a constant"
+        )
         valid = record.valid.copy()
         valid[:rows] = False
         return replace(record, valid=valid)
@@ -237,7 +247,7 @@ class _Search:
             value = float(fit.theta[chosen.index(c)]) if determined else c.default
             remark = why.get(c.path, "")
             if determined and min(value - c.low, c.high - value) < AT_BOUND * (c.high - c.low):
-                remark = "at its bound: the specimen lies beyond it, or something acts that the device file leaves out; run ctrlgen diagnose"
+                remark = BEYOND
             rows.append(CalibratedConstant(c, value, float(np.sqrt(covariance[k, k])), determined, remark))
         start = replace(self.fitter, cache={}).fit(_Specimen.of(self.device, chosen), steps=0)
         errors = self._errors(start, fit)
@@ -259,8 +269,8 @@ class _Search:
             for fit in (before, after)
         ]
         for i, (channel, unit) in enumerate(zip(recording.channels, recording.units, strict=True)):
-            ends = [float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares]
-            rows.append(ReadingError(channel, unit, *ends, float(self.fitter.noise.floor[i])))
+            start, end = (float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares)
+            rows.append(ReadingError(channel, unit, start, end, float(self.fitter.noise.floor[i])))
         return tuple(rows)
 
 

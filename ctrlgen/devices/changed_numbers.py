@@ -24,8 +24,7 @@ def changed(device: Device, values: dict[str, float]) -> Device:
             return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
         if isinstance(node, Section):
             fields = {
-                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key)
-                for key in type(node).model_fields
+                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key) for key in type(node).model_fields
             }
             return node.model_copy(update=fields)
         if isinstance(node, Effect):

@@ -75,7 +75,9 @@ class Constants:
         key = tuple((node.source or node).number for node in nodes)
         if key not in self.derived:
             formula = next((node.formula for node in nodes if node.source and node.formula), "")
-            taken = {member.name.upper() for member in self.derived.values()} | {name.upper() for name in self._reserved}
+            taken = {member.name.upper() for member in self.derived.values()} | {
+                name.upper() for name in self._reserved
+            }
             name = name or _name_of(formula, taken).lower() or f"constant_{len(self.derived) + 1}"
             self.derived[key] = Derived(name, nodes, formula if len(nodes) == 1 else "")
         return self.derived[key]

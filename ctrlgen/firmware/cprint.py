@@ -21,8 +21,8 @@ from ctrlgen.firmware.c_constants import DERIVED, WIDTH, Constants, Derived
 from ctrlgen.firmware.c_expression import PLACE, Call, Linear, Text, text_of
 from ctrlgen.firmware.c_rows import Rows, bare
 from ctrlgen.firmware.expression_graph import GIVEN, Graph, Node, reached, same_number
-from ctrlgen.numerics.interval_arithmetic import Interval
 from ctrlgen.firmware.real import Real
+from ctrlgen.numerics.interval_arithmetic import Interval
 
 Ranges = Mapping[str, tuple[np.ndarray, np.ndarray]]
 FEWEST_OPERATIONS = 3  # of a law that is a function of its own
@@ -79,7 +79,8 @@ class Law:
 class Printer:
     """Prints the functions of one file. `ranges`: low and high of arguments by name; `numbers`: value and formula of each element of
     the arguments that are constants of the device; `laws`: what may be a function of its own; `given`: path and range of the numbers
-    that the C is given when it starts, `given_numbers` as `numbers` of functions in terms of these alone; `derived_type`: the C type of the structure of what follows from them."""
+    that the C is given when it starts, `given_numbers` as `numbers` of functions in terms of these alone; `derived_type`: the C type of
+    the structure of what follows from them."""
 
     real: Real
     ranges: Ranges
@@ -162,8 +163,7 @@ class Printer:
                 return {}
             texts.append(text_of(node, {}, linear, self.real))
         same = {
-            (text.shape, tuple(same_number(c, self.real.literal(c.value)) for c in text.constants))
-            for text in texts
+            (text.shape, tuple(same_number(c, self.real.literal(c.value)) for c in text.constants)) for text in texts
         }
         if len(same) > 1 or texts[0].operations < FEWEST_OPERATIONS:
             return {}
@@ -235,7 +235,6 @@ class Printer:
         ]
         operations = body.operations * (steps[1] if steps else 1)
         return Kernel(name, "\n".join(texts), arguments[-1], operations, body.calls)
-
 
     def _with_derived(self, lines: Sequence[str]) -> list[str]:
         """`lines` with a local copy of each number of the structure that they name: it stays in a register."""

@@ -48,7 +48,9 @@ class Node:
     formula: str = ""
     array: str = ""
     index: int = 0
-    source: Node | None = None  # of a number that is known when the program starts: its expression in the numbers given then
+    source: Node | None = (
+        None  # of a number that is known when the program starts: its expression in the numbers given then
+    )
 
     @property
     def constant(self) -> bool:
@@ -211,7 +213,7 @@ class Graph:
         factor = self._folded(op, [c, d])
         size = max(abs(v) for v in PRODUCT[op](x.within, y.within))
         factors = [abs(v) for v in factor.within]
-        if not (1 / TRUSTED < size < TRUSTED and 1 / TRUSTED < min(factors) and max(factors) < TRUSTED):
+        if not (1 / TRUSTED < size < TRUSTED and min(factors) > 1 / TRUSTED and max(factors) < TRUSTED):
             return self._operation(op, a, b)
         if x.constant:  # c/(d y) = (c/d)/y
             return self._operation(op, factor, y)
@@ -278,10 +280,14 @@ class Graph:
         """The expression of a number in those that the program is given."""
         parts = [node.source or node for node in a]
         less_one = len(parts) == 2 and parts[1].fixed and parts[1].value == {ca.OP_SUB: 1.0, ca.OP_ADD: -1.0}.get(op)
-        if less_one and parts[0].operation == ca.OP_EXP:  # e^y - 1 = 2 t/(1 - t), t = tanh(y/2), which keeps the digits near y = 0
+        if (
+            less_one and parts[0].operation == ca.OP_EXP
+        ):  # e^y - 1 = 2 t/(1 - t), t = tanh(y/2), which keeps the digits near y = 0
             half = self.apply(ca.OP_MUL, [self.constant(0.5), parts[0].operands[0]])
             t = self._operation(ca.OP_TANH, half)
-            return self._operation(ca.OP_DIV, self.apply(ca.OP_TWICE, [t]), self.apply(ca.OP_SUB, [self.constant(1.0), t]))
+            return self._operation(
+                ca.OP_DIV, self.apply(ca.OP_TWICE, [t]), self.apply(ca.OP_SUB, [self.constant(1.0), t])
+            )
         return self.apply(op, parts)
 
     def _operation(self, op: int, *operands: Node) -> Node:

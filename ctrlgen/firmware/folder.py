@@ -44,7 +44,9 @@ class CFolder:
     compression: dict[Real, Compression]
     operations: int
     worst_operations: int
-    given_numbers: int = 0  # in the controller's state, behind its own: constants of the start and what follows from them
+    given_numbers: int = (
+        0  # in the controller's state, behind its own: constants of the start and what follows from them
+    )
 
     def sources(self, real: Real) -> list[Path]:
         """The C of the library in one arithmetic."""

@@ -39,9 +39,14 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     s_low, s_high = np.maximum(x_low[: model.n_states], -UNLIMITED), np.minimum(x_high[: model.n_states], UNLIMITED)
     x_range, u_range = (
         (np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0))
-        for ends in zip(*((c.nominal.x_bounds, c.nominal.u_bounds) for c in (controller, *controller.variants)), strict=True)
+        for ends in zip(
+            *((c.nominal.x_bounds, c.nominal.u_bounds) for c in (controller, *controller.variants)), strict=True
+        )
     )
-    s_range = (np.maximum(x_range[0][: model.n_states], -UNLIMITED), np.minimum(x_range[1][: model.n_states], UNLIMITED))
+    s_range = (
+        np.maximum(x_range[0][: model.n_states], -UNLIMITED),
+        np.minimum(x_range[1][: model.n_states], UNLIMITED),
+    )
     ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": x_range, "state": s_range, "drive": u_range,
     }  # fmt: skip
@@ -70,7 +75,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
                 for part in ("displacement", "state", "drive", "advance")
                 if getattr(inverse, part).size1_out(0)
             }
-            uses_state = any({"x", "z", DERIVED} & set(named[part].arguments) for part in ("state", "drive") if part in named)
+            uses_state = any(
+                {"x", "z", DERIVED} & set(named[part].arguments) for part in ("state", "drive") if part in named
+            )
             modes.append({
                 "name": name, "z": z, "uses_state": uses_state,
                 "examined_first": controller.examined_first[name == "step"],

@@ -77,7 +77,9 @@ def draw_constants(calibration: Calibration) -> Figure:
     for k, row in enumerate(rows):
         c = row.constant
         span = c.high - c.low
-        low, value, high, default = ((v - c.low) / span for v in (row.interval[0], row.value, row.interval[1], c.default))
+        low, value, high, default = (
+            (v - c.low) / span for v in (row.interval[0], row.value, row.interval[1], c.default)
+        )
         ax.plot([0, 1], [k, k], color="#cccccc", linewidth=1, zorder=0)
         ax.plot(default, k, "|", color="black", markersize=14, label="device file" if k == 0 else None)
         if row.determined:
@@ -93,5 +95,7 @@ def draw_constants(calibration: Calibration) -> Figure:
     ax.set_xticks([0, 1], ["low", "high"])
     ax.set_xlabel("within the bounds")
     ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(loc="upper center", bbox_to_anchor=(0.4, 1.3 if len(rows) < 5 else 1.12), ncols=2, frameon=False, fontsize=8)
+    ax.legend(
+        loc="upper center", bbox_to_anchor=(0.4, 1.3 if len(rows) < 5 else 1.12), ncols=2, frameon=False, fontsize=8
+    )
     return figure

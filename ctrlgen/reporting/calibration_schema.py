@@ -15,8 +15,12 @@ class ConstantEntry(Keys):
     unit: str = Field(description="Unit of every number of this entry but those in SI.")
     value: float = Field(description="Value for this specimen.")
     value_si: float = Field(description="The same in SI, as constants.h has it.")
-    interval95: tuple[float, float] = Field(description="95 % interval within the bounds; the bounds where not determined.")
-    sd_si: float = Field(description="Standard deviation in SI; of a constant that is not determined that of its bounds.")
+    interval95: tuple[float, float] = Field(
+        description="95 % interval within the bounds; the bounds where not determined."
+    )
+    sd_si: float = Field(
+        description="Standard deviation in SI; of a constant that is not determined that of its bounds."
+    )
     default: float = Field(description="Value in the device file.")
     bounds: tuple[float, float] = Field(description="Between which the controller accepts it.")
     determined: bool = Field(description="Whether the recording determines it; else value is the default.")
@@ -38,7 +42,9 @@ class PathEntry(Keys):
 
     group: str = Field(description="translation, rotation, or 'in' a unit of another kind.")
     unit: str = Field(description="Unit of the two numbers.")
-    before: float = Field(description="Largest combined standard uncertainty along the path with the constants known by their bounds.")
+    before: float = Field(
+        description="Largest combined standard uncertainty along the path with the constants known by their bounds."
+    )
     after: float = Field(description="The same with the constants of this specimen.")
 
 
@@ -46,7 +52,9 @@ class CalibrationRecord(Origin):
     """Result of `ctrlgen calibrate`: the run-time constants of one specimen."""
 
     device: str = Field(description="Name of the device.")
-    device_hash: str = Field(description="First 32 bits of the SHA-256 of its description, hexadecimal, as in the C header.")
+    device_hash: str = Field(
+        description="First 32 bits of the SHA-256 of its description, hexadecimal, as in the C header."
+    )
     recording: str = Field(description="Title of the recording.")
     constants: list[ConstantEntry] = Field(description="In the order of the C structure.")
     correlation: list[list[Number]] = Field(description="Coefficients of correlation of their deviations.")
