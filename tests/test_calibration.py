@@ -166,5 +166,7 @@ def test_the_command_prints_the_constants_and_leaves_the_report(tmp_path):
     done = ctrlgen("calibrate", str(DEVICE), str(RECORDING), "--out", str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
     assert "actuator.thermal_resistance" in done.stdout and "583" in done.stdout
-    names = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*") if path.is_file()} - {".ctrlgen"}
+    names = {
+        path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*") if path.is_file()
+    } - {".ctrlgen"}
     assert names == {"constants.h", "constants.bin", "constants.json", "calibration.html", "figures/constants.svg"}

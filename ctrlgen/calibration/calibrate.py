@@ -257,7 +257,7 @@ class _Search:
             self.notes.append(f"{', '.join(more)} {what}")
         return Calibration(
             self.device, inputs, self.fitter.recording, tuple(rows), covariance, errors,
-            tuple(dict.fromkeys((*self.notes, *self.fitter.noise.notes))),
+            tuple(dict.fromkeys((*self.notes, *(note for note in self.fitter.noise.notes if "as stated" not in note)))),
         )  # fmt: skip
 
     def _errors(self, before: Fit, after: Fit) -> tuple[ReadingError, ...]:
