@@ -29,6 +29,7 @@ COMMANDS = (
     "budget",
     "example",
     "diagnose",
+    "calibrate",
     "batch",
 )
 
