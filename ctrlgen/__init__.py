@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ctrlgen.app.pipeline import Outcome, run, verify
     from ctrlgen.budget.error_budget import ErrorBudget, error_budget
     from ctrlgen.budget.robust import solve
+    from ctrlgen.calibration.calibrate import Calibration, calibrate
     from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user import user_device
@@ -50,6 +51,10 @@ _EXPORTS = {
         "error_budget",
     ),
     "budget.robust": ("solve",),
+    "calibration.calibrate": (
+        "Calibration",
+        "calibrate",
+    ),
     "core.errors": (
         "CtrlgenError",
         "Fault",
@@ -130,6 +135,7 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "Build",
     "CFolder",
+    "Calibration",
     "Comparison",
     "Controller",
     "ControllerStatus",
@@ -160,6 +166,7 @@ __all__ = [
     "Workspace",
     "__version__",
     "build_model",
+    "calibrate",
     "compare",
     "diagnose",
     "error_budget",

@@ -30,7 +30,9 @@ except ModuleNotFoundError as missing:
 
 PRINTED = sum(CIRCLE.values()) / len(CIRCLE)
 FIRST, SECOND = "first chip", "second chip"
-HEATERS = 1.04 * np.array([1.005, 0.997, 1.002, 0.996, 1.003, 0.999])  # thermal resistances of the second chip over the first's
+HEATERS = 1.04 * np.array(
+    [1.005, 0.997, 1.002, 0.996, 1.003, 0.999]
+)  # thermal resistances of the second chip over the first's
 RUN_TIME = '\n[run_time]\nconstants = ["actuator.thermal_resistance"]\n'
 SHORT = 12  # poses to fit in the recording that a chip is calibrated with
 RUNS = 2  # of learning
@@ -83,9 +85,13 @@ def close(out: Path, seed: int = 0) -> Loop:
     step("solve the circle and generate its C from the device file as printed")
     before = _run(out / "before", DEVICE)
     step("what the error budget expects")
-    ctrlgen("budget", str(before.parent / "circle20"), "--uncertainty", str(_uncertainty()), "--out", str(out / "budget"))
+    ctrlgen(
+        "budget", str(before.parent / "circle20"), "--uncertainty", str(_uncertainty()), "--out", str(out / "budget")
+    )
     expected = _expected(out / "budget" / "budget.json")
-    facts["Error budget"] = f"95 % of such chips keep within {1e3 * expected.translation:.0f} nm of the path in each translation."
+    facts["Error budget"] = (
+        f"95 % of such chips keep within {1e3 * expected.translation:.0f} nm of the path in each translation."
+    )
     step("that C drives the plant")
     stages.append(Stage("as described", FIRST, "C from the device file as printed.", _played(chip, before)))
     step("record poses of the plant")
@@ -123,7 +129,14 @@ def close(out: Path, seed: int = 0) -> Loop:
     stages.append(Stage("learnt", SECOND, about, learnt))
 
     step("the fastest circle")
-    words = ["fastest", str(out / "learning" / "circle20"), "--sample-rate", f"{FAST_RATE} Hz", "--out", str(out / "fastest")]
+    words = [
+        "fastest",
+        str(out / "learning" / "circle20"),
+        "--sample-rate",
+        f"{FAST_RATE} Hz",
+        "--out",
+        str(out / "fastest"),
+    ]
     ctrlgen(*words)
     times = json.loads((out / "fastest" / "fastest.json").read_text(encoding="utf-8"))["times"]
     facts["Fastest circle"] = (

@@ -123,7 +123,13 @@ def film(stages: Sequence[Stage], path: Path) -> None:
     """A GIF: each stage's circle from above being drawn over the commanded one, its error magnified as its title says."""
     lines = -(-len(stages) // COLUMNS)
     figure, grid = plt.subplots(
-        lines, COLUMNS, figsize=(3.4 * COLUMNS, 3.5 * lines), squeeze=False, layout="constrained", sharex=True, sharey=True
+        lines,
+        COLUMNS,
+        figsize=(3.4 * COLUMNS, 3.5 * lines),
+        squeeze=False,
+        layout="constrained",
+        sharex=True,
+        sharey=True,
     )
     traces = []
     for axes in grid.ravel()[len(stages) :]:

@@ -31,6 +31,7 @@ COMMANDS = (
     "learn",
     "example",
     "diagnose",
+    "calibrate",
     "batch",
 )
 

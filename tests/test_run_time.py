@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from conftest import SCENARIOS
 
-from ctrlgen import Controller, build_model, load_scenario
+from ctrlgen import Controller, InputError, build_model, load_device, load_scenario
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
 from ctrlgen.calibration.files import binary
 from ctrlgen.devices.changed_numbers import changed
@@ -22,7 +22,9 @@ from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.run_time import derived_values
 from ctrlgen.firmware.toolchains import FLAGS
-from ctrlgen.model.feedforward import ControllerStatus
+from ctrlgen.model.controller_step import ControllerStatus
+from ctrlgen.model.motion_feedforward import controller_of
+from ctrlgen.model.run_time_check import check_run_time
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.trajectory.scenario import Scenario
 
@@ -270,3 +272,28 @@ def test_the_loader_refuses_a_constant_out_of_bounds_whose_check_sum_is_right(li
         body = head + struct.pack(f"<{count}f", *(c.default for c in library.scenario.device.given_at_start[:-1]), bad)
         status, read = library.load(body + struct.pack("<I", zlib.crc32(body)))
         assert status == REFUSED and np.all(np.isnan(read))
+
+
+@pytest.mark.long
+def test_a_constant_that_acts_on_what_is_compiled_in_is_refused_by_name(tmp_path):
+    text = '\n[run_time]\nconstants = ["stage.stroke", "stage.lever_long", "actuator.time_constant"]\n'
+    scenario = scenario_of(tmp_path, text)
+    with pytest.raises(InputError) as refused:
+        check_run_time(Controller(build_model(scenario.device), "pose", 1e-3))
+    told = str(refused.value)
+    assert "stage.stroke: acts on the displacement range" in told and "stage.lever_long: acts on" in told
+    assert "time_constant" not in told
+
+
+def test_a_stage_with_inertia_is_refused(tmp_path):
+    device = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
+    number = next(
+        path
+        for path, q in load_device(SCENARIOS / "devices" / "flexure_axis.toml").quantities()
+        if not q.whole and q.si
+    )
+    (tmp_path / "device.toml").write_text(f'{device}\n[run_time]\nconstants = ["{number}"]\n')
+    model = build_model(load_device(tmp_path / "device.toml"))
+    assert model.inertial
+    with pytest.raises(InputError, match="stage without inertia"):
+        check_run_time(controller_of(model, "displacement", 1e-3))

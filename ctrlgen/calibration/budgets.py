@@ -53,7 +53,7 @@ def _stated(
     correlation = covariance / np.outer(sds, sds)
     if others is None:
         return Uncertainties(tuple(lines), correlation, None, 0.0, False, {}, {}, {})
-    kept, columns, first = [], [], 0
+    kept, columns, first = list[Uncertain](), list[int](), 0
     for line in others.lines:
         if not paths & set(line.paths):
             kept.append(line)

@@ -39,6 +39,7 @@ from ctrlgen.trajectory.scenario import Input
 TOLD = (
     0.5  # of the standard deviation that its bounds alone give a constant: above, the recording does not determine it
 )
+BEYOND = "at its bound: the specimen lies beyond it, or the device file leaves something out; run ctrlgen diagnose"
 AT_BOUND = 1e-4  # of the range: a value so near its end was held there
 
 
@@ -246,7 +247,7 @@ class _Search:
             value = float(fit.theta[chosen.index(c)]) if determined else c.default
             remark = why.get(c.path, "")
             if determined and min(value - c.low, c.high - value) < AT_BOUND * (c.high - c.low):
-                remark = "at its bound: the specimen lies beyond it, or something acts that the device file leaves out; run ctrlgen diagnose"
+                remark = BEYOND
             rows.append(CalibratedConstant(c, value, float(np.sqrt(covariance[k, k])), determined, remark))
         start = replace(self.fitter, cache={}).fit(_Specimen.of(self.device, chosen), steps=0)
         errors = self._errors(start, fit)
@@ -256,7 +257,7 @@ class _Search:
             self.notes.append(f"{', '.join(more)} {what}")
         return Calibration(
             self.device, inputs, self.fitter.recording, tuple(rows), covariance, errors,
-            tuple(dict.fromkeys((*self.notes, *self.fitter.noise.notes))),
+            tuple(dict.fromkeys((*self.notes, *(note for note in self.fitter.noise.notes if "as stated" not in note)))),
         )  # fmt: skip
 
     def _errors(self, before: Fit, after: Fit) -> tuple[ReadingError, ...]:
@@ -268,8 +269,8 @@ class _Search:
             for fit in (before, after)
         ]
         for i, (channel, unit) in enumerate(zip(recording.channels, recording.units, strict=True)):
-            ends = [float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares]
-            rows.append(ReadingError(channel, unit, *ends, float(self.fitter.noise.floor[i])))
+            start, end = (float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares)
+            rows.append(ReadingError(channel, unit, start, end, float(self.fitter.noise.floor[i])))
         return tuple(rows)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, ValidationError
 
 from ctrlgen.core.units import Quantity, base_unit, parse, show, to_si, written_unit
 from ctrlgen.devices.section import Section
@@ -137,8 +137,8 @@ def _refused(device: Any, path: str, text: str) -> str:
     try:
         type(node).model_validate(dict(node) | {match[2]: text})
     except ValueError as error:
-        errors = getattr(error, "errors", lambda: [{"msg": str(error)}])()
-        return "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in errors)
+        stated = error.errors() if isinstance(error, ValidationError) else [{"msg": str(error)}]
+        return "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in stated)
     return ""
 
 

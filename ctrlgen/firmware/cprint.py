@@ -79,7 +79,8 @@ class Law:
 class Printer:
     """Prints the functions of one file. `ranges`: low and high of arguments by name; `numbers`: value and formula of each element of
     the arguments that are constants of the device; `laws`: what may be a function of its own; `given`: path and range of the numbers
-    that the C is given when it starts, `given_numbers` as `numbers` of functions in terms of these alone; `derived_type`: the C type of the structure of what follows from them."""
+    that the C is given when it starts, `given_numbers` as `numbers` of functions in terms of these alone; `derived_type`: the C type of
+    the structure of what follows from them."""
 
     real: Real
     ranges: Ranges

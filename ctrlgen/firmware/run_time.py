@@ -29,7 +29,8 @@ class Tables:
     """Tables of limits as C: of numbers that are known now, or members of the state that follow from the constants of the start."""
 
     def __init__(self, controller: Controller, printer: Printer) -> None:
-        self._printer, self._real, self._model = printer, printer.real, controller.given and controller.given.model
+        self._printer, self._real = printer, printer.real
+        self._model = None if controller.given is None else controller.given.model
 
     def rows(self, formula: Callable[[Any], ca.SX], values: np.ndarray) -> list[Node] | None:
         """The rows of a table as nodes, where one of them follows from the constants; else None. `formula` of the symbolic model."""
@@ -82,8 +83,8 @@ def start_context(controller: Controller, printer: Printer) -> dict[str, Any]:
         changing = {"constant": own, "kernel": kernel, "assigned": _assigned(some)}
     derive = printer.starting(members, "derive", "What follows from the constants that the controller is given.")
     return {
-        "given": [_described(c, real) for c in constants], "given_numbers": len(constants) + len(_assigned(members)), "derived": members, "derive": derive,
-        "assigned": _assigned(members), "changing": changing, "refused": FIRST,
+        "given": [_described(c, real) for c in constants], "given_numbers": len(constants) + len(_assigned(members)),
+        "derived": members, "derive": derive, "assigned": _assigned(members), "changing": changing, "refused": FIRST,
         "magic": int.from_bytes(MAGIC, "little"), "layout": VERSION + (len(constants) << 16), "crc_polynomial": CRC_POLYNOMIAL,
         "overhead": OVERHEAD,
     }  # fmt: skip
@@ -91,10 +92,8 @@ def start_context(controller: Controller, printer: Printer) -> dict[str, Any]:
 
 def _described(c: RunTimeConstant, real: Real) -> dict[str, str]:
     low, default, high = (real.literal(v) for v in (c.low, c.default, c.high))
-    return {
-        "name": c.name, "low": low, "default": default, "high": high,
-        "about": f"{c.base_unit}, {float(low.rstrip('f')):.7g} ... {float(high.rstrip('f')):.7g}: {c.path}, {c.shown(c.default)} in the file",
-    }  # fmt: skip
+    about = f"{c.base_unit}, {c.low:.7g} ... {c.high:.7g}: {c.path}, {c.shown(c.default)} in the file"
+    return {"name": c.name, "low": low, "default": default, "high": high, "about": about}
 
 
 def _assigned(members: Sequence[Derived]) -> list[tuple[str, int]]:

@@ -7,7 +7,6 @@ It has no feedback: what it keeps of the device is the state that its own model 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntFlag
 from functools import cached_property
 from itertools import product
 
@@ -17,6 +16,7 @@ import numpy as np
 from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.composite_bound import composite_bound
+from ctrlgen.model.controller_step import ControllerStatus, ControllerStep, clamp, row
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
 from ctrlgen.model.lost_state import Groups, is_beyond, plausible_sums
 from ctrlgen.model.model import Limit, Model, Signal
@@ -31,17 +31,6 @@ COMPOSITE_ROUNDS = 8
 
 SECANT_STEPS = 3  # of the line search toward a target that the drives cannot reach in one sample
 SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
-
-
-class ControllerStatus(IntFlag):
-    """What the controller had to change. 0: the target is reached as commanded."""
-
-    DISPLACEMENT = 1  # the target lies beyond the displacement range; the nearest target inside was taken
-    COMPOSITE = 2  # a limit on stress or rotation: the displacement was scaled toward home
-    STATE = 4  # the actuator state (temperature) was set to its limit
-    DRIVE = 8  # a drive is at its limit: the target is reached later than commanded
-    INPUT = 16  # the target is not a number or absurdly large: it is ignored, drives at zero or the nearest admissible value
-    LOST = 32  # the state is none that the controller left: drives as for INPUT until it is initialised again
 
 
 @dataclass(frozen=True)
@@ -263,7 +252,7 @@ class Controller:
         z_slack, state_slack = share * m.z_scale, share * m.x_scale[:n]
         x, z = self.rest()
         kernel = (self.moving or self.static).drive
-        drives = [_row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
+        drives = [row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
         return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
     @cached_property
@@ -316,39 +305,39 @@ class Controller:
         k = self.static if settle or self.moving is None else self.moving
         n, static = m.n_states, k is self.static
         z_slack, _, u_slack = self.slacks
-        wanted, status = _row(k.displacement(x, z, target)), ControllerStatus(0)
+        wanted, status = row(k.displacement(x, z, target)), ControllerStatus(0)
         if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
             usable = np.all(np.abs(target) <= self.input_limits[: len(target)])
             if not usable:
                 lost = not first and self.is_lost(x, z)
                 return self._without_state() if lost else self._without_target(k, x, z)
             beyond = wanted
-            wanted, hit = _clamp(beyond, *m.z_bounds, z_slack)
+            wanted, hit = clamp(beyond, *m.z_bounds, z_slack)
             if hit:
-                wanted = _row(self.nearest(beyond))
+                wanted = row(self.nearest(beyond))
                 status |= ControllerStatus.DISPLACEMENT
         state_wanted, hit = self._limited_state(k, x, z, wanted)
         if hit:
-            wanted = _row(k.settle(np.concatenate([state_wanted, x[n:]]), wanted, self.safe_drive))
+            wanted = row(k.settle(np.concatenate([state_wanted, x[n:]]), wanted, self.safe_drive))
             status |= ControllerStatus.STATE
         wanted, worst = self._limit_composite(x, z, wanted)
         if worst > 1:
             state_wanted, _ = self._limited_state(k, x, z, wanted)
         if worst > 1 + self.slack:
             status |= ControllerStatus.COMPOSITE
-        drive = _row(k.drive(x, z, wanted, state_wanted))
+        drive = row(k.drive(x, z, wanted, state_wanted))
         outside = not np.all((drive >= m.u_bounds[0]) & (drive <= m.u_bounds[1]))
         if outside and not first and self.is_lost(x, z):
             return self._without_state()
-        u, limited = _clamp(drive, *m.u_bounds, u_slack)
+        u, limited = clamp(drive, *m.u_bounds, u_slack)
         if limited:
             wanted, state_wanted, drive = self._line_search(k, x, z, np.zeros_like(z) if static else z, wanted, drive)
-            u, limited = _clamp(drive, *m.u_bounds, u_slack)
+            u, limited = clamp(drive, *m.u_bounds, u_slack)
             status |= ControllerStatus.DRIVE
         if not limited and len(x) == n:  # only actuators have memory: their state is what the drive was computed for
             return ControllerStep(status, wanted, state_wanted, u, (state_wanted, wanted))
-        x_next = _row(k.advance(x, wanted if static else z, u))
-        z_next = _row(k.settle(x_next, wanted, u)) if limited else wanted
+        x_next = row(k.advance(x, wanted if static else z, u))
+        z_next = row(k.settle(x_next, wanted, u)) if limited else wanted
         return ControllerStep(status, z_next, state_wanted, u, (x_next, z_next))
 
     def _without_state(self) -> ControllerStep:
@@ -359,15 +348,15 @@ class Controller:
 
     def _without_target(self, k: Inverse, x: np.ndarray, z: np.ndarray) -> ControllerStep:
         """The safe drive, and what the device does under it for one sample."""
-        x_next = _row(k.advance(x, z, self.safe_drive))
-        z_next = _row(k.settle(x_next, z, self.safe_drive))
+        x_next = row(k.advance(x, z, self.safe_drive))
+        z_next = row(k.settle(x_next, z, self.safe_drive))
         return ControllerStep(ControllerStatus.INPUT, z, x[: self.nominal.n_states], self.safe_drive, (x_next, z_next))
 
     def _limited_state(self, k: Inverse, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, bool]:
         """The actuator state that displacement `wanted` needs, limited to its range, and whether that changed it."""
         n, (low, high) = self.nominal.n_states, self.nominal.x_bounds
-        state = _row(k.state(x, z, wanted))
-        return _clamp(state, low[:n], high[:n], self.slacks[1]) if self.state_can_be_limited else (state, False)
+        state = row(k.state(x, z, wanted))
+        return clamp(state, low[:n], high[:n], self.slacks[1]) if self.state_can_be_limited else (state, False)
 
     def _limit_composite(self, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, float]:
         """`wanted` scaled toward home where it breaks a guarded limit, and the largest share of a limit seen (0: none looked at)."""
@@ -391,10 +380,10 @@ class Controller:
 
         def answer(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             state, _ = self._limited_state(k, x, z, displacement)
-            return state, _row(k.drive(x, z, displacement, state))
+            return state, row(k.drive(x, z, displacement, state))
 
         state, at_start = answer(origin)
-        if _clamp(at_start, low, high, slack)[1]:
+        if clamp(at_start, low, high, slack)[1]:
             return origin, state, at_start
         direction, accepted, rejected = target - origin, 0.0, 1.0
         for _ in range(SECANT_STEPS):
@@ -404,31 +393,8 @@ class Controller:
                 share = min(share, (limit - at_start[i]) / (at_target[i] - at_start[i]))
             fraction = accepted + SECANT_FRACTION * max(share, 0.0) * (rejected - accepted)
             trial_state, drive = answer(origin + fraction * direction)
-            if _clamp(drive, low, high, slack)[1]:
+            if clamp(drive, low, high, slack)[1]:
                 rejected, at_target = fraction, drive
             else:
                 accepted, state, at_start = fraction, trial_state, drive
         return origin + accepted * direction, state, at_start
-
-
-@dataclass(frozen=True)
-class ControllerStep:
-    """One answer of the controller, SI; `state` (x, z) is the one predicted for the next sample."""
-
-    status: ControllerStatus
-    displacement: np.ndarray
-    actuator_state: np.ndarray
-    drive: np.ndarray
-    state: tuple[np.ndarray, np.ndarray]
-
-
-def _row(value: ca.DM) -> np.ndarray:
-    return value.full().ravel()
-
-
-def _clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:
-    """`wanted` clipped to low ... high (NaN to low), and whether that changed it by more than `slack`; true for NaN."""
-    raised = np.where(wanted > low, wanted, low)
-    limited = np.where(raised < high, raised, high)
-    with np.errstate(invalid="ignore"):  # inf - inf, of a state that overflowed
-        return limited, not bool(np.all(np.abs(limited - wanted) <= slack))

@@ -60,8 +60,8 @@ def _compiled_in(controller: Controller, variant: Controller, values: dict[str, 
         return "the state at rest"
     if not _same(controller.safe_drive, variant.safe_drive):
         return "the drive without a target"
-    slopes = [c.nearest_slopes for c in (controller, variant)]
-    if (slopes[0] is None) != (slopes[1] is None) or (slopes[0] is not None and not _same(*slopes)):
+    P, other_P = controller.nearest_slopes, variant.nearest_slopes
+    if (P is None) != (other_P is None) or (P is not None and other_P is not None and not _same(P, other_P)):
         return "the target nearest to one out of range"
     return _kernels_differ(controller, variant, named, p)
 
@@ -117,8 +117,5 @@ def _same(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether two arrays hold the same numbers, infinite ones and NaN too, to `SAME` of the largest."""
     finite = np.isfinite(b)
     size = float(np.max(np.abs(b[finite]), initial=0.0))
-    return bool(
-        a.shape == b.shape
-        and np.array_equal(a[~finite], b[~finite], equal_nan=True)
-        and np.allclose(a[finite], b[finite], rtol=0, atol=SAME * size)
-    )
+    near = np.allclose(a[finite], b[finite], rtol=0, atol=SAME * size)
+    return bool(near and np.array_equal(a[~finite], b[~finite], equal_nan=True))

@@ -1,0 +1,172 @@
+"""ctrlgen calibrate: the constants of a specimen from a recording of it, and what it writes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import struct
+import subprocess
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import ctrlgen
+from conftest import SCENARIOS
+
+from ctrlgen import Controller, InputError, build_model, calibrate, load_device
+from ctrlgen.calibration.budgets import budgets
+from ctrlgen.calibration.calibrate import sd_of_bounds
+from ctrlgen.core.units import to_si
+from ctrlgen.model.simulation import trace
+from ctrlgen.reporting.calibration_page import write_calibration
+
+DEVICE = SCENARIOS / "devices" / "mems_hexapod_run_time.toml"
+RECORDING = SCENARIOS / "hexapod_specimen"
+TRUE = {"actuator.ambient": 273.15 + 26, "actuator.thermal_resistance": 583.0, "actuator.time_constant": 4.4e-3}
+
+
+@pytest.fixture(scope="module")
+def specimen():
+    return calibrate(DEVICE, RECORDING)
+
+
+@pytest.mark.long
+def test_the_constants_of_the_specimen_are_found_within_their_intervals(specimen):
+    for row in specimen.constants:
+        low, high = row.interval
+        assert row.determined and low < TRUE[row.constant.path] < high, row
+        assert row.sd < 0.05 * sd_of_bounds(row.constant)
+
+
+@pytest.mark.long
+def test_held_out_readings_are_then_as_good_as_their_noise(specimen):
+    for e in specimen.errors:
+        assert e.before > 50 * e.noise
+        assert abs(e.after / e.noise - 1) < 0.12  # 230 samples tell a deviation to 5 %
+
+
+def record_lag(folder: Path, tau: float, resistance: float, seed: int) -> tuple[Path, Path]:
+    """A device file with two constants, and a recording in which the temperatures are those of the closed form of a lag,
+    T_k+1 = T_k e^(-h/tau) + R P (1 - e^(-h/tau)), written here; the poses are the model's equilibria at these temperatures."""
+    ambient = '    { number = "actuator.ambient", low = "10 degC", high = "40 degC" },\n'
+    text = DEVICE.read_text()
+    assert ambient in text
+    (folder / "device.toml").write_text(text.replace(ambient, "").replace('input = "actuator.ambient"', ""))
+    model = build_model(load_device(folder / "device.toml"))
+    settle = Controller(model, "pose", None).static.settle
+    rng, decay, noise = np.random.default_rng(seed), np.exp(-1e-3 / tau), np.array([1e-6] * 3 + [5e-9] * 3)
+    for role in ("fit", "hold_out"):
+        powers = np.repeat(rng.uniform(0, 0.29, (20, 6)), 10, axis=0)
+        rise = [np.zeros(6)]
+        for power in powers[:-1]:
+            rise.append(rise[-1] * decay + resistance * power * (1 - decay))
+        T = model.rest + np.array(rise)
+        z = settle.map(len(T))(T.T, np.full((6, len(T)), 1e-5), powers.T).full().T
+        pose = trace(model, np.zeros(len(T)), T, z, powers).signals["pose"]
+        rows = np.hstack([powers, (pose + rng.standard_normal(pose.shape) * noise) * ([1e6] * 3 + [1e9] * 3)])
+        head = ",".join([*(f"P_{axis}" for axis in model.axes), *model.signals["pose"].channels])
+        np.savetxt(folder / f"{role}.csv", rows, "%.9g", ",", header=head, comments="")
+    shutil.copy(RECORDING / "recording.toml", folder)
+    return folder / "device.toml", folder
+
+
+@pytest.mark.long
+def test_constants_of_the_closed_form_of_a_lag_are_found_with_deviations_as_stated(tmp_path):
+    """Ten deviations over their stated standard deviations: their mean square is 1 within what chance leaves of ten, 0.25 to 2.5."""
+    scores = []
+    for seed in range(5):
+        (folder := tmp_path / str(seed)).mkdir()
+        found = calibrate(*record_lag(folder, 5.7e-3, 500.0, seed))
+        truth = {"actuator.time_constant": 5.7e-3, "actuator.thermal_resistance": 500.0}
+        assert all(row.determined for row in found.constants)
+        scores += [(row.value - truth[row.constant.path]) / row.sd for row in found.constants]
+    assert 0.25 < np.mean(np.square(scores)) < 2.5, scores
+
+
+@pytest.mark.long
+def test_a_constant_on_which_the_recording_says_nothing_keeps_its_default(tmp_path):
+    text = DEVICE.read_text().replace('input = "actuator.ambient"', "")
+    device = tmp_path / "device.toml"
+    device.write_text(
+        text.replace("constants = [", 'constants = [\n    "actuator.heater_resistance", "hexapod.stress_limit",')
+    )
+    found = {row.constant.path: row for row in calibrate(device, RECORDING).constants}
+    for path in ("actuator.heater_resistance", "hexapod.stress_limit"):
+        assert not found[path].determined and found[path].value == found[path].constant.default
+        assert "acts on nothing" in found[path].remark
+    assert found["actuator.time_constant"].determined
+
+
+@pytest.mark.long
+def test_the_budget_of_a_path_falls_to_what_the_recording_leaves(specimen):
+    before, after = budgets(specimen, SCENARIOS / "circle20", DEVICE)
+    translation = before.groups[0]
+    assert translation.unit == "nm"
+    assert after.peak(translation) < 0.3 * before.peak(translation)
+    own = next(line for line in before.lines if line.name == "actuator.thermal_resistance")
+    assert own.sd == f"{200 / np.sqrt(12):.3g} K/W"  # uniform between 450 and 650 K/W, GUM 4.3.7
+
+
+@pytest.mark.long
+def test_the_files_hold_the_same_numbers(specimen, tmp_path):
+    write_calibration(tmp_path, specimen)
+    record = json.loads((tmp_path / "constants.json").read_text())
+    data = (tmp_path / "constants.bin").read_bytes()
+    magic, version, count, number = struct.unpack_from("<4sHHI", data)
+    assert (magic, version, count) == (b"CGRT", 1, 3) and f"{number:08x}" == record["device_hash"]
+    assert zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0]
+    values = [k["value_si"] for k in record["constants"]]
+    assert np.allclose(struct.unpack_from("<3f", data, 12), values, rtol=1e-7, atol=0)
+    for entry in record["constants"]:
+        assert np.isclose(to_si(entry["value"], entry["unit"]), entry["value_si"], rtol=1e-12)
+    main = tmp_path / "main.c"
+    main.write_text(
+        '#include <stdio.h>\n#include "constants.h"\nint main(void) { const double v[3] = MEMS_HEXAPOD_SPECIMEN_CONSTANTS_F64;\n'
+        'const float f[3] = MEMS_HEXAPOD_SPECIMEN_CONSTANTS_F32;\nprintf("%.17g %.17g %.17g %g", v[0], v[1], v[2], f[2]); return 0; }\n'
+    )
+    words = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", str(main), "-o", str(tmp_path / "main")]
+    subprocess.run(words, check=True)
+    printed = subprocess.run([str(tmp_path / "main")], capture_output=True, text=True, check=True).stdout.split()
+    assert [float(v) for v in printed[:3]] == values
+    wrong = ["-DMEMS_HEXAPOD_SPECIMEN_ONLINE_F32_DEVICE_HASH=0x12345678U"]
+    refused = subprocess.run([*words, *wrong], capture_output=True, text=True)
+    assert refused.returncode and "belong to another device file" in refused.stderr
+
+
+def test_a_device_without_run_time_constants_is_refused():
+    with pytest.raises(InputError, match="run_time: is missing"):
+        calibrate(SCENARIOS / "devices" / "mems_hexapod.toml", RECORDING)
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ('constants = ["actuator.ambiant"]', "did you mean actuator.ambient"),
+        ('constants = ["actuator.beams"]', "is a count"),
+        (
+            'constants = [{ number = "actuator.time_constant", low = "6 ms", high = "7 ms" }]',
+            "is not within 6 ... 7 ms",
+        ),
+        ('constants = [{ number = "actuator.time_constant", low = "0 ms", high = "7 ms" }]', "out of bounds"),
+        ('constants = [{ number = "actuator.time_constant", low = "4 K", high = "7 ms" }]', "wrong unit"),
+        ('constants = ["actuator.ambient", "actuator.ambient"]', "is named twice"),
+        ('constants = ["actuator.ambient"]\ninput = "actuator.young"', "is not among the constants"),
+    ],
+)
+def test_a_run_time_table_that_cannot_be_is_refused_with_what_to_do(tmp_path, stated, words):
+    device = tmp_path / "device.toml"
+    device.write_text((SCENARIOS / "devices" / "mems_hexapod.toml").read_text() + f"\n[run_time]\n{stated}\n")
+    with pytest.raises(InputError, match=words):
+        load_device(device)
+
+
+@pytest.mark.long
+def test_the_command_prints_the_constants_and_leaves_the_report(tmp_path):
+    done = ctrlgen("calibrate", str(DEVICE), str(RECORDING), "--out", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    assert "actuator.thermal_resistance" in done.stdout and "583" in done.stdout
+    names = {
+        path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*") if path.is_file()
+    } - {".ctrlgen"}
+    assert names == {"constants.h", "constants.bin", "constants.json", "calibration.html", "figures/constants.svg"}
