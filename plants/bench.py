@@ -41,7 +41,8 @@ int main(void) {{
     {name}_output out;
     double target[6];
     if ({name}_init_with(&state, &specimen) != 0) return 1;
-    for (int first = 1; scanf("%lf %lf %lf %lf %lf %lf", target, target + 1, target + 2, target + 3, target + 4, target + 5) == 6; first = 0) {{
+    double *t = target;
+    for (int first = 1; scanf("%lf %lf %lf %lf %lf %lf", t, t + 1, t + 2, t + 3, t + 4, t + 5) == 6; first = 0) {{
         if ((first ? {name}_settle(&state, target, &out) : {name}_step(&state, target, &out)) != 0) return 2;
         for (int i = 0; i < 6; ++i) printf("%.17g%c", out.drive[i], i < 5 ? ' ' : '\\n');
     }}

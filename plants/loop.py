@@ -1,4 +1,4 @@
-"""Closes the loop on the plant, the whole story: as described, budget, diagnosis, calibration of another chip, learning, the fastest circle.
+"""The whole story on the plant: the C as described, error budget, diagnosis, calibration of another chip, learning, the fastest circle.
 
 The plant's maker knows what ctrlgen's model leaves out, and how the second chip differs from the first; ctrlgen gets recordings and
 nothing else. Everything goes through files and the command line. `python -m plants.loop --out out/loop`; some minutes.
