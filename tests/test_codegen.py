@@ -349,7 +349,9 @@ def test_two_trajectories_of_one_device_and_rate_have_the_same_online_controller
         assert name not in (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
 
 
-def test_controllers_of_one_device_at_two_rates_with_two_names_link_into_one_program(folder, circle, compiler, tmp_path):
+def test_controllers_of_one_device_at_two_rates_with_two_names_link_into_one_program(
+    folder, circle, compiler, tmp_path
+):
     """Both controllers and both plants; each has the rate of its own."""
     text = circle.scenario.inputs["scenario"].text.replace("../devices", str(SCENARIOS / "devices"))
     text = text.replace('sample_rate = "1 kHz"', 'sample_rate = "2 kHz"\ncontroller = "fast_hexapod"')
@@ -374,7 +376,12 @@ def test_controllers_of_one_device_at_two_rates_with_two_names_link_into_one_pro
     (tmp_path / "main.c").write_text(f"{headers}\n{target}\nint main(void)\n{{\n{calls}\n    return 0;\n}}\n")
     sources = [folder.path / f"{names[0]}.c", fast.path / f"{names[1]}.c", *(tmp_path / f"{name}.c" for name in plants)]
     build(
-        compiler, [tmp_path / "main.c", *sources], tmp_path / "main", f"-I{folder.path}", f"-I{fast.path}", f"-I{tmp_path}"
+        compiler,
+        [tmp_path / "main.c", *sources],
+        tmp_path / "main",
+        f"-I{folder.path}",
+        f"-I{fast.path}",
+        f"-I{tmp_path}",
     )
     assert subprocess.run([tmp_path / "main"]).returncode == 0
     for text in ("README.md", "library.properties", "zephyr/Kconfig"):

@@ -122,7 +122,7 @@ def test_axes_that_share_masses_are_led_by_the_drive_of_their_inverse():
     model = build_model(load_device(SCENARIOS / "devices" / "dynamic_hexapod.toml"))
     inverse = inverse_dynamics(model, "pose")
     assert inverse.degrees == (3,) * 6 and inverse.internal == ()
-    assert inverse.kernel.n_instructions() < 1500  # constant blocks; a Newton step of all temperatures at once makes it 8,000
+    assert inverse.kernel.n_instructions() < 1500  # a Newton step of all temperatures at once takes 8,000
     rate, radius, height, step = 2 * np.pi * 25, 10e-6, 20e-6, 1e-5
 
     def wanted(t):
@@ -409,6 +409,7 @@ def test_every_path_that_cannot_be_followed_is_explained_with_one_that_can(tmp_p
 def test_the_online_drive_is_that_of_the_equations_and_limits_are_kept():
     device = coil(state={"current": ("-1.5 V", "1.5 V")})
     controller = controller_of(build_model(device), "pose", 1e-3)
+    assert controller.moving is None and controller.named.moving is None  # derivatives instead of the sample before
     rest = controller.rest()
     d, v, a, jerk = 20e-6, 1e-3, 0.5, 30.0
     force = MASS * a + DAMPING * v + STIFFNESS * d + CUBIC * d**3

@@ -70,7 +70,8 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
     target = ca.SX.sym("target", len(chains), max(degrees) + 1)
     motion, accelerations = _implicit(model, follow, degrees) or (chains, [])
     equations = ca.vertcat(
-        *(h - target[i, k] for i, chain in enumerate(motion) for k, h in enumerate(chain)), *(e for _, e in accelerations)
+        *(h - target[i, k] for i, chain in enumerate(motion) for k, h in enumerate(chain)),
+        *(e for _, e in accelerations),
     )
     x, z, u = (ca.SX.sym(name, v.numel()) for name, v in (("x1", model.x), ("z1", model.z), ("u1", model.u)))
     equations = ca.substitute(equations, ca.vertcat(model.x, model.z, model.u), ca.vertcat(x, z, u))
