@@ -349,6 +349,45 @@ def test_two_trajectories_of_one_device_and_rate_have_the_same_online_controller
         assert name not in (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
 
 
+def test_controllers_of_one_device_at_two_rates_with_two_names_link_into_one_program(
+    folder, circle, compiler, tmp_path
+):
+    """Both controllers and both plants; each has the rate of its own."""
+    text = circle.scenario.inputs["scenario"].text.replace("../devices", str(SCENARIOS / "devices"))
+    text = text.replace('sample_rate = "1 kHz"', 'sample_rate = "2 kHz"\ncontroller = "fast_hexapod"')
+    (tmp_path / "scenario.toml").write_text(text)
+    scenario = load_scenario(tmp_path)
+    fast = generate(scenario, build_model(scenario.device), tmp_path / "fast")
+    names = [folder.online[Real.FLOAT], fast.online[Real.FLOAT]]
+    plants = [write_plant(s, plant_of(s), Real.FLOAT, tmp_path) for s in (circle.scenario, scenario)]
+    assert names == ["mems_hexapod_online_f32", "fast_hexapod_online_f32"]
+    assert plants == ["mems_hexapod_plant_f32", "fast_hexapod_plant_f32"]
+    headers = "\n".join(f'#include "{name}.h"' for name in (*names, *plants))
+    calls = "\n".join(
+        f"""    {{
+        static {name}_state state;
+        {name}_output out;
+        {name}_init(&state);
+        if (({name.upper()}_RATE_HZ != {rate}U) || ({name}_step(&state, target, &out) == {name.upper()}_LOST)) {{ return {rate}; }}
+    }}"""
+        for name, rate in zip(names, (1000, 2000), strict=True)
+    )
+    target = "static const float target[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 2e-5f };"
+    (tmp_path / "main.c").write_text(f"{headers}\n{target}\nint main(void)\n{{\n{calls}\n    return 0;\n}}\n")
+    sources = [folder.path / f"{names[0]}.c", fast.path / f"{names[1]}.c", *(tmp_path / f"{name}.c" for name in plants)]
+    build(
+        compiler,
+        [tmp_path / "main.c", *sources],
+        tmp_path / "main",
+        f"-I{folder.path}",
+        f"-I{fast.path}",
+        f"-I{tmp_path}",
+    )
+    assert subprocess.run([tmp_path / "main"]).returncode == 0
+    for text in ("README.md", "library.properties", "zephyr/Kconfig"):
+        assert "mems_hexapod_online" not in (fast.path / text).read_text()
+
+
 @pytest.mark.parametrize("piece", ["online", "player", "plant"])
 def test_a_firmware_can_pin_the_interface_at_compile_time(piece, folder, circle, tmp_path):
     if not shutil.which("gcc"):

@@ -10,13 +10,14 @@ import casadi as ca
 import numpy as np
 import pytest
 from command_line import ctrlgen as run
-from conftest import AXIS_FILE
+from conftest import AXIS_FILE, SCENARIOS
 from numpy.polynomial import Polynomial
 from scipy.integrate import solve_ivp
 
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
+from ctrlgen.devices import load_device
 from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
 from ctrlgen.model.motion_feedforward import controller_of
@@ -114,6 +115,32 @@ def test_the_relative_degree_is_that_of_the_equations():
     assert relative_degrees(build_model(stage()), "displacement") == (2, 2)
     prompt = coil(force=lambda u, x, p: p.f * x.current + 0.1 * p.f * u.coil)  # a part of the force does not lag
     assert relative_degrees(build_model(prompt), "pose") == (2,)
+
+
+def test_axes_that_share_masses_are_led_by_the_drive_of_their_inverse():
+    """NIST's hexapod on a circle 25 times a second: its states change as the equations of motion say under the drive."""
+    model = build_model(load_device(SCENARIOS / "devices" / "dynamic_hexapod.toml"))
+    inverse = inverse_dynamics(model, "pose")
+    assert inverse.degrees == (3,) * 6 and inverse.internal == ()
+    assert inverse.kernel.n_instructions() < 1500  # a Newton step of all temperatures at once takes 8,000
+    rate, radius, height, step = 2 * np.pi * 25, 10e-6, 20e-6, 1e-5
+
+    def wanted(t):
+        turned = [radius * rate**k * np.exp(1j * (rate * t + k * np.pi / 2)) for k in range(4)]
+        target = np.zeros((6, 4))
+        target[3], target[4], target[5, 0] = np.real(turned), np.imag(turned), height
+        return [part.full().ravel() for part in inverse.kernel(target)]
+
+    for t in (0.0, 7e-3, 23e-3):
+        x, z, u = wanted(t)
+        pose = ca.Function("pose", [model.z], [model.signals["pose"].expr])(z).full().ravel()
+        there = [0, 0, 0, radius * np.cos(rate * t), radius * np.sin(rate * t), height]
+        assert pose == pytest.approx(there, abs=1e-15)
+        rates = model.dynamics(x, z, u, [])[0].full().ravel()
+        near = [wanted(t + k * step) for k in (-2, -1, 1, 2)]  # central differences of the fourth order
+        x_rate, z_rate = (np.dot([1, -8, 8, -1], [w[i] for w in near]) / (12 * step) for i in (0, 1))
+        assert rates == pytest.approx(x_rate, rel=1e-8, abs=1e-9 * np.abs(x_rate[-6:]).max())
+        assert x[-6:] == pytest.approx(z_rate, abs=1e-9 * radius * rate)
 
 
 def test_a_signal_that_the_drive_does_not_move_is_named():
@@ -382,6 +409,7 @@ def test_every_path_that_cannot_be_followed_is_explained_with_one_that_can(tmp_p
 def test_the_online_drive_is_that_of_the_equations_and_limits_are_kept():
     device = coil(state={"current": ("-1.5 V", "1.5 V")})
     controller = controller_of(build_model(device), "pose", 1e-3)
+    assert controller.moving is None and controller.named.moving is None  # derivatives instead of the sample before
     rest = controller.rest()
     d, v, a, jerk = 20e-6, 1e-3, 0.5, 30.0
     force = MASS * a + DAMPING * v + STIFFNESS * d + CUBIC * d**3

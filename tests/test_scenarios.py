@@ -20,7 +20,7 @@ def test_the_scenarios_of_the_papers_are_there():
     assert set(ALL) >= {"circle20", "coupled_dof", "xy_stage_force", "raster", "spiral", "unreachable"}
 
 
-SLOW = ("raster", "spiral")
+SLOW = ("dynamic_circle", "raster", "spiral")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in ALL])

@@ -136,7 +136,7 @@ def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folde
     """The online controller's C in `folder`, and the unit around it."""
     check_online(scenario, model)
     controller = controller_of(model, scenario.file.follow, sample_time)
-    m, core = controller.nominal, f"{scenario.device.name}_online_{Real.DOUBLE.suffix}"
+    m, core = controller.nominal, f"{scenario.controller_name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"{core}.{end}")

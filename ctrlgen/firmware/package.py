@@ -29,8 +29,9 @@ TEMPLATES = {
 
 
 def owners(scenario: Scenario) -> dict[str, str]:
-    """Piece -> what its files and functions are named after: the scenario, but the device for the controller, which knows no trajectory."""
-    return dict.fromkeys(PIECES, scenario.name) | {"online": scenario.device.name}
+    """Piece -> what its files and functions are named after: the scenario, but for the controller, which knows no trajectory, the device,
+    or the scenario's `controller`."""
+    return dict.fromkeys(PIECES, scenario.name) | {"online": scenario.controller_name}
 
 
 def write_package(

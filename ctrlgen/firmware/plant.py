@@ -130,8 +130,8 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
 
 
 def write_plant(scenario: Scenario, plant: Plant, real: Real, out: Path) -> str:
-    """Writes `{device}_plant_{f64, f32}.c` and `.h` to the folder `out`; their common name. Raises CtrlgenError."""
-    name = f"{scenario.device.name}_plant_{real.suffix}"
+    """Writes `{controller}_plant_{f64, f32}.c` and `.h` to the folder `out`; their common name. Raises CtrlgenError."""
+    name = f"{scenario.controller_name}_plant_{real.suffix}"
     context = plant_context(scenario, plant, real, name)
     for end in ("h", "c"):
         write(f"plant.{end}", context, out / f"{name}.{end}")

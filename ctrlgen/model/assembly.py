@@ -126,7 +126,9 @@ def _assemble(
     state, memories = physics.state, terms.memories()
     own_x = NONE if state is None else state.expr
     first = own_x.numel()  # place in x of the effects' states
-    acceleration = _acceleration(physics.mass, parts.balance) if isinstance(physics, InertialPhysics) else NONE
+    mass, acceleration = ca.SX(0, 0), NONE
+    if isinstance(physics, InertialPhysics):
+        mass, acceleration = _mass(physics.mass), _acceleration(physics.mass, parts.balance)
     memory_rates = ca.vertcat(NONE, *(m.rates[s.name] for m, s, _ in memories))
     rates = ca.vertcat(parts.rates, memory_rates, acceleration)
 
@@ -155,6 +157,7 @@ def _assemble(
         rates_of_heat=closed(rates),
         sampled_rates=ca.substitute(rates, parts.heat, parts.heat_of_drive),
         balance=closed(parts.balance),
+        mass=mass,
         stepped={first + k: closed(m.stepped[s.name]) for k, (m, s, _) in enumerate(memories) if s.stepped},
         clocks=tuple(first + k for k, (_, s, _) in enumerate(memories) if s.clock),
         set_valued_axes=_set_valued_axes(terms, v, parts.own_force),
@@ -257,6 +260,11 @@ def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) 
     signals |= _mechanical(physics, force, displacement, pose, reading)
     rates = rates if loop is None else loop.rates(x, arriving)
     return Assembly(signals, rates, balance, heat, produced, held, command, force - damping)
+
+
+def _mass(mass: tuple[float | ca.SX, ...] | ca.SX | ca.DM) -> ca.SX:
+    """(n_axes, n_axes) from one number an axis or a matrix."""
+    return ca.diag(ca.SX(ca.vertcat(*mass))) if isinstance(mass, tuple) else ca.SX(mass)
 
 
 def _acceleration(mass: tuple[float | ca.SX, ...] | ca.SX | ca.DM, force: ca.SX) -> ca.SX:

@@ -47,21 +47,26 @@ class Controller:
         """Kernels for equilibria."""
         return inverse_of(self.nominal, self.follow, None)
 
+    @property
+    def _step_time(self) -> float | None:
+        """The sample time of the kernels for the next sample; None where there are none."""
+        return self.sample_time
+
     @cached_property
     def moving(self) -> Inverse | None:
         """Kernels for the next sample; None where there is no sample time."""
-        return None if self.sample_time is None else inverse_of(self.nominal, self.follow, self.sample_time)
+        return None if self._step_time is None else inverse_of(self.nominal, self.follow, self._step_time)
 
     @cached_property
     def named(self) -> NamedInverses:
         """The same kernels with their numbers as formulas of the device's parameters."""
-        return named_inverses(self.model.device, self.follow, self.sample_time)
+        return named_inverses(self.model.device, self.follow, self._step_time)
 
     @cached_property
     def given(self) -> NamedInverses | None:
         """The same kernels in terms of the run-time constants; None for a device without."""
         device = self.model.device
-        return given_inverses(device, self.follow, self.sample_time) if device.given_at_start else None
+        return given_inverses(device, self.follow, self._step_time) if device.given_at_start else None
 
     def at(self, values: dict[str, float]) -> Controller:
         """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them."""

@@ -8,9 +8,15 @@ for channel i after rho_i times, its relative degree: 2 for a force on the mass,
 
     h_i,k(y) = r_i^(k),  k = 0 ... rho_i - 1,      h_i,rho_i(y, u) = r_i^(rho_i)
 
-are solved for states and drive by `ctrlgen.model.inverse.solve_by_blocks`. States that no such equation determines (memories
-of effects, flexible modes, an integrator of a feedback loop) are internal: here they stay at rest, and `ctrlgen.trajectory.sampled_inverse`
-finds them. Source: A. Isidori, Nonlinear Control Systems, 3rd ed. (1995), section 5.1.
+are solved for states and drive by `ctrlgen.model.inverse.solve_by_blocks`. Where axes share a matrix of masses M, M^-1 makes each of these
+equations one of every axis's force. There the accelerations a and their derivatives by time stay unknowns beside states and drive, with
+
+    M a^(k) = d^k g/dt^k (y, u, a, a', ..., a^(k-1)),   k = 0 ... max rho - 2,
+
+g being the net forces: the matrices are then solved once, as constant blocks, and each actuator's law by itself.
+
+States that no such equation determines (memories of effects, flexible modes, an integrator of a feedback loop) are internal: here they
+stay at rest, and `ctrlgen.trajectory.sampled_inverse` finds them. Source: A. Isidori, Nonlinear Control Systems, 3rd ed. (1995), section 5.1.
 """
 
 from __future__ import annotations
@@ -22,6 +28,7 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.allocation import allocate
+from ctrlgen.model.assembly import TYPICAL_RATE
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 from ctrlgen.model.model import Model
 
@@ -62,12 +69,17 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
     chains = _chains(model, follow)
     degrees = tuple(len(chain) - 1 for chain in chains)
     target = ca.SX.sym("target", len(chains), max(degrees) + 1)
-    equations = ca.vertcat(*(h - target[i, k] for i, chain in enumerate(chains) for k, h in enumerate(chain)))
+    motion, accelerations = _implicit(model, follow, degrees) or (chains, [])
+    equations = ca.vertcat(
+        *(h - target[i, k] for i, chain in enumerate(motion) for k, h in enumerate(chain)),
+        *(e for _, e in accelerations),
+    )
     x, z, u = (ca.SX.sym(name, v.numel()) for name, v in (("x1", model.x), ("z1", model.z), ("u1", model.u)))
     equations = ca.substitute(equations, ca.vertcat(model.x, model.z, model.u), ca.vertcat(x, z, u))
     equations = ca.substitute(equations, model.p, ca.DM(model.p_nominal))
     own, last = range(model.n_states), model.x.numel() - model.v.numel()
-    candidates = ca.vertcat(u, z, x[last:], x[list(own)], x[model.n_states : last])
+    orders = ca.vertcat(NONE, *(symbol for symbol, _ in accelerations))
+    candidates = ca.vertcat(u, z, x[last:], orders, x[list(own)], x[model.n_states : last])
     chosen = _determined(equations, candidates)
     if len(chosen) < equations.numel() or not set(range(model.u.numel())) <= set(chosen):
         what = f"does not move the channels of the {follow} independently of one another"
@@ -85,6 +97,7 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
     known = ExpansionPoint.of(
         (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (u, 0 * model.u_scale, model.u_scale),
         (ca.vec(target), np.zeros(target.numel()), np.zeros(target.numel())),
+        *((a, 0 * model.z_scale, model.z_scale * TYPICAL_RATE ** (k + 2)) for k, (a, _) in enumerate(accelerations)),
     )  # fmt: skip
     solution = solve_by_blocks(known, equations, unknowns)
     result = [ca.substitute(ca.substitute(e, unknowns, solution), held, at_rest) for e in (x, z, u)]
@@ -119,6 +132,33 @@ def _chains(model: Model, follow: str) -> list[list[ca.SX]]:
             raise InputError(model.name, [Fault("drive", what)])
         chains.append(chain)
     return chains
+
+
+def _implicit(
+    model: Model, follow: str, degrees: tuple[int, ...]
+) -> tuple[list[list[ca.SX]], list[tuple[ca.SX, ca.SX]]] | None:
+    """The chains in terms of the accelerations and their derivatives, and each of those with its equation; None where the axes do not
+    share their masses, or not every channel is moved after as many derivatives."""
+    if model.mass.sparsity().is_diag() or len(set(degrees)) > 1:
+        return None
+    n, degree = len(model.axes), degrees[0]
+    own = model.rates[: model.x.numel() - n]
+    force = ca.substitute(model.balance, model.heat, model.heat_of_drive)
+    symbols = [ca.SX.sym(f"a{k}", n) for k in range(degree)]
+    y, F = ca.vertcat(model.x, model.z, *symbols[:-1]), ca.vertcat(own, symbols[0], model.v, *symbols[1:])
+    equations: list[tuple[ca.SX, ca.SX]] = []
+    for k, a in enumerate(symbols[:-1]):
+        if k and ca.depends_on(force, model.u):
+            return None
+        force = ca.jtimes(force, y, F) if k else force
+        equations.append((a, ca.mtimes(model.mass, a) - force))
+    chains = []
+    for channel in ca.vertsplit(model.signals[follow].expr):
+        chain = [channel]
+        while len(chain) <= degree:
+            chain.append(ca.jtimes(chain[-1], y, F))
+        chains.append(chain)
+    return chains, equations
 
 
 def _determined(equations: ca.SX, candidates: ca.SX) -> list[int]:

@@ -58,6 +58,7 @@ class Model:
     heat_of_drive: ca.SX
     rates_of_heat: ca.SX  # dx/dt (n_x,) in terms of `heat`
     balance: ca.SX  # (n_axes,) 0 = g(x, z, u) of a stage in balance, or the net force on each mass
+    mass: ca.SX  # (n_axes, n_axes) M in M v' = balance; empty without inertia
 
     # Places in x of states that are not integrated, and of those that need an implicit integrator
     stepped: dict[int, ca.SX]  # change once a sample: place -> new value

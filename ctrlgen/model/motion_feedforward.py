@@ -37,8 +37,8 @@ class MotionController(Controller):
         """The inverse dynamics."""
         return inverse_dynamics(self.nominal, self.follow)
 
-    @cached_property
-    def moving(self) -> None:
+    @property
+    def _step_time(self) -> None:
         """None: a motion takes its derivatives, and not the sample before."""
         return
 

@@ -37,7 +37,7 @@ def quasi_static(model: Model) -> Model:
 
     none = ca.SX(0, 1)
     return replace(
-        model, x=model.x[:own, :], v=none, acceleration=none,
+        model, x=model.x[:own, :], v=none, acceleration=none, mass=ca.SX(0, 0),
         rates_of_heat=of(model.rates_of_heat[:own, :]), sampled_rates=of(model.sampled_rates[:own, :]), balance=of(model.balance),
         signals={name: replace(s, expr=of(s.expr)) for name, s in model.signals.items()},
         limits=tuple(replace(limit, expr=of(limit.expr)) for limit in model.limits),

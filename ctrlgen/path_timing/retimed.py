@@ -29,6 +29,7 @@ def retimed(scenario: Scenario, model: Model, samples: np.ndarray, rate: Quantit
     folder = device.path.parent
     lines = [
         f'title = "{_escaped(title)}"', f'device = "{device.path.name}"', f'follow = "{file.follow}"',
+        *([f'controller = "{file.controller}"'] if file.controller else []),
         f'sample_rate = "{rate.text}"', "", "[path]", 'kind = "poses"', f'file = "{name}.csv"',
         *(["periodic = true"] if closed else []),
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
@@ -86,6 +86,10 @@ class ScenarioFile(Section):
     """The scenario in words, for reports."""
     device: str
     """The device file, relative to this one."""
+    controller: str | None = None
+    """C name of the online controller and of the plant, a C identifier in lower case. Left out: the device's name. Controllers of one
+    device at two rates need two names to be linked into one program.
+    """
     follow: Literal["pose", "displacement"] = "pose"
     """The signal that the path commands: the platform's pose, or the stages' displacements."""
     sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
@@ -109,6 +113,15 @@ class ScenarioFile(Section):
     """Left out: the limits hold for the device as described, and may be broken by one whose numbers differ."""
     expect: tuple[Expectation, ...] = ()
     """`[[expect]]` tables: values that the solution must have."""
+
+    @field_validator("controller")
+    @classmethod
+    def _c_name(cls, name: str | None) -> str | None:
+        if name is not None and not re.fullmatch(r"[a-z][a-z0-9_]*", name, re.ASCII):
+            raise ValueError(
+                f"{name!r} is no C identifier in lower case: begin with a letter, then letters, digits and _, such as fast_hexapod"
+            )
+        return name
 
     @model_validator(mode="after")
     def _robust_feedforward(self) -> ScenarioFile:
@@ -166,6 +179,11 @@ class Scenario:
     device: Device
     inputs: dict[str, Input]
     home: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def controller_name(self) -> str:
+        """What the C that knows no trajectory, online controller and plant, is named after: by default the device."""
+        return self.file.controller or self.device.name
 
     @property
     def digest(self) -> dict[str, str]:
