@@ -20,6 +20,8 @@ from ctrlgen.budget.linear import propagate
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.reporting.budget_section import budget_section
+from ctrlgen.reporting.report import write_report
 from ctrlgen.trajectory.solution import Solution
 
 FILE = SCENARIOS / "circle20" / "uncertainty.toml"
@@ -443,3 +445,37 @@ def test_the_help_shows_the_sections_of_the_file():
     """Square brackets are markup to the library that prints the help."""
     text = ctrlgen("budget", "--help").stdout
     assert all(f"[{name}]" in text for name in ("numbers", "surroundings", "drive"))
+
+
+def test_the_report_of_a_solution_holds_the_budget_to_first_order(circle, tmp_path):
+    """The numbers are those of the budget by itself, whose own are proved above."""
+    section = budget_section(circle)
+    whole = budget_of(circle, load_uncertainties(circle.scenario, circle.model), draws=0)
+    write_report(tmp_path, circle, None, (), None, {}, section)
+    page = " ".join((tmp_path / "report.html").read_text().split())
+    for g in whole.groups:
+        assert f"± {g.shown(whole.factor * whole.peak(g)):.4g} {g.unit} ({g.name})" in page
+    first, hidden = whole.lines[0], whole.lines[-1]
+    assert f"<code>{first.name}</code>" in page and f"{1e9 * first.peak['translation']:.3g}" in page
+    assert f"<code>{hidden.name}</code></td><td class=\"n\">{hidden.sd}" not in page
+    assert "keeps 550 degC with 99.9 %: margin" in page and "<code>ctrlgen budget</code> gives the whole" in page
+    assert section.shown()["sources"]["uncertainty"] in page
+
+
+def test_what_the_budget_cannot_do_is_a_sentence_of_the_report(circle, tmp_path):
+    (tmp_path / "uncertainty.toml").write_text(
+        'title = "t"\n[numbers]\n"actuator.yung" = { sd = "1 %", source = "a" }\n'
+    )
+    moved = replace(circle, scenario=replace(circle.scenario, path=tmp_path / "scenario.toml"))
+    section = budget_section(moved)
+    assert section.budget is None
+    write_report(tmp_path / "out", moved, None, (), None, {}, section)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "The error budget is not drawn up: " in page and "did you mean &#39;actuator.young&#39;" in page
+
+
+def test_a_report_of_what_is_known_exactly_has_no_budget(circle, tmp_path):
+    moved = replace(circle, scenario=replace(circle.scenario, path=tmp_path / "scenario.toml"))
+    assert budget_section(moved) is None
+    write_report(tmp_path / "out", moved, None, (), None, {}, None)
+    assert "Error budget" not in (tmp_path / "out" / "report.html").read_text()
