@@ -28,6 +28,12 @@ def print_budget(budget: ErrorBudget) -> None:
     for g in budget.groups:
         cells += ["", f"{g.shown(budget.peak(g)):.4g}", f"{g.shown(budget.rms(g)):.4g}"]
     table.add_row("combined standard uncertainty", "", "", *cells, "", style="bold")
+    if budget.model_difference is not None:
+        cells = []
+        for g in budget.groups:
+            cells += ["", f"{g.shown(budget.difference_peak(g)):.4g}", f"{g.shown(budget.difference_rms(g)):.4g}"]
+        name = budget.model_difference.finer.model.name
+        table.add_row(f"model difference: {escape(name)}, not combined", "", "", *cells, "")
     show_table(table)
     bands = ", ".join(f"± {g.shown(budget.factor * budget.peak(g)):.4g} {g.unit} ({g.name})" for g in budget.groups)
     out.print(f"95 % band where it is widest: {bands}", markup=False, soft_wrap=True)
