@@ -22,6 +22,8 @@ from ctrlgen.budget.linear import propagate
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.firmware.compression import compress
+from ctrlgen.firmware.real import Real
 from ctrlgen.reporting.budget_section import budget_section
 from ctrlgen.reporting.report import write_report
 from ctrlgen.trajectory.solution import Solution
@@ -161,6 +163,25 @@ def test_draws_and_first_order_agree(budget):
     assert len(budget.agreements) == 2 and all(a.passed for a in budget.agreements) and budget.reasons == ()
     for a in budget.agreements:
         assert a.drawn == pytest.approx(a.linear, rel=0.1) and 0 < a.difference < 0.1
+
+
+def test_replayed_drives_are_within_what_is_counted_for_the_player(circle, tmp_path):
+    """The drives that the player's C computes, simulated for two laps; and draws that are uniform within the tolerance."""
+    given = stated(circle, "[drive]\nplayer = true", tmp_path)
+    found = budget_of(circle, given, draws=2000)
+    (line,) = found.lines
+    played = compress(circle)[Real.FLOAT].drives(np.arange(len(circle.drive)))
+    deviation = driven(circle, {}, played)
+    off = {g.name: np.abs(deviation[:, g.channels]) for g in found.groups}
+    tolerances = {"translation": 1e-10, "rotation": 1e-8}  # docs/player.md
+    for name, a in tolerances.items():
+        assert line.sensitivity[name] == pytest.approx(a) and line.peak[name] == pytest.approx(a / 3**0.5)
+        assert 0 < off[name].max() < a
+        assert np.sqrt(np.mean(off[name] ** 2, axis=0)).max() < line.rms[name]  # a bound
+    assert off["translation"].max() > 0.01 * tolerances["translation"]  # the tables are no better than they must be
+    drawn = found.drawn.pose[:, :, TRANSLATIONS]
+    assert np.abs(drawn).max() < 1.001e-10 + 1e-12 and drawn.std() == pytest.approx(1e-10 / 3**0.5, rel=0.01)
+    assert all(s.sd == 0 for s in found.safeties)
 
 
 def test_a_draw_is_a_simulated_device(circle, budget):
@@ -450,8 +471,13 @@ def test_the_command_states_the_difference_to_a_finer_model(tmp_path):
     assert faults(record, "budget") == [] and "finer" in record["inputs"]
     entry = record["model_difference"]
     z = np.array(entry["deviation"]["delta_z [nm]"])
-    assert entry["kind"] == "model difference" and len(z) == record["samples"] and z.min() > 0  # hotter: it pushes farther
-    assert entry["effects"][0]["peak"] >= z.max() and "stands beside the band" in (tmp_path / "b" / "budget.html").read_text()
+    assert (
+        entry["kind"] == "model difference" and len(z) == record["samples"] and z.min() > 0
+    )  # hotter: it pushes farther
+    assert (
+        entry["effects"][0]["peak"] >= z.max()
+        and "stands beside the band" in (tmp_path / "b" / "budget.html").read_text()
+    )
     other = ctrlgen("budget", SCENARIOS / "circle20", "--finer", SCENARIOS / "devices" / "flexure_axis.toml")
     assert other.returncode == 1 and "describe the same device" in " ".join(other.stderr.split())
 
@@ -477,7 +503,7 @@ def test_the_report_of_a_solution_holds_the_budget_to_first_order(circle, tmp_pa
         assert f"± {g.shown(whole.factor * whole.peak(g)):.4g} {g.unit} ({g.name})" in page
     first, hidden = whole.lines[0], whole.lines[-1]
     assert f"<code>{first.name}</code>" in page and f"{1e9 * first.peak['translation']:.3g}" in page
-    assert f"<code>{hidden.name}</code></td><td class=\"n\">{hidden.sd}" not in page
+    assert f'<code>{hidden.name}</code></td><td class="n">{hidden.sd}' not in page
     assert "keeps 550 degC with 99.9 %: margin" in page and "<code>ctrlgen budget</code> gives the whole" in page
     assert section.shown()["sources"]["uncertainty"] in page
 
@@ -523,7 +549,9 @@ def test_a_finer_model_of_one_other_number_differs_by_its_sensitivity(circle, tm
         off = np.abs(found.model_difference.deviation - expected)[:, g.channels].max()
         assert off < 0.01 * largest, g.name  # the second order of a step of one per cent
         assert found.difference_peak(g) == pytest.approx(largest, rel=0.01)
-        assert found.difference_rms(g) == pytest.approx(np.sqrt(np.mean(expected[:, g.channels] ** 2, axis=0)).max(), rel=0.01)
+        assert found.difference_rms(g) == pytest.approx(
+            np.sqrt(np.mean(expected[:, g.channels] ** 2, axis=0)).max(), rel=0.01
+        )
         assert found.peak(g) == pytest.approx(uncertain.sds[0] / step * largest, rel=1e-9)  # not combined
 
 
@@ -538,7 +566,9 @@ def test_a_finer_model_with_inertia_repeats_on_a_closed_path(tmp_path):
     model = build_model(scenario.device)
     solution = solve(scenario, model)
     assert scenario.closed and model.inertial
-    finer = load_finer(scenario, model, changed(scenario.device, {"mechanics.mass": 1.01 * number(solution, "mechanics.mass")}))
+    finer = load_finer(
+        scenario, model, changed(scenario.device, {"mechanics.mass": 1.01 * number(solution, "mechanics.mass")})
+    )
     found = budget_of(solution, load_uncertainties(scenario, model), draws=0, finer=finer).model_difference.deviation
     n, periods = len(solution.drive), 200  # 10 s: the mode of 100 Hz decays in less than one
     poses = [

@@ -133,9 +133,7 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("report")
-        report.write_report(
-            draft, solution, None, expected, None, plots.draw_all(solution), budget_section(solution)
-        )
+        report.write_report(draft, solution, None, expected, None, plots.draw_all(solution), budget_section(solution))
         return Outcome(solution, None, None, expected)
 
 

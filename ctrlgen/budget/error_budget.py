@@ -367,6 +367,8 @@ def _by_step(path: UncertainPath, linear: Propagated, name: str, own: np.ndarray
     """Text and deviation (n, channels) of one step: of a converter and of arithmetic the path under the rounded drives."""
     if name == "jitter":
         return "1 us", own / path.uncertainties.jitter * JITTER_STEP
+    if name == "player":
+        return "tolerance", own * np.sqrt(3)
     single = path.drive.astype(np.float32).astype(float)
     rounded = path.nominal(path.rounded() if name == "converter" else single)
     pose = path.evaluate("pose", rounded[path.before :], path.drive[path.before :])

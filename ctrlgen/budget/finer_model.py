@@ -8,6 +8,7 @@ corrected, not added to its variance (GUM F.2.4.5).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import read_text
 from ctrlgen.devices import Device, Signal, files_of, load_device
-from ctrlgen.model.discretisation import settling_time
+from ctrlgen.model.discretisation import settling_time, shortest_half_period
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import periodic_start, simulate, trace
 from ctrlgen.trajectory.scenario import Input, Scenario, model_of
@@ -77,16 +78,20 @@ def difference_to(finer: FinerModel, path: UncertainPath, linear: Propagated) ->
     model, scenario = finer.model, path.solution.scenario
     h = SETTLED if scenario.sample_time is None else scenario.sample_time
     drives, before = path.drives_after(FORGOTTEN * settling_time(model))
-    x, z = model.rest.astype(float), None
+    x = model.rest.astype(float)
     x[list(model.clocks)] -= (before + 1) * (0.0 if scenario.sample_time is None else h)
+    # held drives may be given in parts: the steps of a model with inertia are of less than half a period
+    parts = max(1, ceil(h / shortest_half_period(model)))
     try:
+        moved = simulate(model, np.repeat(drives, parts, axis=0), h / parts, x)
         if model.inertial and scenario.closed:  # lightly damped modes settle late
-            drives = drives[-path.n :]
-            start, _ = periodic_start(model, drives, h, np.concatenate([x, 0 * model.z_scale]))
-            x, z = start[: len(x)], start[len(x) :]
-        moved = simulate(model, drives, h, x, z)
+            drives, begin = drives[-path.n :], -parts * path.n - 1
+            held = np.repeat(drives, parts, axis=0)
+            start, _ = periodic_start(model, held, h / parts, np.concatenate([moved.x[begin], moved.z[begin]]))
+            moved = simulate(model, held, h / parts, start[: len(x)], start[len(x) :])
     except SolverError as error:
         raise SolverError(f"the finer model under the drives of {scenario.name}: {error}") from error
-    n = path.n
-    reached = trace(model, moved.time[-n:], moved.x[-n:], moved.z[-n:], drives[-n:]).signals[scenario.file.follow]
+    own = slice(-parts * (path.n - 1) - 1, None, parts)  # the samples of the path
+    states = moved.time[own], moved.x[own], moved.z[own]
+    reached = trace(model, *states, drives[-path.n :]).signals[scenario.file.follow]
     return ModelDifference(finer, reached - linear.nominal["pose"])
