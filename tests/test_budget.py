@@ -381,6 +381,8 @@ def test_every_fault_is_named_at_once(circle, tmp_path):
         ("circle20", '[numbers]\n"actuator.heater_resistance" = { sd = "1 %", source = "a" }', "acts on neither motion nor limits"),
         ("xy_stage_force", '[drive]\njitter = { sd = "1 us", source = "a" }', "row of equilibria"),
         ("mirror_spiral", '[surroundings]\nsd = "1 K"\nsource = "a"', "act on nothing"),
+        ("circle20", "[drive]\nplayer = 3", "drive.player"),
+        ("circle20", "[drive]\nplayer = false", "is not stated of anything"),
         ("circle20", "", "is not stated of anything"),
         ("circle20", '[number]\n"a" = 1', "number: is not a key I know; did you mean 'numbers'?"),
         ("circle20", '[drive]\nconverter = { bits = 3, source = "a" }', "drive.converter.bits"),

@@ -20,10 +20,12 @@ from ctrlgen.core.files import read_text
 from ctrlgen.devices import Device, Signal, files_of, load_device
 from ctrlgen.model.discretisation import settling_time, shortest_half_period
 from ctrlgen.model.model import Model
-from ctrlgen.model.simulation import periodic_start, simulate, trace
+from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.scenario import Input, Scenario, model_of
 
 FORGOTTEN = 2.0  # settling times: it begins at rest, farther off than the deviation is long
+MOST_STEPS = 2_000_000  # of a simulation that fits into memory
+REPEATED = 1e-6  # typical sizes by which a closed path may end elsewhere than it began
 SETTLED = 1e6  # s, of a pose of a row of equilibria: longer than any actuator's memory
 
 
@@ -77,20 +79,24 @@ def difference_to(finer: FinerModel, path: UncertainPath, linear: Propagated) ->
     start. Raises SolverError where the finer model does not move under these drives."""
     model, scenario = finer.model, path.solution.scenario
     h = SETTLED if scenario.sample_time is None else scenario.sample_time
-    drives, before = path.drives_after(FORGOTTEN * settling_time(model))
+    period = path.n * h if scenario.closed else 0.0
+    drives, before = path.drives_after(FORGOTTEN * settling_time(model) + period)
     x = model.rest.astype(float)
     x[list(model.clocks)] -= (before + 1) * (0.0 if scenario.sample_time is None else h)
     # held drives may be given in parts: the steps of a model with inertia are of less than half a period
     parts = max(1, ceil(h / shortest_half_period(model)))
+    if parts * len(drives) > MOST_STEPS:
+        what = f"takes {parts * len(drives)} steps until it has forgotten its start, more than {MOST_STEPS}; give it damping"
+        raise SolverError(f"the finer model under the drives of {scenario.name} {what}, or a scenario of fewer samples")
     try:
         moved = simulate(model, np.repeat(drives, parts, axis=0), h / parts, x)
-        if model.inertial and scenario.closed:  # lightly damped modes settle late
-            drives, begin = drives[-path.n :], -parts * path.n - 1
-            held = np.repeat(drives, parts, axis=0)
-            start, _ = periodic_start(model, held, h / parts, np.concatenate([moved.x[begin], moved.z[begin]]))
-            moved = simulate(model, held, h / parts, start[: len(x)], start[len(x) :])
     except SolverError as error:
         raise SolverError(f"the finer model under the drives of {scenario.name}: {error}") from error
+    if scenario.closed and np.any(np.abs(moved.z[-1] - moved.z[-1 - parts * path.n]) > REPEATED * model.z_scale):
+        what = "does not repeat: it forgets its start too slowly"
+        raise SolverError(
+            f"the finer model under the drives of {scenario.name} {what}; give it damping, or make the path open"
+        )
     own = slice(-parts * (path.n - 1) - 1, None, parts)  # the samples of the path
     states = moved.time[own], moved.x[own], moved.z[own]
     reached = trace(model, *states, drives[-path.n :]).signals[scenario.file.follow]
