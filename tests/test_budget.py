@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -15,11 +16,16 @@ from result_files import faults
 
 from ctrlgen import InputError, SolverError, build_model, error_budget, load_scenario, simulate, solve
 from ctrlgen.budget.error_budget import agreement, budget_of
+from ctrlgen.budget.finer_model import load_finer
 from ctrlgen.budget.limits import margins, slopes_of_limits
 from ctrlgen.budget.linear import propagate
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.firmware.compression import compress
+from ctrlgen.firmware.real import Real
+from ctrlgen.reporting.budget_section import budget_section
+from ctrlgen.reporting.report import write_report
 from ctrlgen.trajectory.solution import Solution
 
 FILE = SCENARIOS / "circle20" / "uncertainty.toml"
@@ -157,6 +163,25 @@ def test_draws_and_first_order_agree(budget):
     assert len(budget.agreements) == 2 and all(a.passed for a in budget.agreements) and budget.reasons == ()
     for a in budget.agreements:
         assert a.drawn == pytest.approx(a.linear, rel=0.1) and 0 < a.difference < 0.1
+
+
+def test_replayed_drives_are_within_what_is_counted_for_the_player(circle, tmp_path):
+    """The drives that the player's C computes, simulated for two laps; and draws that are uniform within the tolerance."""
+    given = stated(circle, "[drive]\nplayer = true", tmp_path)
+    found = budget_of(circle, given, draws=2000)
+    (line,) = found.lines
+    played = compress(circle)[Real.FLOAT].drives(np.arange(len(circle.drive)))
+    deviation = driven(circle, {}, played)
+    off = {g.name: np.abs(deviation[:, g.channels]) for g in found.groups}
+    tolerances = {"translation": 1e-10, "rotation": 1e-8}  # docs/player.md
+    for name, a in tolerances.items():
+        assert line.sensitivity[name] == pytest.approx(a) and line.peak[name] == pytest.approx(a / 3**0.5)
+        assert 0 < off[name].max() < a
+        assert np.sqrt(np.mean(off[name] ** 2, axis=0)).max() < line.rms[name]  # a bound
+    assert off["translation"].max() > 0.01 * tolerances["translation"]  # the tables are no better than they must be
+    drawn = found.drawn.pose[:, :, TRANSLATIONS]
+    assert np.abs(drawn).max() < 1.001e-10 + 1e-12 and drawn.std() == pytest.approx(1e-10 / 3**0.5, rel=0.01)
+    assert all(s.sd == 0 for s in found.safeties)
 
 
 def test_a_draw_is_a_simulated_device(circle, budget):
@@ -356,6 +381,8 @@ def test_every_fault_is_named_at_once(circle, tmp_path):
         ("circle20", '[numbers]\n"actuator.heater_resistance" = { sd = "1 %", source = "a" }', "acts on neither motion nor limits"),
         ("xy_stage_force", '[drive]\njitter = { sd = "1 us", source = "a" }', "row of equilibria"),
         ("mirror_spiral", '[surroundings]\nsd = "1 K"\nsource = "a"', "act on nothing"),
+        ("circle20", "[drive]\nplayer = 3", "drive.player"),
+        ("circle20", "[drive]\nplayer = false", "is not stated of anything"),
         ("circle20", "", "is not stated of anything"),
         ("circle20", '[number]\n"a" = 1', "number: is not a key I know; did you mean 'numbers'?"),
         ("circle20", '[drive]\nconverter = { bits = 3, source = "a" }', "drive.converter.bits"),
@@ -434,6 +461,29 @@ def test_the_command_leaves_page_record_and_figures(tmp_path):
     assert again.returncode == 0 and json.loads((tmp_path / "c" / "budget.json").read_text()) == record
 
 
+def test_the_command_states_the_difference_to_a_finer_model(tmp_path):
+    text = (SCENARIOS / "devices" / "mems_hexapod.toml").read_text()
+    (tmp_path / "finer.toml").write_text(text.replace('"550 K/W', '"551 K/W'))
+    done = ctrlgen(
+        "budget", SCENARIOS / "circle20", "--finer", tmp_path / "finer.toml", "--draws", "0", "--out", tmp_path / "b"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "model difference" in done.stdout
+    record = json.loads((tmp_path / "b" / "budget.json").read_text())
+    assert faults(record, "budget") == [] and "finer" in record["inputs"]
+    entry = record["model_difference"]
+    z = np.array(entry["deviation"]["delta_z [nm]"])
+    assert (
+        entry["kind"] == "model difference" and len(z) == record["samples"] and z.min() > 0
+    )  # hotter: it pushes farther
+    assert (
+        entry["effects"][0]["peak"] >= z.max()
+        and "stands beside the band" in (tmp_path / "b" / "budget.html").read_text()
+    )
+    other = ctrlgen("budget", SCENARIOS / "circle20", "--finer", SCENARIOS / "devices" / "flexure_axis.toml")
+    assert other.returncode == 1 and "describe the same device" in " ".join(other.stderr.split())
+
+
 def test_the_command_refuses_what_it_cannot_read(tmp_path):
     assert "is not a probability" in ctrlgen("budget", SCENARIOS / "circle20", "--probability", "often").stderr
     assert "does not exist" in ctrlgen("budget", SCENARIOS / "circle20", "--uncertainty", tmp_path / "none.toml").stderr
@@ -443,3 +493,96 @@ def test_the_help_shows_the_sections_of_the_file():
     """Square brackets are markup to the library that prints the help."""
     text = ctrlgen("budget", "--help").stdout
     assert all(f"[{name}]" in text for name in ("numbers", "surroundings", "drive"))
+
+
+def test_the_report_of_a_solution_holds_the_budget_to_first_order(circle, tmp_path):
+    """The numbers are those of the budget by itself, whose own are proved above."""
+    section = budget_section(circle)
+    whole = budget_of(circle, load_uncertainties(circle.scenario, circle.model), draws=0)
+    write_report(tmp_path, circle, None, (), None, {}, section)
+    page = " ".join((tmp_path / "report.html").read_text().split())
+    for g in whole.groups:
+        assert f"± {g.shown(whole.factor * whole.peak(g)):.4g} {g.unit} ({g.name})" in page
+    first, hidden = whole.lines[0], whole.lines[-1]
+    assert f"<code>{first.name}</code>" in page and f"{1e9 * first.peak['translation']:.3g}" in page
+    assert f'<code>{hidden.name}</code></td><td class="n">{hidden.sd}' not in page
+    assert "keeps 550 degC with 99.9 %: margin" in page and "<code>ctrlgen budget</code> gives the whole" in page
+    assert section.shown()["sources"]["uncertainty"] in page
+
+
+def test_what_the_budget_cannot_do_is_a_sentence_of_the_report(circle, tmp_path):
+    (tmp_path / "uncertainty.toml").write_text(
+        'title = "t"\n[numbers]\n"actuator.yung" = { sd = "1 %", source = "a" }\n'
+    )
+    moved = replace(circle, scenario=replace(circle.scenario, path=tmp_path / "scenario.toml"))
+    section = budget_section(moved)
+    assert section.budget is None
+    write_report(tmp_path / "out", moved, None, (), None, {}, section)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "The error budget is not drawn up: " in page and "did you mean &#39;actuator.young&#39;" in page
+
+
+def test_a_report_of_what_is_known_exactly_has_no_budget(circle, tmp_path):
+    moved = replace(circle, scenario=replace(circle.scenario, path=tmp_path / "scenario.toml"))
+    assert budget_section(moved) is None
+    write_report(tmp_path / "out", moved, None, (), None, {}, None)
+    assert "Error budget" not in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    "name, path, share",
+    [("circle20", "actuator.thermal_resistance", 0.01), ("circle20", "actuator.time_constant", 0.01),
+     ("flexure_axis_line", "mechanics.stiffness", 0.001), ("xy_stage_force", "stage.half_stage_stiffness", 0.01)],
+)  # fmt: skip
+def test_a_finer_model_of_one_other_number_differs_by_its_sensitivity(circle, tmp_path, name, path, share):
+    """A closed path, an open one of a stage with inertia, and a row of equilibria; with its sign, sample by sample."""
+    scenario = load_scenario(SCENARIOS / name)
+    model = build_model(scenario.device)
+    solution = circle if name == "circle20" else solve(scenario, model)
+    step = share * number(solution, path)
+    other = load_finer(scenario, model, changed(scenario.device, {path: number(solution, path) + step}))
+    text = f'[numbers]\n"{path}" = {{ sd = "5 %", source = "chosen" }}'
+    (uncertain,) = (line for line in stated(solution, text, tmp_path).lines if line.name == path)
+    alone = Uncertainties((uncertain,), np.eye(1), None, 0.0, False, {}, {}, {})
+    found = budget_of(solution, alone, draws=0, finer=other)
+    expected = step * found.linear.sensitivity["pose"][:, :, 0]
+    for g in found.groups:
+        largest = np.abs(expected[:, g.channels]).max()
+        off = np.abs(found.model_difference.deviation - expected)[:, g.channels].max()
+        assert off < 0.01 * largest, g.name  # the second order of a step of one per cent
+        assert found.difference_peak(g) == pytest.approx(largest, rel=0.01)
+        assert found.difference_rms(g) == pytest.approx(
+            np.sqrt(np.mean(expected[:, g.channels] ** 2, axis=0)).max(), rel=0.01
+        )
+        assert found.peak(g) == pytest.approx(uncertain.sds[0] / step * largest, rel=1e-9)  # not combined
+
+
+def test_a_finer_model_with_inertia_repeats_on_a_closed_path(tmp_path):
+    """The reference is the simulator after so many periods of the held drives that the start is forgotten."""
+    points = ", ".join(f'{{ axis = "{5 * math.sin(2 * math.pi * k / 50)!r} um" }}' for k in range(50))
+    (tmp_path / "scenario.toml").write_text(
+        f'title = "t"\ndevice = "{SCENARIOS / "devices" / "flexure_axis.toml"}"\nsample_rate = "1 kHz"\n'
+        f'[path]\nkind = "poses"\nperiodic = true\npoints = [{points}]\n'
+    )
+    scenario = load_scenario(tmp_path)
+    model = build_model(scenario.device)
+    solution = solve(scenario, model)
+    assert scenario.closed and model.inertial
+    finer = load_finer(
+        scenario, model, changed(scenario.device, {"mechanics.mass": 1.01 * number(solution, "mechanics.mass")})
+    )
+    found = budget_of(solution, load_uncertainties(scenario, model), draws=0, finer=finer).model_difference.deviation
+    n, periods = len(solution.drive), 200  # 10 s: the mode of 100 Hz decays in less than one
+    poses = [
+        simulate(m, np.tile(solution.drive, (periods, 1)), scenario.sample_time).signals["pose"][-n - 1 : -1]
+        for m in (finer.model, model)
+    ]
+    np.testing.assert_allclose(found, poses[0] - poses[1], atol=1e-6 * np.abs(found).max())
+
+
+def test_a_finer_model_of_another_device_is_refused(circle, tmp_path):
+    scenario, model = circle.scenario, circle.model
+    with pytest.raises(InputError) as caught:
+        load_finer(scenario, model, SCENARIOS / "devices" / "flexure_axis.toml")
+    assert [fault.where for fault in caught.value.faults] == ["drive", "pose"]
+    assert "describe the same device" in str(caught.value) and "flexure_axis.toml: 2 faults" in str(caught.value)

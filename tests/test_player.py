@@ -13,9 +13,7 @@ from conftest import DEVICE, SCENARIOS
 from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.firmware import spline
 from ctrlgen.firmware.compression import (
-    ANGLE_TOLERANCE,
     INSTRUCTION_BUDGET,
-    LENGTH_TOLERANCE,
     TOLERANCE_SHARE,
     compress,
     instructions,
@@ -24,6 +22,7 @@ from ctrlgen.firmware.folder import generate
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model.simulation import simulate
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 
 KINDS = ["closed", "raster", "limited", "short", "single", "three drives"]
 

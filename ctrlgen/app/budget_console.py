@@ -28,9 +28,17 @@ def print_budget(budget: ErrorBudget) -> None:
     for g in budget.groups:
         cells += ["", f"{g.shown(budget.peak(g)):.4g}", f"{g.shown(budget.rms(g)):.4g}"]
     table.add_row("combined standard uncertainty", "", "", *cells, "", style="bold")
+    if budget.model_difference is not None:
+        cells = []
+        for g in budget.groups:
+            cells += ["", f"{g.shown(budget.difference_peak(g)):.4g}", f"{g.shown(budget.difference_rms(g)):.4g}"]
+        table.add_row("model difference", "", "", *cells, "")
     show_table(table)
     bands = ", ".join(f"± {g.shown(budget.factor * budget.peak(g)):.4g} {g.unit} ({g.name})" for g in budget.groups)
     out.print(f"95 % band where it is widest: {bands}", markup=False, soft_wrap=True)
+    if budget.model_difference is not None:
+        what = f"model difference: {budget.model_difference.finer.model.name} under the same drives; it is not combined with the band"
+        out.print(what, markup=False, soft_wrap=True)
     for k, line in enumerate([line for line in budget.lines if any(line.peak.values())][:3]):
         halves = ", ".join(
             f"{g.shown(budget.peak(g)):.4g} -> {g.shown(line.halved[g.name]):.4g} {g.unit}" for g in budget.groups

@@ -23,6 +23,7 @@ from ctrlgen.firmware.player_only import check_online, generate_player
 from ctrlgen.firmware.toolchains import find_compilers
 from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting import plots, report
+from ctrlgen.reporting.budget_section import budget_section
 from ctrlgen.reporting.build_page import write_build
 from ctrlgen.reporting.build_record import Build
 from ctrlgen.trajectory.frame import Frame
@@ -89,7 +90,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
         c = generate(solution.scenario, solution.model, draft / "c", solution, drawn)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
         progress("report")
-        report.write_report(draft, solution, comparison, expected, c, drawn)
+        report.write_report(draft, solution, comparison, expected, c, drawn, budget_section(solution))
         return Outcome(solution, c, comparison, expected)
 
 
@@ -131,7 +132,8 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
-        report.write_report(draft, solution, None, expected, None, plots.draw_all(solution))
+        progress("report")
+        report.write_report(draft, solution, None, expected, None, plots.draw_all(solution), budget_section(solution))
         return Outcome(solution, None, None, expected)
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import norm
 
+from ctrlgen.budget.finer_model import FinerModel, ModelDifference, difference_to, load_finer
 from ctrlgen.budget.limits import DrawnLimits, Safety, critical_samples, margins, safeties, slopes_of_limits
 from ctrlgen.budget.linear import Propagated, propagate
 from ctrlgen.budget.monte_carlo import Drawn, draw
@@ -22,6 +23,7 @@ from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import difference, same_dimension
+from ctrlgen.devices import Device
 from ctrlgen.model.model import Signal
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
@@ -97,7 +99,8 @@ class Agreement:
 @dataclass(frozen=True)
 class ErrorBudget:
     """The error budget of a path. `combined` (n, channels) is the standard uncertainty u_c of the followed signal [SI], `lines` come in
-    the order of what to measure or tighten next; `safeties` of the limits at `probability`. Without draws `drawn` is None."""
+    the order of what to measure or tighten next; `safeties` of the limits at `probability`. Without draws `drawn` is None, without a finer
+    model `model_difference`."""
 
     solution: Solution
     uncertainties: Uncertainties
@@ -111,6 +114,7 @@ class ErrorBudget:
     probability: float
     draws: int
     seed: int
+    model_difference: ModelDifference | None = None
 
     @property
     def factor(self) -> float:
@@ -124,6 +128,14 @@ class ErrorBudget:
     def rms(self, group: Group) -> float:
         """Root mean square along the path of the combined standard uncertainty of the channel where it is largest [SI]."""
         return _rms(self.combined[:, group.channels])
+
+    def difference_peak(self, group: Group) -> float:
+        """The largest deviation of the finer model in a channel of a group [SI]; 0 without one."""
+        return 0.0 if self.model_difference is None else _largest(self.model_difference.deviation, group)
+
+    def difference_rms(self, group: Group) -> float:
+        """Root mean square along the path of that deviation, of the channel where it is largest [SI]; 0 without a finer model."""
+        return 0.0 if self.model_difference is None else _rms(self.model_difference.deviation[:, group.channels])
 
     @property
     def broken(self) -> float | None:
@@ -177,13 +189,15 @@ def error_budget(
     probability: float = PROBABILITY,
     draws: int = DRAWS,
     seed: int = 0,
+    finer: Device | Path | str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ErrorBudget:
     """The error budget of a scenario: y(q) of the path under the drives computed for the described device, q what `uncertainty` states
     (a file; by default uncertainty.toml beside the scenario) and the sds of the device file.
 
     u_c^2 = sum_ij dy/dq_i cov(q_i, q_j) dy/dq_j plus what scatters from sample to sample. Limits are judged at `probability` at each
-    sample; 0 `draws` leave the Monte Carlo out. Raises InputError (with all faults), Unreachable, SolverError.
+    sample; 0 `draws` leave the Monte Carlo out. `finer` is another description of the same device, or its file: by how much that moves
+    otherwise under the same drives. Raises InputError (with all faults), Unreachable, SolverError.
     Sources: JCGM 100:2008 section 5; JCGM 101:2008; A. H. Slocum, Precision Machine Design (1992), chapter 2.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
@@ -191,7 +205,8 @@ def error_budget(
     progress("symbolic model")
     model = model_of(scenario)
     stated = load_uncertainties(scenario, model, uncertainty)
-    return budget_of(solve(scenario, model, progress), stated, probability, draws, seed, progress)
+    other = None if finer is None else load_finer(scenario, model, finer)
+    return budget_of(solve(scenario, model, progress), stated, probability, draws, seed, other, progress)
 
 
 def _check(probability: float, draws: int) -> None:
@@ -211,12 +226,17 @@ def budget_of(
     probability: float = PROBABILITY,
     draws: int = DRAWS,
     seed: int = 0,
+    finer: FinerModel | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ErrorBudget:
     """The error budget of a path that is solved already; as `error_budget`."""
     progress("sensitivities along the path")
     path = UncertainPath(solution, stated)
     linear = _propagated(path)
+    other = None
+    if finer is not None:
+        progress("finer model")
+        other = difference_to(finer, path, linear)
     combined = linear.combined("pose", stated)
     groups = groups_of(path.signal)
     slopes = slopes_of_limits(path, linear)
@@ -234,7 +254,7 @@ def budget_of(
     lines = _lines(path, linear, combined, groups, drawn)
     agreements = () if drawn is None else tuple(agreement(g, combined, drawn, path) for g in groups)
     return ErrorBudget(
-        solution, stated, groups, lines, combined, linear, drawn, agreements, rows, probability, draws, seed
+        solution, stated, groups, lines, combined, linear, drawn, agreements, rows, probability, draws, seed, other
     )
 
 
@@ -347,6 +367,8 @@ def _by_step(path: UncertainPath, linear: Propagated, name: str, own: np.ndarray
     """Text and deviation (n, channels) of one step: of a converter and of arithmetic the path under the rounded drives."""
     if name == "jitter":
         return "1 us", own / path.uncertainties.jitter * JITTER_STEP
+    if name == "player":
+        return "tolerance", own * np.sqrt(3)
     single = path.drive.astype(np.float32).astype(float)
     rounded = path.nominal(path.rounded() if name == "converter" else single)
     pose = path.evaluate("pose", rounded[path.before :], path.drive[path.before :])

@@ -17,6 +17,7 @@ import numpy as np
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties
 from ctrlgen.numerics.batched_evaluation import evaluate
+from ctrlgen.trajectory.playback import playback_tolerance
 
 BLOCK = 500  # samples whose Jacobians are kept at once
 SIGNIFICAND = 24  # bits of a number in single precision
@@ -51,6 +52,9 @@ def propagate(path: UncertainPath) -> Propagated:
     nominal = {name: path.evaluate(name, S[before:], path.drive[before:]) for name in ("pose", "limits")}
     sensitivity = {name: np.zeros((n, y.shape[1], len(columns))) for name, y in nominal.items()}
     variance = {name: {of: np.zeros(y.shape) for of in scatters} for name, y in nominal.items()}
+    if path.uncertainties.player:
+        for name, sd in (("pose", player_deviation(path)), ("limits", np.zeros(1))):
+            variance[name]["player"] = np.zeros(nominal[name].shape) + sd**2
     X, P = np.zeros((n_s, len(columns))), {of: np.zeros((n_s, n_s)) for of in scatters}
     outputs = {name: _slopes(path, name) for name, y in nominal.items() if y.shape[1]}
     for a, b, (A, B, F_q) in _along(path, _slopes(path, "step"), np.vstack([path.start, S[:-1]])):
@@ -73,8 +77,14 @@ def propagate(path: UncertainPath) -> Propagated:
     return Propagated(nominal, sensitivity, scatter, S)
 
 
+def player_deviation(path: UncertainPath) -> np.ndarray:
+    """(n_y,) [SI] standard deviation a/sqrt(3) of the followed signal under drives from tables of the tolerance a (GUM 4.3.7): a bound,
+    for the tables are judged by their largest error."""
+    return playback_tolerance(path.signal.units) / np.sqrt(3)
+
+
 def scattering(path: UncertainPath) -> list[str]:
-    """What is stated to scatter from sample to sample."""
+    """What is stated to scatter from sample to sample of the drives."""
     stated = path.uncertainties
     present = {"converter": stated.bits is not None, "jitter": stated.jitter > 0, "arithmetic": stated.single}
     return [name for name, given in present.items() if given]

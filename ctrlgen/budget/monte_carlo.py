@@ -13,7 +13,7 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
-from ctrlgen.budget.linear import Propagated, drive_deviations
+from ctrlgen.budget.linear import Propagated, drive_deviations, player_deviation
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.numerics.batched_evaluation import evaluate
 from ctrlgen.numerics.compiled import Compilable
@@ -83,7 +83,7 @@ def draw(
         S = step(S, drive)
         sample = k - path.before
         if sample in place:
-            found[:, place[sample]] = outputs["pose"](S, drive) - pose[sample]
+            found[:, place[sample]] = outputs["pose"](S, drive) - pose[sample] + scatter.replayed()
         here = critical == sample
         if sample >= 0 and (np.any(here) or limited.near(sample).any()):
             values = outputs["limits"](S, drive)
@@ -131,6 +131,7 @@ class _Scatter:
         zero = np.zeros(path.drive.shape)
         self.rounding = np.sqrt(3 * sum((sd**2 for sd, together in given if not together), zero))
         self.late = sum((sd for sd, together in given if together), zero)
+        self.tolerance = np.sqrt(3) * player_deviation(path) if stated.player else None
         self.rng, self.shape, self.still = rng, (draws, path.drive.shape[1]), still
 
     def at(self, k: int) -> np.ndarray:
@@ -140,6 +141,14 @@ class _Scatter:
             error[: self.shape[0]] += (2 * self.rng.random(self.shape, dtype=np.float32) - 1) * self.rounding[k]
         if self.late[k].any():
             error[: self.shape[0]] += self.rng.standard_normal((self.shape[0], 1)) * self.late[k]
+        return error
+
+    def replayed(self) -> np.ndarray | float:
+        """(draws + still, n_y) errors of the followed signal that the player's tables leave: uniform within their tolerance."""
+        if self.tolerance is None:
+            return 0.0
+        error = np.zeros((self.shape[0] + self.still, len(self.tolerance)))
+        error[: self.shape[0]] = (2 * self.rng.random((self.shape[0], len(self.tolerance))) - 1) * self.tolerance
         return error
 
 

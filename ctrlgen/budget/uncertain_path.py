@@ -114,15 +114,18 @@ class UncertainPath:
         return [(limit, slice(end - limit.expr.numel(), end)) for limit, end in zip(self.limits, ends, strict=True)]
 
     def _drives(self) -> tuple[np.ndarray, int]:
-        """v (before + n, n_u), and how many of them stand before the path.
+        """The path's drives v (before + n, n_u), and how many of them stand before the path."""
+        return self.drives_after(settling_time(self.solution.model))
+
+    def drives_after(self, settling: float) -> tuple[np.ndarray, int]:
+        """v (before + n, n_u) for a device that takes `settling` [s] to forget, and how many of them stand before the path.
 
         A closed path has been run for long enough to repeat; an open one begins at rest, held by the drive that holds its start.
         """
         u, scenario = self.solution.drive, self.solution.scenario
         if scenario.sample_time is None:
             return np.vstack([u[:1], u]), LEAST_BEFORE
-        settled = ceil(settling_time(self.solution.model) / scenario.sample_time)
-        before = min(max(settled, LEAST_BEFORE), MOST_BEFORE)
+        before = min(max(ceil(settling / scenario.sample_time), LEAST_BEFORE), MOST_BEFORE)
         if scenario.closed:
             return u[np.arange(-before - 1, self.n - 1) % self.n], before
         held = holding_drive(self.solution)

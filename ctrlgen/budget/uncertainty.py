@@ -17,10 +17,12 @@ from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.units import Quantity, parse, same_dimension, to_si, written_unit
 from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE, playback_tolerance
 from ctrlgen.trajectory.scenario import Input, Scenario
 
 FILE = "uncertainty.toml"
 AMBIENT = ".ambient"  # how the path of a temperature to which heaters cool ends
+PLAYER = f"{1e9 * LENGTH_TOLERANCE / 3**0.5:.3g} nm, {1e9 * ANGLE_TOLERANCE / 3**0.5:.3g} nrad"
 FROM_DEVICE = "sd in the device file"
 EXAMPLE = """[numbers]
 "actuator.thermal_resistance" = { sd = "5 %", source = "spread of five specimens" }"""
@@ -58,6 +60,9 @@ class DriveChain(Section):
     """By how much the moments at which the drives change scatter, independent from sample to sample; for all channels the same."""
     arithmetic: Literal["double", "float"] = "double"
     """In which the drives are computed; `float` rounds each of them to 24 bits."""
+    player: bool = False
+    """Whether the drives are replayed from the player's tables, which may move the followed signal by 0.1 nm and 1e-8 rad; left out:
+    they are as solved."""
 
 
 class Correlation(Section):
@@ -111,7 +116,8 @@ class Uncertain:
 @dataclass(frozen=True)
 class Uncertainties:
     """What is uncertain: `lines` with `correlation` (m, m), m the paths of all lines in their order, and the drive's own: steps of
-    the converter `lsb` (n_u,) [SI] or None, `jitter` [s], whether `single` precision; `texts` and `sources` of those three."""
+    the converter `lsb` (n_u,) [SI] or None, `jitter` [s], whether `single` precision, whether from the `player`; `texts` and `sources`
+    of those four."""
 
     lines: tuple[Uncertain, ...]
     correlation: np.ndarray
@@ -121,6 +127,7 @@ class Uncertainties:
     texts: dict[str, str]
     sources: dict[str, str]
     inputs: dict[str, Input]
+    player: bool = False
 
     @property
     def sds(self) -> np.ndarray:
@@ -146,18 +153,22 @@ def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None
     if read.faults:
         raise InputError(found or scenario.path, read.faults)
     drive = file.drive or DriveChain()
-    if not read.lines and drive.converter is None and drive.jitter is None and drive.arithmetic == "double":
+    if not (read.lines or drive.converter or drive.jitter or drive.arithmetic == "float" or drive.player):
         what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{EXAMPLE}"
         raise InputError(found or scenario.path, [Fault("uncertainty", what)])
     correlation = read.correlation(found or scenario.path)
-    texts, sources = {"arithmetic": "float"}, {"arithmetic": "IEEE 754, round to nearest"}
+    texts = {"arithmetic": "float", "player": PLAYER}
+    sources = {
+        "arithmetic": "IEEE 754, round to nearest",
+        "player": "tolerance of the player's tables, uniform within it",
+    }
     if drive.converter is not None:
         texts["converter"], sources["converter"] = f"{drive.converter.bits} bit", drive.converter.source
     if drive.jitter is not None:
         texts["jitter"], sources["jitter"] = drive.jitter.sd, drive.jitter.source
     return Uncertainties(
         tuple(read.lines), correlation, None if drive.converter is None else drive.converter.bits, read.jitter,
-        drive.arithmetic == "float", texts, sources, inputs,
+        drive.arithmetic == "float", texts, sources, inputs, drive.player,
     )  # fmt: skip
 
 
@@ -272,6 +283,9 @@ class _Reader:
         if self.drive.jitter is not None and scenario.sample_time is None:
             what = "is of a motion in time, but the scenario is a row of equilibria; leave it out"
             self.faults.append(Fault("drive.jitter", what))
+        if self.drive.player and not playback_tolerance(model.signals[scenario.file.follow].units).any():
+            what = "acts on nothing that it judges: the followed signal has neither lengths nor angles; leave it out"
+            self.faults.append(Fault("drive.player", what))
         heated = model.n_states > 0 and any(path.endswith(AMBIENT) for path in self.numbers)
         if (
             self.file.surroundings is not None

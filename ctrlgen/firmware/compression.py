@@ -18,9 +18,9 @@ from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.spline import Spline, fit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ctrlgen.trajectory.solution import Solution
 
-LENGTH_TOLERANCE, ANGLE_TOLERANCE = 1e-10, 1e-8  # m, rad: error of the followed signal that compression may cause
 TOLERANCE_SHARE = 0.8  # of the tolerances; the rest is left to compilers that fuse a product and a sum
 INSTRUCTION_BUDGET = 150  # of one sample, Cortex-M4F
 SEARCH_INSTRUCTIONS = 22  # of one sample, to find the piece of a cubic

@@ -211,11 +211,22 @@ def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) ->
 def settling_time(model: Model) -> float:
     """How long [s] actuators and stage keep moving after a change of drive, to a millionth of the change; by the slopes near
     rest. 0 where nothing lags."""
+    A = _slopes_near_rest(model)
+    decay = np.abs(np.linalg.eigvals(A).real) if model.inertial else np.abs(np.diag(A)[: model.n_states])
+    decay = decay[decay > SLOWEST_RATE]
+    return float(SETTLING_TIME_CONSTANTS / decay.min()) if decay.size else 0.0
+
+
+def shortest_half_period(model: Model) -> float:
+    """Half a period [s] of the fastest mode of a model with inertia, by the slopes near rest; infinite where nothing oscillates."""
+    fastest = float(np.abs(np.linalg.eigvals(_slopes_near_rest(model)).imag).max(initial=0.0))
+    return np.pi / fastest if model.inertial and fastest else np.inf
+
+
+def _slopes_near_rest(model: Model) -> np.ndarray:
+    """Derivatives of the rates by the states; of a stage with inertia by its displacement too."""
     rates, state = model.rates, model.x
     if model.inertial:
         rates, state = ca.vertcat(model.rates, model.v), ca.vertcat(model.x, model.z)
     slope = ca.Function("A", [model.x, model.z, model.u, model.p, model.ambient_symbol], [ca.jacobian(rates, state)])
-    A = slope(model.rest, NEAR_HOME * model.z_scale, 0, model.p_nominal, 0).full()
-    decay = np.abs(np.linalg.eigvals(A).real) if model.inertial else np.abs(np.diag(A)[: model.n_states])
-    decay = decay[decay > SLOWEST_RATE]
-    return float(SETTLING_TIME_CONSTANTS / decay.min()) if decay.size else 0.0
+    return np.asarray(slope(model.rest, NEAR_HOME * model.z_scale, 0, model.p_nominal, 0).full())

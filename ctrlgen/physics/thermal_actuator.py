@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -9,6 +11,9 @@ import casadi as ca
 from ctrlgen.physics.flexure import blade_compliance
 from ctrlgen.physics.screw import Matrix, Scalar, inverse, move, parallel, rotation_z
 
+STIFFENING = (
+    "beams", "beam_gap", "bar_width", "bar_half_height", "beam_length", "beam_width", "thickness", "beam_angle", "young", "poisson",
+)  # fmt: skip
 ZERO_CELSIUS = 273.15  # K; S1 Table 1 gives alpha as a function of degrees Celsius
 
 
@@ -47,6 +52,18 @@ def stiffness(a: Any) -> Matrix:
 
     Entries (1, 4), (2, 5) and (3, 6) are those of the paper; its moment entries do not follow from its beam spacing.
     """
+    own = {name: getattr(a, name) for name in STIFFENING}
+    if all(isinstance(value, float) for value in own.values()):
+        return ca.DM(_stiffness_of(**own))  # a model asks for it several times, and a budget for many models
+    return _stiffness(a)
+
+
+@lru_cache(maxsize=16)
+def _stiffness_of(**numbers: float) -> Matrix:
+    return _stiffness(SimpleNamespace(**numbers))
+
+
+def _stiffness(a: Any) -> Matrix:
     K = beam_stiffness(a)
     pitch = a.beam_gap + a.bar_width / 2
     sides = ((ca.pi / 2 + a.beam_angle, -1), (3 * ca.pi / 2 - a.beam_angle, 1))

@@ -42,7 +42,8 @@ def budget_record(budget: ErrorBudget) -> dict[str, Any]:
     solution = budget.solution
     scenario, stated = solution.scenario, budget.uncertainties
     signal = solution.model.signals[scenario.file.follow]
-    inputs = {**scenario.digest, **{name: read.sha256 for name, read in stated.inputs.items()}}
+    finer = {} if budget.model_difference is None else budget.model_difference.finer.inputs
+    inputs = {**scenario.digest, **{name: read.sha256 for name, read in (*stated.inputs.items(), *finer.items())}}
     return {
         **origin(inputs, budget.seed if budget.draws else None, budget.notes),
         "scenario": scenario.name, "title": scenario.file.title, "device": solution.model.name, "signal": scenario.file.follow,
@@ -56,7 +57,7 @@ def budget_record(budget: ErrorBudget) -> dict[str, Any]:
             for g in budget.groups
         ],
         "contributors": [_contributor(budget, line, k) for k, line in enumerate(budget.lines, 1)],
-        "draws": budget.draws,
+        "model_difference": _model_difference(budget), "draws": budget.draws,
         "agreement": [
             {
                 "group": a.group.name, "linear": a.group.shown(a.linear), "drawn": a.group.shown(a.drawn), "difference": a.difference,
@@ -87,6 +88,25 @@ def _contributor(budget: ErrorBudget, line: BudgetLine, rank: int) -> dict[str, 
     return {
         "rank": rank, "name": line.name, "sd": line.sd, "source": line.source, "per": line.per, "share": line.share,
         "effects": effects,
+    }  # fmt: skip
+
+
+def _model_difference(budget: ErrorBudget) -> dict[str, Any] | None:
+    """How the finer model moves; None without one."""
+    if budget.model_difference is None:
+        return None
+    signal = budget.solution.model.signals[budget.solution.scenario.file.follow]
+    deviation = budget.model_difference.deviation
+    return {
+        "kind": "model difference", "device": budget.model_difference.finer.model.name,
+        "effects": [
+            {"group": g.name, "peak": g.shown(budget.difference_peak(g)), "rms": g.shown(budget.difference_rms(g))}
+            for g in budget.groups
+        ],
+        "deviation": {
+            f"{signal.channels[i]} [{g.unit}]": difference(deviation[:, i], g.unit).tolist()
+            for g in budget.groups for i in g.channels
+        },
     }  # fmt: skip
 
 

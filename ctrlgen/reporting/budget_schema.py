@@ -51,6 +51,25 @@ class ContributorEntry(Keys):
     effects: list[ByGroup] = Field(description="One entry a group.")
 
 
+class DifferenceByGroup(Keys):
+    """How far a finer model moves from the described one in one group, in the unit of the group."""
+
+    group: str = Field(description="Name of the group.")
+    peak: float = Field(description="Largest deviation of a channel along the path, without its sign.")
+    rms: float = Field(description="Root mean square along the path, of the channel with the largest.")
+
+
+class ModelDifferenceEntry(Keys):
+    """The same drives on a finer model of the device: known with its sign, and not combined with what is uncertain."""
+
+    kind: Literal["model difference"] = Field(description="Sets it apart from the contributors.")
+    device: str = Field(description="Name of the finer model.")
+    effects: list[DifferenceByGroup] = Field(description="One entry a group.")
+    deviation: dict[str, list[float]] = Field(
+        description="Finer model minus described one at every sample, signed, by 'channel [unit]', in the unit of its group."
+    )
+
+
 class AgreementEntry(Keys):
     """First order (GUM) against Monte Carlo on the nonlinear model (GUM supplement 1), for one group."""
 
@@ -99,6 +118,7 @@ class BudgetRecord(Origin):
     coverage_factor: float = Field(description="k of the 95 % band.")
     groups: list[GroupEntry] = Field(description="Translations, rotations, channels of other units.")
     contributors: list[ContributorEntry] = Field(description="In the order of what to measure or tighten next.")
+    model_difference: ModelDifferenceEntry | None = Field(description="Of a finer model; null where none is given.")
     draws: int = Field(description="Draws of the Monte Carlo; 0 where it was left out.")
     agreement: list[AgreementEntry] = Field(description="One entry a group; empty without draws.")
     reasons: list[str] = Field(description="Why first order and draws differ; empty where they agree.")

@@ -7,15 +7,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.core.units import same_dimension
-from ctrlgen.firmware import compression
 from ctrlgen.reporting.build_record import BUDGET_CORE, BUDGETS, Build
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.trajectory import playback
 from ctrlgen.verification import comparison
 from ctrlgen.verification.in_loop import TargetRun
 
 SHOWN = {
-    "um": ("nm", comparison.LENGTH_LIMIT, compression.LENGTH_TOLERANCE),
-    "rad": ("nrad", comparison.ANGLE_LIMIT, compression.ANGLE_TOLERANCE),
+    "um": ("nm", comparison.LENGTH_LIMIT, playback.LENGTH_TOLERANCE),
+    "rad": ("nrad", comparison.ANGLE_LIMIT, playback.ANGLE_TOLERANCE),
 }
 SCALES = {"nm": 1e9, "nrad": 1e9}
 DECADES = 18  # that the logarithmic axis shows at most: down to the roundings of a double

@@ -15,6 +15,7 @@ from ctrlgen.core.files import write_text
 from ctrlgen.core.units import difference, from_si, show
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.reporting.budget_section import BudgetSection
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.result_schemas import origin
 from ctrlgen.trajectory.metrics import ExpectationResult, in_unit
@@ -157,10 +158,11 @@ def write_report(
     expected: tuple[ExpectationResult, ...],
     c: CFolder | None,
     figures: dict[str, str],
+    budget: BudgetSection | None = None,
 ) -> None:
     """Writes what a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html.
 
-    `figures`: name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives.
+    `figures`: name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives; `budget` as `budget_section` gives.
     """
     result = summary(solution, comparison, expected, c)
     write_text(out / "summary.json", json.dumps(result, indent=1) + "\n")
@@ -169,7 +171,7 @@ def write_report(
         write_text(out / "figures" / f"{name}.svg", text)
     page = render(
         "report.html.j2", s=result, figures=figures, rows=worst_rows(comparison) if comparison else [], source=solution.model.device.source,
-        device_title=solution.model.device.title,
+        device_title=solution.model.device.title, budget=None if budget is None else budget.shown(),
         sourced=[(path, q.text, q.source or "") for path, q in solution.model.device.quantities()],
     )  # fmt: skip
     write_text(out / "report.html", page)

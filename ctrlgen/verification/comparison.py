@@ -18,7 +18,6 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import from_si, same_dimension
-from ctrlgen.firmware import compression as compressed
 from ctrlgen.firmware.compression import Compression
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.firmware.real import Real
@@ -28,6 +27,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.numerics.newton import newton_solver
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.host import build_host, run_host
 from ctrlgen.verification.reference import ReferenceAnswers
@@ -208,7 +208,7 @@ def _rows(
         angle, length = (
             (max(ANGLE_LIMIT[real], ref.held_error), max(LENGTH_LIMIT[real], ref.held_error))
             if what == "online C"
-            else (compressed.ANGLE_TOLERANCE, compressed.LENGTH_TOLERANCE)
+            else (ANGLE_TOLERANCE, LENGTH_TOLERANCE)
         )
         for unit, limit in (("rad", angle), ("um", length)):
             channels = [i for i, u in enumerate(m.signals[role].units) if same_dimension(u, unit)]

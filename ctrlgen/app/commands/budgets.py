@@ -35,6 +35,14 @@ def budget(
     probability: Annotated[str, typer.Option(help='At which limits are judged, as "99.9 %" or 0.999.')] = "99.9 %",
     draws: Annotated[int, typer.Option(min=0, metavar="N", help="Monte Carlo draws; 0 leaves it out.")] = DRAWS,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draws.")] = 0,
+    finer: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DEVICE",
+            help="A finer description of the same device: how differently it moves under the same drives.",
+            show_default=False,
+        ),
+    ] = None,
     device: OtherDevice = None,
 ) -> None:
     """Draw up what everything uncertain does to the pose along a path, in nm and urad, and to the limits.
@@ -59,6 +67,9 @@ def budget(
 
     A number that has an sd in the device file, as a diagnosis writes it into device.next.toml, counts too.
 
+    --finer names another description of the device, with the same drives and channels. Its difference along the path is known with its
+    sign; it stands beside the band and is not combined with it.
+
     Example:  ctrlgen budget scenarios/circle20 --out out/budget
     """
     from ctrlgen.budget.error_budget import error_budget
@@ -69,8 +80,8 @@ def budget(
     chance = _probability(probability)
     with progress() as advance:
         found = error_budget(
-            load_scenario(scenario, device), uncertainty, probability=chance, draws=draws, seed=seed, progress=advance
-        )
+            load_scenario(scenario, device), uncertainty, probability=chance, draws=draws, seed=seed, finer=finer, progress=advance
+        )  # fmt: skip
         if out_folder is not None:
             advance("report")
             with whole_folder(out_folder) as draft:
