@@ -114,10 +114,10 @@ def calibrate(
 ) -> None:
     """Fit the constants of one specimen to a short recording of it, for the C that is given them when it starts.
 
-    The numbers that the device file names in \[run_time] are fitted, within their bounds, and no others:
+    The numbers that the device file names in \\[run_time] are fitted, within their bounds, and no others:
 
     \b
-      \[run_time]
+      \\[run_time]
       constants = [
           "actuator.time_constant",
           { number = "actuator.thermal_resistance", low = "450 K/W", high = "650 K/W" },
