@@ -23,7 +23,7 @@ from ctrlgen.devices.sensor import DisplacementSensor, InterferometerSensor
 from ctrlgen.diagnosis import settings
 from ctrlgen.effects import Effect
 from ctrlgen.recordings.schema import RecordingFile
-from ctrlgen.trajectory.scenario import ScenarioFile
+from ctrlgen.trajectory.scenario_file import ScenarioFile
 
 DOCS = ROOT / "docs"
 IN_ORDER = {  # pages that build on files of the pages before them

@@ -83,7 +83,7 @@ def test_an_expectation_of_something_that_does_not_exist_is_refused(circle, name
 def test_an_expectation_that_is_missed_is_reported(circle):
     from dataclasses import replace
 
-    from ctrlgen.trajectory.scenario import Expectation
+    from ctrlgen.trajectory.scenario_file import Expectation
 
     wrong = Expectation(value="force.1X.max", range=("1 N", "2 N"))
     file = circle.scenario.file.model_copy(update={"expect": (wrong,)})

@@ -36,7 +36,8 @@ from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.infeasibility import instead
 from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
 from ctrlgen.trajectory.path_inverse import PathInverse
-from ctrlgen.trajectory.scenario import Robust, Scenario
+from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.scenario_file import Robust
 from ctrlgen.trajectory.solution import Solution, judged_by, unlimited
 
 SCATTER_RISK = 0.1  # of the risk, for what scatters: little of it is gained by more, as z grows with its logarithm

@@ -7,11 +7,12 @@ f(s z) = |s| f(z), as stresses of a linear structure are, f(z) <= sum_k |lambda_
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.model.model import Model
+from ctrlgen.model.model import Limit, Model
 
 NEGLIGIBLE = 1e-6  # of a limit: a direction that uses less of it over the whole range is left out of the bound
 
@@ -34,3 +35,11 @@ def composite_bound(model: Model, follow: str, ratios: Callable[[np.ndarray], np
     return ca.Function(
         "composite_bound", [wanted], [bound + shares[~few].sum() + NEGLIGIBLE], ["wanted"], ["bound"], {"cse": True}
     )
+
+
+def worst_in_range(model: Model, limit: Limit) -> float:
+    """The largest ratio of a convex limit's value to its bound over the displacement range, which is at a corner of it."""
+    corners = np.array(list(product(*zip(*model.z_bounds, strict=True)))).T
+    count = corners.shape[1]
+    shares = ca.Function("shares", [model.x, model.z], [limit.expr / limit.upper]).map(count)
+    return float(np.max(shares(np.tile(model.rest[:, None], (1, count)), corners).full()))

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model
-from ctrlgen.model.composite_bound import composite_bound
+from ctrlgen.model.composite_bound import composite_bound, worst_in_range
 from ctrlgen.model.controller_step import ControllerStatus, ControllerStep, clamp, row
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
 from ctrlgen.model.lost_state import Groups, is_beyond, plausible_sums
@@ -94,21 +93,14 @@ class Controller:
         """The model with every free parameter at its nominal value."""
         return build_model(self.model.device) if self.model.p.numel() else self.model
 
-    def _worst_in_range(self, limit: Limit) -> float:
-        """The largest ratio of a convex limit's value to its bound over the displacement range, which is at a corner of it."""
-        m = self.nominal
-        corners = np.array(list(product(*zip(*m.z_bounds, strict=True)))).T
-        shares = ca.Function("shares", [m.x, m.z], [limit.expr / limit.upper])
-        return float(
-            np.max(shares.map(corners.shape[1])(np.tile(m.rest[:, None], (1, corners.shape[1])), corners).full())
-        )
-
     @cached_property
     def guarded_limits(self) -> tuple[Limit, ...]:
         """Composite limits that can be broken by displacements inside their range."""
         limits = [limit for limit in self.nominal.composite_limits() if limit.upper is not None]
         x = self.nominal.x
-        return tuple(limit for limit in limits if ca.depends_on(limit.expr, x) or self._worst_in_range(limit) > 1)
+        return tuple(
+            limit for limit in limits if ca.depends_on(limit.expr, x) or worst_in_range(self.nominal, limit) > 1
+        )
 
     @cached_property
     def composite_shares(self) -> ca.Function:

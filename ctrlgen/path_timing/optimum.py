@@ -27,7 +27,7 @@ from ctrlgen.path_timing.speed_bound import landed, largest_speeds, largest_step
 from ctrlgen.path_timing.timing_law import TimingLaw
 from ctrlgen.trajectory.path_inverse import PathInverse
 from ctrlgen.trajectory.paths import smooth_step
-from ctrlgen.trajectory.scenario import MOST_SAMPLES
+from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
 
 NODES = 800  # of all pieces together, at which the speed is bounded
 FEWEST_NODES = 60  # of a piece

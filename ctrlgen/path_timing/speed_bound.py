@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ctrlgen.path_timing.drive_law import BalancedPath
-from ctrlgen.trajectory.scenario import MOST_SAMPLES
+from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
 from ctrlgen.trajectory.violations import NEGLIGIBLE, limited_values
 
 GROWING = 16.0  # by which a speed is enlarged until it breaks a limit

@@ -1,4 +1,4 @@
-"""A scenario: a device, the path it is to follow, at what rate, and the values that are expected."""
+"""A scenario: a device and the path that it is to follow, at what rate."""
 
 from __future__ import annotations
 
@@ -9,17 +9,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Annotated, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import In, Quantity, read_probability, read_quantity, show, written_unit
+from ctrlgen.core.units import Quantity, read_quantity, show, written_unit
 from ctrlgen.devices import Device, files_of, load_device
-from ctrlgen.devices.base import Section
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
@@ -28,128 +25,15 @@ from ctrlgen.model.quasi_static import natural_modes
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.motion import Command, Motion
 from ctrlgen.trajectory.paths import PathKind, Poses
+from ctrlgen.trajectory.scenario_file import MOST_SAMPLES, ScenarioFile
 from ctrlgen.trajectory.shaping import Shaper, Shaping
 from ctrlgen.trajectory.shaping import shaper as make_shaper
 
 FILE = "scenario.toml"
-MOST_SAMPLES = 1_000_000  # of one path: what memory holds
 WHOLE = 1e-6  # of the number of samples, by which rate times duration may be off a whole one: durations are written with six digits
 SMOOTHER = 1  # derivatives more than the drive follows: it then starts without a bend too
 LEAST_CLOSED = 3  # samples of a closed motion: of two, drives that change at each of them show nothing of one between
 RESOLVED = 0.5  # of the largest value of a derivative, by which it may change from one listed sample to the next
-
-
-class Expectation(Section):
-    """One `[[expect]]` table: a value that the solution must have, named as `trajectory.metrics.metric` reads it."""
-
-    value: str
-    """What is expected: SIGNAL.CHANNEL.min, .max, .rms or .abs, SIGNAL.CHANNEL[sample], or margin.LIMIT."""
-    range: tuple[str, str]
-    """Smallest and largest value that pass, with units."""
-    source: str = ""
-    """Where the expected value comes from."""
-
-
-class Robust(Section):
-    """Limits that hold for what is not known exactly: the standard deviations of uncertainty.toml beside the scenario and those of the
-    device file."""
-
-    probability: str
-    """With which all limits hold along the whole path, such as "99.9 %"."""
-    home: tuple[str, ...] = ()
-    """Channels of the followed signal along which the whole path may be moved; of the places where the limits hold, that with the
-    smallest expected error is taken."""
-
-    @model_validator(mode="after")
-    def _meaning(self) -> Robust:
-        if not 0.5 <= self.chance < 1:
-            raise ValueError(
-                f'probability = "{self.probability}" must be at least 50 % and below 100 %, such as "99.9 %"'
-            )
-        if len(set(self.home)) < len(self.home):
-            raise ValueError(f"home names a channel twice: {', '.join(self.home)}; name each once")
-        return self
-
-    @property
-    def chance(self) -> float:
-        """The probability as a number, 0.999 for "99.9 %"."""
-        return read_probability(self.probability)
-
-
-class ScenarioFile(Section):
-    """A path for a device to follow.
-
-    With `sample_rate` the path is followed in time; without it the scenario is static, a row of separate equilibria.
-    """
-
-    title: str
-    """The scenario in words, for reports."""
-    device: str
-    """The device file, relative to this one."""
-    controller: str | None = None
-    """C name of the online controller and of the plant, a C identifier in lower case. Left out: the device's name. Controllers of one
-    device at two rates need two names to be linked into one program.
-    """
-    follow: Literal["pose", "displacement"] = "pose"
-    """The signal that the path commands: the platform's pose, or the stages' displacements."""
-    sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
-    """Samples a second of a motion in time. Left out: the scenario is static, and its samples are separate equilibria.
-    """
-    duration: Annotated[Quantity, In("s", positive=True)] | None = None
-    """Length of the motion; with `sample_rate` it gives the number of samples."""
-    points: Annotated[int, Field(ge=2, le=MOST_SAMPLES)] | None = None
-    """Number of samples of a static scenario; not needed for a list of poses."""
-    path: PathKind
-    """The commanded path; its `kind` chooses the shape."""
-    shaping: Shaping | None = None
-    """`[shaping]`: the path is shaped so that it leaves a mode of the device at rest. Left out: it is not."""
-    feedforward: Literal["inertia", "static"] = "inertia"
-    """Of a device with inertia. `inertia`: the drives that move its masses along the path. `static`: those that would if it stood in
-    balance at every moment, without inertia and damping; it then follows as well as it does, and vibrates.
-    """
-    outcome: Literal["solved", "unreachable"] = "solved"
-    """Whether a trajectory is expected to exist; `unreachable` passes where none does."""
-    robust: Robust | None = None
-    """Left out: the limits hold for the device as described, and may be broken by one whose numbers differ."""
-    expect: tuple[Expectation, ...] = ()
-    """`[[expect]]` tables: values that the solution must have."""
-
-    @field_validator("controller")
-    @classmethod
-    def _c_name(cls, name: str | None) -> str | None:
-        if name is not None and not re.fullmatch(r"[a-z][a-z0-9_]*", name, re.ASCII):
-            raise ValueError(
-                f"{name!r} is no C identifier in lower case: begin with a letter, then letters, digits and _, such as fast_hexapod"
-            )
-        return name
-
-    @model_validator(mode="after")
-    def _robust_feedforward(self) -> ScenarioFile:
-        if self.robust is not None and self.feedforward == "static":
-            raise ValueError(
-                'robust solves for drives that keep the path, which feedforward = "static" does not; leave out one of them'
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _timing(self) -> ScenarioFile:
-        if self.sample_rate is None:
-            if self.duration is not None:
-                raise ValueError(
-                    "duration is given without sample_rate; add sample_rate, or leave both out for a static scenario"
-                )
-            if self.shaping is not None:
-                raise ValueError("shaping is of motions in time: give sample_rate and duration, or leave it out")
-            if self.points is None and not isinstance(self.path, Poses):
-                raise ValueError(
-                    'a static scenario needs points = N; for motion in time give sample_rate = "1 kHz" and duration'
-                )
-        elif isinstance(self.path, Poses):
-            if self.duration is not None or self.points is not None:
-                raise ValueError("a list of poses already fixes the number of samples; leave out duration and points")
-        elif self.duration is None or self.points is not None:
-            raise ValueError('with sample_rate give duration = "1 s" (and no points)')
-        return self
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from ctrlgen.trajectory.motion import Motion
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
 from ctrlgen.trajectory.sampled_inverse import SampledTrajectory
-from ctrlgen.trajectory.scenario import MOST_SAMPLES, Scenario, check_tightened
+from ctrlgen.trajectory.scenario import Scenario, check_tightened
+from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
 from ctrlgen.trajectory.violations import Before, limited_values, violations
 
 SHOWN = 3  # limits that a message names

@@ -244,7 +244,7 @@ def device_page() -> str:
 
 def scenario_page() -> str:
     """scenario.toml."""
-    from ctrlgen.trajectory.scenario import ScenarioFile
+    from ctrlgen.trajectory.scenario_file import ScenarioFile
 
     return "\n".join([GENERATED, *model_section(ScenarioFile, "scenario.toml", level=1)])
 
