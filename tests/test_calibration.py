@@ -17,6 +17,7 @@ from conftest import SCENARIOS
 from ctrlgen import Controller, InputError, build_model, calibrate, load_device
 from ctrlgen.calibration.budgets import budgets
 from ctrlgen.calibration.calibrate import sd_of_bounds
+from ctrlgen.calibration.device_file import NAME, write_calibrated_device
 from ctrlgen.core.units import to_si
 from ctrlgen.model.simulation import trace
 from ctrlgen.reporting.calibration_page import write_calibration
@@ -132,6 +133,19 @@ def test_the_files_hold_the_same_numbers(specimen, tmp_path):
     wrong = ["-DMEMS_HEXAPOD_SPECIMEN_ONLINE_F32_DEVICE_HASH=0x12345678U"]
     refused = subprocess.run([*words, *wrong], capture_output=True, text=True)
     assert refused.returncode and "belong to another device file" in refused.stderr
+
+
+@pytest.mark.long
+def test_the_device_file_of_the_specimen_has_its_constants_and_the_authors_comments(specimen, tmp_path):
+    write_calibrated_device(specimen, DEVICE, tmp_path / NAME)
+    found, before = (dict(load_device(path).quantities()) for path in (tmp_path / NAME, DEVICE))
+    for row in specimen.constants:
+        number = found[row.constant.path]
+        assert number.si == pytest.approx(row.value, rel=1e-9)  # twelve digits are written, of degrees Celsius too
+        assert "calibrated from" in number.source and before[row.constant.path].text in number.source
+    assert all(found[path].si == number.si for path, number in before.items() if path not in TRUE)
+    comments = [line.partition("#")[2] for line in DEVICE.read_text().splitlines() if line.startswith("#")]
+    assert comments and all(comment in (tmp_path / NAME).read_text() for comment in comments)
 
 
 def test_a_device_without_run_time_constants_is_refused():
