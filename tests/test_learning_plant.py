@@ -10,11 +10,10 @@ import pytest
 
 pytest.importorskip("exudyn", reason="no Exudyn: learning needs the independent plant; pip install ctrlgen[plant]")
 
-from plants.bench import ctrlgen
+from plants.bench import DEVICE, ctrlgen
 from plants.excitation import record
 from plants.imperfect import Imperfect, played_back
 from plants.learning import Learnt, learn, solved
-from plants.loop import DEVICE
 from plants.mems_hexapod import MemsHexapod
 
 WANTED = 0.05  # % of S1's measure
