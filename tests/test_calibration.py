@@ -183,4 +183,5 @@ def test_the_command_prints_the_constants_and_leaves_the_report(tmp_path):
     names = {
         path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*") if path.is_file()
     } - {".ctrlgen"}
-    assert names == {"constants.h", "constants.bin", "constants.json", "calibration.html", "figures/constants.svg"}
+    page = {"calibration.html", "figures/constants.svg"}
+    assert names == {"constants.h", "constants.bin", "constants.json", "device.calibrated.toml"} | page

@@ -95,6 +95,10 @@ class Scripted(Controller):
     def composite_rounds(self) -> int:
         return self.__dict__["rounds"]
 
+    def slacks_of(self, slack: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        assert slack == SLACK  # in double the C has the slack of the controller
+        return self.slacks
+
 
 def controller_of(device: Device) -> Scripted:
     x, z, target, wanted, u = (
@@ -131,11 +135,11 @@ def controller_of(device: Device) -> Scripted:
     signal = SimpleNamespace(channels=("a", "b", "c"), units=("m",) * N, label="signal", scale=(1.0,) * N)
     nominal = SimpleNamespace(
         axes=("a", "b", "c"), x=x, z=z, n_states=device.n_s, rest=np.full(device.n_x, 0.5), limits=(), laws=(),
-        z_bounds=(Z_LOW, Z_HIGH), u_bounds=(U_LOW, U_HIGH),
+        z_bounds=(Z_LOW, Z_HIGH), u_bounds=(U_LOW, U_HIGH), probability=None,
         x_bounds=(np.r_[S_LOW[: device.n_s], [-np.inf] * 2 * device.memory], np.r_[S_HIGH[: device.n_s], [np.inf] * 2 * device.memory]),
         x_names=tuple(f"x{i}" for i in range(device.n_x)), x_units=("K",) * device.n_x,
         signals={"drive": signal, "displacement": signal, "state": signal if device.states else None},
-        device=SimpleNamespace(title="scripted", source="none"),
+        device=SimpleNamespace(title="scripted", source="none", given_at_start=(), run_time=None),
     )  # fmt: skip
     controller = Scripted(nominal, "displacement", 1e-3 if device.moving else None, SLACK)
     controller.__dict__["named"] = NamedInverses(

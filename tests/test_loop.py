@@ -93,6 +93,7 @@ def test_what_is_left_is_learnt(loop):
 
 @pytest.mark.long
 def test_the_fastest_circle_keeps_what_is_asked(loop):
-    """The heaters of the chip cool with the time constant of the file: no even circle is shorter than that of its limits."""
-    assert loop.fastest is not None and 0.038 < loop.fastest < 0.08
+    """By hand, heaters whose force is proportional to their temperature cool in time for 23.5 turns a second, 43 ms; the law of the stage
+    stiffens, which makes it some tenth faster."""
+    assert loop.fastest is not None and 0.034 < loop.fastest < 0.06
     assert loop.stage("fast").distance <= 0.010
