@@ -32,7 +32,7 @@ battery: $(VENV)/installed-test
 	test -e $(CONCEALED)/battery.json || $(BIN)/python -m battery make --out $(CONCEALED) --seed $(SEED) --size $(SIZE) --classes "$(CLASSES)"
 	$(BIN)/python -m battery score $(CONCEALED) --run "$(BIN)/ctrlgen diagnose --jobs 0" --opponents $(OPPONENTS)
 
-# make loop    drives the independent plant with generated C, diagnoses it, corrects the device, drives it again (minutes)
+# make loop    the whole story on the independent plant: budget, diagnosis, calibration, learning, the fastest circle (ten minutes)
 loop: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[plant]'
 	$(BIN)/python -m plants.loop --out out/loop

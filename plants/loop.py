@@ -57,7 +57,7 @@ class Loop:
 class Steps:
     """One line a step on stderr, with the time since the start."""
 
-    COUNT = 13
+    COUNT = 12
 
     def __init__(self) -> None:
         self.began, self.done = time.monotonic(), 0

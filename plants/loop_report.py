@@ -143,7 +143,10 @@ def film(stages: Sequence[Stage], path: Path) -> None:
         (line,) = axes.plot([], [], color=colour, lw=1.5)
         (head,) = axes.plot([], [], "o", color=colour, ms=5)
         axes.set_title(f"{stage.name}\n{1e3 * m.distance:.3g} nm, error drawn {times:g}x", fontsize=9)
-        axes.set(aspect="equal", xlabel="delta_x [um]", ylabel="delta_y [um]")
+        reach = float(np.abs(m.command[:, 3:5]).max()) + 1.2 * DRAWN
+        axes.set(
+            aspect="equal", xlabel="delta_x [um]", ylabel="delta_y [um]", xlim=(-reach, reach), ylim=(-reach, reach)
+        )
         traces.append((drawn, line, head))
 
     def frame(k: int) -> list[Any]:
@@ -153,6 +156,8 @@ def film(stages: Sequence[Stage], path: Path) -> None:
             head.set_data(*drawn[done - 1 : done].T)
         return [artist for _, *artists in traces for artist in artists]
 
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # laid out once, not for every frame
     FuncAnimation(figure, frame, frames=FRAMES).save(path, writer=PillowWriter(fps=FRAMES_A_SECOND), dpi=80)
     plt.close(figure)
 
