@@ -33,6 +33,7 @@ FIRST_STEP = (
 MISMATCH = 0.1  # share of a change by which the device may answer otherwise than described, until runs have shown it
 LEAST_MISMATCH = 0.01
 WORSE = 3.0  # standard errors by which a run must be worse than the best one for the step to be lowered
+FIRST_WORTH = 0.999  # the same of the first step, which is small on purpose and shows what the device answers
 WORTH = 0.9  # of the error: a next run that is not predicted to fall below is not worth running
 COVERAGE_FACTOR = 1.96
 MOST_STALLS = 3  # runs in a row without a better one
@@ -300,6 +301,7 @@ class _Job:
         then, _ = self.predicted(base, u, self.mismatch(len(self.runs)))
         left, variance = self._left(base)
         now = self._rms(left**2 + variance)
-        if any(then[g] < WORTH * now[g] for g in now if now[g]):
+        worth = FIRST_WORTH if len(self.runs) == 1 else WORTH
+        if any(then[g] < worth * now[g] for g in now if now[g]):
             return ""
         return "no more improvement is predicted: the limits, or how well the device answers as described, leave none"
