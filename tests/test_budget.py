@@ -461,6 +461,7 @@ def test_the_command_leaves_page_record_and_figures(tmp_path):
     assert again.returncode == 0 and json.loads((tmp_path / "c" / "budget.json").read_text()) == record
 
 
+@pytest.mark.long
 def test_the_command_states_the_difference_to_a_finer_model(tmp_path):
     text = (SCENARIOS / "devices" / "mems_hexapod.toml").read_text()
     (tmp_path / "finer.toml").write_text(text.replace('"550 K/W', '"551 K/W'))

@@ -283,6 +283,7 @@ def test_a_verdict_says_what_to_do(found):
     assert "no known effect" in sentence(replace(found, verdict=UNEXPLAINED, findings=()))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("value", "low", "high", "unit", "says"),
     [(0.041, 0.039, 0.043, "1", "4.1 % (3.9 ... 4.3 %)"), (312.0, 300.0, 324.0, "nm", "312 nm (300 ... 324 nm)"),
@@ -392,6 +393,7 @@ def test_an_interruption_keeps_the_earlier_result(creeping, tmp_path, at):
     assert set(tmp_path.iterdir()) <= {out, unfinished(out)}  # the fits, for when it is asked again
 
 
+@pytest.mark.long
 def test_objects_and_paths_give_the_same_answer_and_the_same_page(creeping, found):
     device = ctrlgen.load_device(AXIS_FILE)
     again = ctrlgen.diagnose(device, ctrlgen.load_recordings([creeping], ctrlgen.build_model(device)), laws=LAWS)

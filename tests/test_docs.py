@@ -26,9 +26,8 @@ from ctrlgen.recordings.schema import RecordingFile
 from ctrlgen.trajectory.scenario_file import ScenarioFile
 
 DOCS = ROOT / "docs"
-IN_ORDER = {  # pages that build on files of the pages before them
+IN_ORDER = {  # pages that build on files of the pages before them; the first diagnosis has a test of its own
     "device": ["tutorial/first_device.md"],
-    "diagnosis": ["tutorial/first_device.md", "tutorial/first_diagnosis.md"],
     "mechanism": ["howto/own_mechanism.md"],
 }
 
@@ -84,8 +83,9 @@ def test_the_first_firmware_works(tmp_path):
     assert names and all(re.search(rf"\b{name}\b", headers) for name in names)
 
 
+@pytest.mark.long
 def test_the_first_diagnosis_finds_what_the_page_says(tmp_path):
-    follow(IN_ORDER["diagnosis"], tmp_path)
+    follow(["tutorial/first_device.md", "tutorial/first_diagnosis.md"], tmp_path)
     shown = next(text for language, _, text in blocks("tutorial/first_diagnosis.md") if language == "text")
     found = (tmp_path / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8")
     assert "stiffening" in shown and '"stiffening"' in found and '"explained"' in found

@@ -162,6 +162,7 @@ def bang_bang(force):
     return arc(1, [0, 0], switch).t[-1] + backwards(switch).t[-1]
 
 
+@pytest.mark.long
 def test_an_axis_with_inertia_comes_within_a_hundredth_of_full_force_one_way_and_the_other():
     """At 1 MHz the four samples in which its drive crosses its range cost a quarter of a per cent."""
     found = ctrlgen.fastest(AXIS, sample_rate="1 MHz")

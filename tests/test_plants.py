@@ -268,6 +268,7 @@ def test_coupled_poses(whole):
     assert list(errors.values()) == pytest.approx([4.45, 3.28, 3.27, 4.24, 4.14, 2.80], abs=0.05)
 
 
+@pytest.mark.long
 def test_circle(whole):
     """S1 Fig. 14 with ctrlgen's forces. The paper: a mean of 3.38 %."""
     case = circle(whole)

@@ -93,6 +93,7 @@ def test_the_hinges_may_choose_their_own_equations(tmp_path: Any) -> None:
         load_device(path)
 
 
+@pytest.mark.long
 def test_a_command_gives_each_warning_once(tmp_path: Any) -> None:
     """Although the model is built for the check of the device and for the solution."""
     lines = (DEVICES / "rrr_case2.toml").read_text().splitlines()

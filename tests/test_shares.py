@@ -111,6 +111,7 @@ def test_numbers_that_the_fit_has_moved_do_not_hide_friction(signals, rng):
 NULLS = {"white": [1.0], "AR(1)": [1, -0.95], "random walk": [1, -1.0]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NULLS)
 def test_noise_is_a_function_of_nothing_but_its_past_and_time(name):
     """Six recordings, fifteen kinds each: 90 shares, of which chance may show a few per cent."""
@@ -155,6 +156,7 @@ def test_memory_shows_in_the_order_of_poses(rng):
     assert all(row.kind is not Kind.TRAVEL_HISTORY for row in other.selected)
 
 
+@pytest.mark.long
 def test_spikes_change_nothing(signals, rng):
     y = planted(FUNCTIONS[Kind.POSITION](signals), rng)
     spiked = y.copy()
@@ -174,6 +176,7 @@ def test_samples_that_are_not_valid_and_a_second_record_are_taken_as_they_are(si
     assert np.isnan(found.residual).any()
 
 
+@pytest.mark.long
 def test_a_prediction_reaches_the_share_that_it_has_on_the_same_blocks(signals, rng):
     law = FUNCTIONS[Kind.DIRECTION](signals)
     y = planted(law, rng)
@@ -203,6 +206,7 @@ def test_every_kind_speaks_and_every_effect_of_the_library_belongs_to_a_family()
     assert {family for families, _ in SPEAKS_FOR.values() for family in families} == set(Family)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "family"),
     [

@@ -172,6 +172,7 @@ def stage():
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_stiffening_of_one_axis_of_two_is_found_there(tmp_path):
     K = np.array([[20e3, 2e3], [2e3, 30e3]])
 
@@ -305,6 +306,7 @@ def test_an_imposed_motion_gives_the_force_that_its_user_wrote():
     assert force == pytest.approx([8 * 2.0 - 1.5 + 20 * 0.3 + 300 * 0.1, -8.0 + 1.5 * 2.0 + 20 * 0.2], rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_diagnosis_names_the_friction_of_an_imposed_motion_written_in_python(tmp_path):
     rng = np.random.default_rng(5)
     names = [f"{axis}_{kind}" for kind in ("position", "velocity", "acceleration") for axis in "xy"]
