@@ -37,8 +37,8 @@ class Rows:
     def joined(self, other: Rows) -> Rows:
         """Both."""
         A = sp.vstack([self.A, other.A], format="csr")
-        columns = (np.append(getattr(self, name), getattr(other, name)) for name in ("low", "high", "over"))
-        return Rows(A, *columns)
+        low, high = np.append(self.low, other.low), np.append(self.high, other.high)
+        return Rows(A, low, high, np.append(self.over, other.over))
 
     @property
     def bounds(self) -> np.ndarray:
@@ -75,16 +75,15 @@ def limited_rows(
 ) -> Rows:  # fmt: skip
     """The limits of the drives of `n` samples, and of their changes, `gaps` times the `rates`, from each to the next, of a closed path also
     from the last to the first."""
-    alone = np.ones(n * len(span))
-    limited = Rows(sp.eye(len(alone), format="csr"), *(np.tile(bound / span, n) for bound in bounds), alone)
+    low, high = (np.tile(bound / span, n) for bound in bounds)
+    limited = Rows(sp.eye(n * len(span), format="csr"), low, high, np.ones(n * len(span)))
     if rates is None:
         return limited
     allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
     step = (sp.eye(n, k=1) - sp.eye(n) + sp.eye(n, k=1 - n)).tocsr()[: len(gaps)]
     change = sp.kron(sp.diags_array(1 / gaps) @ step, sp.diags_array(span / allowed), format="csr")
-    return limited.joined(
-        Rows(change, *(np.tile(bound / allowed, len(gaps)) for bound in rates), np.repeat(gaps, len(span)))
-    )
+    slowest, fastest = (np.tile(rate / allowed, len(gaps)) for rate in rates)
+    return limited.joined(Rows(change, slowest, fastest, np.repeat(gaps, len(span))))
 
 
 def least_worst(pushed: sp.csr_array, wanted: np.ndarray, limited: Rows) -> tuple[np.ndarray, float, Refutation]:

@@ -143,34 +143,27 @@ class LeastEffortInverse:
         """Whether drives that join those of few samples keep every limit. What these samples take is looked at before all others are."""
         n = len(command) if closed else len(command) + 1
         k = np.unique(np.linspace(0, n - 1, COARSE).round().astype(int))
-        if (few := self._held_at(command, closed, k)) is None:  # a sample depends on those before it
-            found = self._forces(command, closed, periods)
-            z, f = self._held(found, samples_of(command)[0], closed)
-            few = z[k], f[k]
-        else:
-            found = None
-        if not self._within_reach(*few, margin):
+        few = self._held_at(command, closed, k)
+        if few is not None and not self._within_reach(*few, margin):
             return False
         bounds, rates, gaps = self._bounds(margin), self._rate_bounds(margin), _gaps(k, n, closed)
         coarse = None
-        if np.any(_out(self._closed_form(*few), bounds, rates, gaps)):
+        if few is not None and np.any(_out(self._closed_form(*few), bounds, rates, gaps)):
             coarse = self._coarse(self._slopes(few[0]), few[1], bounds, rates, gaps)
             if coarse is None:
                 return False
-        if found is None:
-            found = self._forces(command, closed, periods)
-            z, f = self._held(found, samples_of(command)[0], closed)
-        if not np.all(np.isfinite(f)):
+        found = self._forces(command, closed, periods)
+        z, f = self._held(found, samples_of(command)[0], closed)
+        if not found.solved or not self._within_reach(z, f, margin):
             return False
-        u, every = self._closed_form(z, f), _gaps(np.arange(n), n, closed)
-        if np.any(_out(u, bounds, rates, every)):
-            if coarse is None:
-                coarse = self._coarse(self._slopes(few[0]), few[1], bounds, rates, gaps)
-            u = None if coarse is None else self._joined(k, coarse, self._slopes(z), f, bounds, rates, closed)
-        if u is None:
-            return False
-        found = _with_held(found, u, closed)
-        return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
+        u, B = self._closed_form(z, f), self._slopes(z)
+        if np.any(_out(u, bounds, rates, _gaps(np.arange(n), n, closed))):
+            coarse = self._coarse(B[k], f[k], bounds, rates, gaps) if coarse is None else coarse
+            joined = None if coarse is None else self._joined(k, coarse, B, f, bounds, rates, closed)
+            if joined is None:
+                return False
+            u = joined
+        return not _with_held(found, u, closed).violations(self.model, self.sample_time, closed, margin)
 
     def _allocated(
         self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
@@ -196,7 +189,11 @@ class LeastEffortInverse:
     def _held_at(self, command: Command, closed: bool, places: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """The same at some `places` alone; None where these take all samples."""
         begun = 0 if closed else 1
-        found = self.inner.forces_at(command, closed, places[begun:] - begun)
+        if isinstance(self.inner, InertialInverse):
+            found = self.inner.forces_at(command, closed, places[begun:] - begun)
+        else:
+            assert isinstance(command, np.ndarray)  # of devices in balance only samples are followed
+            found = self.inner.forces_at(command, closed, places[begun:] - begun)
         if found is None or closed:
             return found
         _, z_start, f_start = self.inner.at_rest(samples_of(command)[0])
