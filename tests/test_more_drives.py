@@ -11,7 +11,8 @@ from scipy.optimize import linprog, minimize, nnls
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
 from ctrlgen.model.feedforward import Controller, ControllerStatus
-from ctrlgen.trajectory.least_effort import path_inverse
+from ctrlgen.trajectory.drive_programmes import diagonal, least_worst, limited_rows
+from ctrlgen.trajectory.least_effort import motion_inverse, path_inverse
 
 B = 0.2 * np.array([[1.0, 0.5, 0.0], [0.0, -0.5, 1.0]])  # N/V
 LOW, HIGH = np.array([-100.0, 0.0, -20.0]), np.array([100.0, 150.0, 130.0])  # V
@@ -204,6 +205,45 @@ def test_what_few_samples_show_of_a_rate_is_what_a_linear_programme_over_all_say
     assert [i.keeps_limits(command, closed) for i in inverse] == [False] * 3 + [True] * 3
     searched = [i.keeps_limits(command, closed, every) for i in inverse]
     assert searched[:3] + searched[4:] == [False] * 3 + [True] * 2
+
+
+def coarse_programme(rng: np.random.Generator, gaps: np.ndarray):
+    """Forces of random samples of `stage`, in shares, and limits of its drives and of the changes of one of them."""
+    n, rates = len(gaps), (np.array([-2.0, -np.inf, -np.inf]), np.array([3.0, np.inf, np.inf]))
+    shares = np.tile(B * RANGE, (n, 1, 1))
+    size = np.linalg.norm(shares, axis=2)
+    wanted = rng.uniform(-50, 50, (n, 2)) / size
+    return diagonal(shares / size[:, :, None]), wanted.ravel(), limited_rows((LOW, HIGH), rates, RANGE, gaps, n)
+
+
+def test_what_refutes_one_path_bounds_what_every_other_breaks():
+    """Weak duality, for other forces and another pace; at the path itself it is what the programme says."""
+    rng, positive = np.random.default_rng(3), 0
+    pushed, wanted, limited = coarse_programme(rng, np.full(12, 5.0))
+    _, excess, refutation = least_worst(pushed, wanted, limited)
+    assert refutation.excess(wanted, limited) == pytest.approx(excess, rel=1e-9) and excess > 0.01
+    for _ in range(20):
+        _, other, slower = coarse_programme(rng, rng.integers(3, 9, 12).astype(float))
+        other = wanted + rng.choice([0.1, 1.0]) * other
+        least = refutation.excess(other, slower)
+        positive += least > 0.01
+        assert least <= least_worst(pushed, other, slower)[1] + 1e-9
+    assert positive > 3
+
+
+@pytest.mark.parametrize(
+    "device", [stage(drive_rate={"a": "1 V/ms"}), heavy(drive_rate={"a": "1 V/ms"})], ids=["stage", "heavy"]
+)
+@pytest.mark.parametrize("path", [circle(20, 4, 0), 'kind = "line"\nend = { x = "12 um", y = "4 um" }\n'])
+def test_forces_at_few_samples_are_those_of_the_whole_path(tmp_path, device, path):
+    scenario, model = loaded(tmp_path, device, path)
+    motion = model.inertial
+    inverse = (motion_inverse if motion else path_inverse)(model, "pose", 1e-3).inner
+    command = scenario.motion(model) if motion else scenario.command(model)
+    every, few = inverse.trajectory(command, scenario.closed), np.array([0, 3, 41, 99])
+    leads = np.roll(every.z, -1, axis=0) if scenario.closed else np.vstack([every.z[1:], every.z[-1:]])
+    z, f = inverse.forces_at(command, scenario.closed, few)
+    assert np.array_equal(z, leads[few]) and np.array_equal(f, every.u[few])
 
 
 def test_a_rate_is_kept_where_the_closed_form_breaks_only_another_limit(tmp_path):

@@ -25,12 +25,13 @@ SECONDS_PER_CHARACTER = (
 LARGE = (
     400_000  # characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million
 )
-PART = 500  # statements of a part
+PART = 250  # statements of a part
 FUNCTION = re.compile(
     r"^static int (?P<name>casadi_f\d+)\((?P<arguments>[^)]*)\) \{\n(?P<body>.*?)  return 0;\n\}\n", re.M | re.S
 )
 IN_WORK_VECTOR = re.compile(r"  (w\[\d+\]=|if \(res\[\d+\]!=0\) )")
-LONGEST = 4_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
+PLACE = re.compile(r"w\[(\d+)\]")
+LONGEST = 6_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
 
 
 class Compilable:
@@ -86,13 +87,14 @@ def _generated(function: ca.Function, avoid_stack: bool) -> str:
 
 def _in_parts(code: str) -> str:
     """The generated C with long functions that only compute in the work vector cut into functions of `PART` statements, as a compiler's
-    time grows faster than the length of a function."""
+    time grows faster than the length of a function. What no other part reads is a local variable, as every access to the work vector
+    is a memory access to the compiler too: in all half of the time."""
 
     def parts(found: re.Match[str]) -> str:
         name, body = found["name"], found["body"].splitlines(keepends=True)
         if len(body) <= PART or not all(IN_WORK_VECTOR.match(line) for line in body):
             return found[0]
-        pieces = ["".join(body[k : k + PART]) for k in range(0, len(body), PART)]
+        pieces = _with_locals([body[k : k + PART] for k in range(0, len(body), PART)])
         head = "(const casadi_real** arg, casadi_real** res, casadi_real* w)"
         defined = "".join(
             f"__attribute__((noinline)) static void {name}_{k}{head} {{\n{piece}}}\n\n"
@@ -102,6 +104,34 @@ def _in_parts(code: str) -> str:
         return f"{defined}static int {name}({found['arguments']}) {{\n{calls}  return 0;\n}}\n"
 
     return FUNCTION.sub(parts, code)
+
+
+def _with_locals(parts: list[list[str]]) -> list[str]:
+    """The parts, in each a local variable for every value, which ends in the work vector where a later part reads it."""
+    read: set[str] = set()  # places that the parts after this one read before they write them
+    pieces = []
+    for part in reversed(parts):
+        now: dict[str, str] = {}  # place -> the local variable that holds it
+        before: set[str] = set()
+        lines = []
+
+        def local(found: re.Match[str], now: dict[str, str] = now, before: set[str] = before) -> str:
+            if found[1] not in now:
+                before.add(found[1])
+            return now.get(found[1], found[0])
+
+        for statement in part:
+            place = PLACE.match(statement, 2)
+            if place is None:
+                lines.append(PLACE.sub(local, statement))
+                continue
+            value = PLACE.sub(local, statement[place.end() :])
+            now[place[1]] = f"a{len(lines)}"
+            lines.append(f"  const casadi_real a{len(lines)}{value}")
+        lines += [f"  w[{place}]={name};\n" for place, name in now.items() if place in read]
+        read = (read - now.keys()) | before
+        pieces.append("".join(lines))
+    return pieces[::-1]
 
 
 def _library(code: str) -> Path:

@@ -55,41 +55,61 @@ def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix],
 
     A body k that is eliminated leaves, with S = sum_j K_kj over its neighbours and the ground, K_ik S^-1 K_kj between each two of
     them and K_ik S^-1 W_k on them. Nothing is subtracted, so that soft flexures in series with stiff ones lose no digits (the block
-    form of W. K. Grassmann, M. I. Taksar, D. P. Heyman, Oper. Res. 33 (1985) 1107). Raises ValueError naming a body (by its
-    number) that nothing joins to the ground.
+    form of W. K. Grassmann, M. I. Taksar, D. P. Heyman, Oper. Res. 33 (1985) 1107). Wrenches written as (moment; force), K_ji is the
+    transpose of K_ij, and what two flexures in series leave, (K_ik^-1 + K_kj^-1)^-1, is symmetric: only what differs is computed.
+    Raises ValueError naming a body (by its number) that nothing joins to the ground.
     """
     if loose := loose_bodies(count, elements):
         raise ValueError(f"body {loose[0]} is not joined to the ground")
+    counted = ca.diag(ca.DM([1 / size] * 3 + [1] * 3))  # T and (moment; force) to and from lengths in units of `size`
+    swap = [3, 4, 5, 0, 1, 2]
     K: list[dict[int, Matrix]] = [{} for _ in range(count)]  # K[i][j]: the wrench on i per T_i - T_j
     for e in elements:
+        own = _mirrored(ca.mtimes([counted, e.stiffness[swap, :], counted]))
         for i, j in ((e.first, e.second), (e.second, e.first)):
             if i != GROUND:
-                K[i][j] = K[i][j] + e.stiffness if j in K[i] else e.stiffness
+                K[i][j] = K[i][j] + own if j in K[i] else own
     columns = next((W.shape[1] for W in loads.values()), 0)
-    right = [loads.get(i, ca.DM.zeros(6, columns)) for i in range(count)]
-    left, order = set(range(count)), []
+    right = [ca.mtimes(counted, loads[i][swap, :]) if i in loads else ca.DM.zeros(6, columns) for i in range(count)]
+    left, order, skew = set(range(count)), [], set()  # `skew`: the pairs whose K is not symmetric
+    factors: dict[int, Matrix] = {}
     while left:  # forward elimination
         k = min(left, key=lambda i: (len(K[i].keys() & left), i))
         left.remove(k)
         order.append(k)
-        near = sorted(j for j in K[k] if j in left or j == GROUND)
-        S = sum((K[k][j] for j in near[1:]), K[k][near[0]])
-        reduced = _solve(S, size, ca.horzcat(*(K[k][j] for j in near), right[k]))
-        *factors, T = ca.horzsplit(reduced, [*(6 * i for i in range(len(near) + 1)), reduced.shape[1]])
-        for i in near:
-            if i == GROUND:
-                continue
-            for j, factor in zip(near, factors, strict=True):
-                if i != j:
+        near = sorted(j for j in K[k] if j in left or j == GROUND)  # the ground first
+        factors[k] = _factor()(sum((K[k][j] for j in near[1:]), K[k][near[0]]))
+        solved = _solve(factors[k], ca.horzcat(right[k], *(K[k][j] for j in near[:-1])))
+        T, *moved = ca.horzsplit(solved, [0, *(columns + 6 * i for i in range(len(near)))])
+        series = len(near) == 2 and not {_pair(k, j) for j in near} & skew
+        for j, factor in zip(near[:-1], moved, strict=True):
+            for i in near:
+                if i > j:
                     passed = ca.mtimes(K[i][k], factor)
+                    passed = _mirrored(passed) if series else passed
                     K[i][j] = K[i][j] + passed if j in K[i] else passed
-            right[i] = right[i] + ca.mtimes(K[i][k], T)
-        K[k] = {j: factor for j, factor in zip(near, factors, strict=True) if j != GROUND}
+                    if j != GROUND:
+                        K[j][i] = K[i][j].T
+                    if not series:
+                        skew.add(_pair(i, j))
+        for i in near:
+            if i != GROUND:
+                right[i] = right[i] + ca.mtimes(K[i][k], T)
         right[k] = T
+        K[k] = {j: K[k][j] for j in near if j != GROUND}
     for k in reversed(order):  # back substitution: T_k = S^-1 (sum_j K_kj T_j + W_k)
-        for j, factor in K[k].items():
-            right[k] = right[k] + ca.mtimes(factor, right[j])
-    return right
+        if K[k]:
+            right[k] = right[k] + _solve(factors[k], sum(ca.mtimes(own, right[j]) for j, own in K[k].items()))
+    return [ca.mtimes(counted, T) for T in right]
+
+
+def _pair(i: int, j: int) -> tuple[int, int]:
+    return min(i, j), max(i, j)
+
+
+def _mirrored(matrix: Matrix) -> Matrix:
+    """A symmetric matrix whose upper triangle is its lower one: the same expressions, which are evaluated once."""
+    return ca.tril2symm(ca.tril(matrix))
 
 
 def loose_bodies(count: int, elements: Sequence[Element]) -> list[int]:
@@ -102,34 +122,36 @@ def loose_bodies(count: int, elements: Sequence[Element]) -> list[int]:
     return [i for i in range(count) if i not in joined]
 
 
-def _solve(matrix: Matrix, size: float, right: Matrix) -> Matrix:
-    """x with `matrix` x = `right` (6, n), lengths in units of `size`: forces and moments are then of similar magnitude.
-
-    Wrenches written as (moment; force), the matrix is symmetric and positive, and L D L' needs no pivots: a third of the operations
-    of the QR decomposition that CasADi would write, which are what a compiler sees of a mechanism.
-    Source: G. H. Golub, C. F. Van Loan, Matrix Computations (4th ed.), section 4.2.
-    """
-    per, times, swap = ca.DM([1 / size] * 3 + [1] * 3), ca.DM([1, 1, 1, *[size] * 3]), [3, 4, 5, 0, 1, 2]
-    A = ca.mtimes([ca.diag(per), matrix[swap, :], ca.diag(times)])
-    x = _symmetric_solver(right.shape[1])(A, ca.mtimes(ca.diag(per), right[swap, :]))
-    return ca.mtimes(ca.diag(times), x)
+def _solve(factors: Matrix, right: Matrix) -> Matrix:
+    """x (6, n) with L D L' x = `right`, L below the diagonal and D on it."""
+    return _substitution(right.shape[1])(factors, right)
 
 
 @functools.cache
-def _symmetric_solver(columns: int) -> ca.Function:
-    """(A, b) -> x with A x = b (6, columns), A (6, 6) symmetric and positive, by A = L D L'; its lower triangle is read."""
-    n, A, right = 6, ca.SX.sym("A", 6, 6), ca.SX.sym("b", 6, columns)
-    below: list[list[Any]] = [[] for _ in range(n)]  # L, row by row
-    pivots: list[Any] = []
+def _factor() -> ca.Function:
+    """A (6, 6), symmetric and positive -> L below the diagonal and D on it with A = L D L'; its lower triangle is read.
+
+    With lengths in such units that forces and moments are of similar magnitude it needs no pivots: a third of the operations of the QR
+    decomposition that CasADi would write, which are what a compiler sees of a mechanism.
+    Source: G. H. Golub, C. F. Van Loan, Matrix Computations (4th ed.), section 4.2.
+    """
+    n, A = 6, ca.SX.sym("A", 6, 6)
+    F = ca.SX(ca.Sparsity.lower(n))
     for i in range(n):
         for j in range(i):
-            scaled = A[i, j] - sum(below[i][k] * pivots[k] * below[j][k] for k in range(j))
-            below[i].append(scaled / pivots[j])
-        pivots.append(A[i, i] - sum(below[i][k] ** 2 * pivots[k] for k in range(i)))
+            F[i, j] = (A[i, j] - sum(F[i, k] * F[k, k] * F[j, k] for k in range(j))) / F[j, j]
+        F[i, i] = A[i, i] - sum(F[i, k] ** 2 * F[k, k] for k in range(i))
+    return ca.Function("factor", [A], [F])
+
+
+@functools.cache
+def _substitution(columns: int) -> ca.Function:
+    """(L and D, b) -> x with L D L' x = b (6, columns)."""
+    n, F, right = 6, ca.SX.sym("F", ca.Sparsity.lower(6)), ca.SX.sym("b", 6, columns)
     rows: list[Any] = []
     for i in range(n):
-        rows.append(right[i, :] - sum(below[i][k] * rows[k] for k in range(i)))
-    rows = [row / pivot for row, pivot in zip(rows, pivots, strict=True)]
+        rows.append(right[i, :] - sum(F[i, k] * rows[k] for k in range(i)))
+    rows = [row / F[i, i] for i, row in enumerate(rows)]
     for i in reversed(range(n)):
-        rows[i] = rows[i] - sum(below[k][i] * rows[k] for k in range(i + 1, n))
-    return ca.Function("solve", [A, right], [ca.vertcat(*rows)])
+        rows[i] = rows[i] - sum(F[k, i] * rows[k] for k in range(i + 1, n))
+    return ca.Function("substitution", [F, right], [ca.vertcat(*rows)])

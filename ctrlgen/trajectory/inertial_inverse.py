@@ -130,6 +130,17 @@ class InertialInverse:
         needed = self.trajectory(command, closed, periods)
         return needed.solved and not needed.violations(self.model, self.sample_time, closed, margin)
 
+    def forces_at(self, command: Command, closed: bool, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Where the drives at the samples `chosen` lead, z (n, n_axes), and these, u (n, n_u); None where the drives depend on more than
+        their own samples."""
+        assert isinstance(command, Motion)
+        if not self.approximate and self.remembers:
+            return None
+        following = np.append(np.arange(1, len(command)), 0 if closed else len(command) - 1)
+        _, _, u = self._continuous(command.at(chosen))
+        _, z, _ = self._continuous(command.at(following[chosen]))
+        return (z, u) if self._exact(u) else None
+
     def _continuous(self, command: Motion) -> list[np.ndarray]:
         """x (n, n_x), z (n, n_axes), u (n, n_u) in continuous time, internal states at rest."""
         samples = np.hstack(list(command.stacked()))

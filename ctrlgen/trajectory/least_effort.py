@@ -18,29 +18,33 @@ joined by lines in time and corrected to B_k u_k = f_k; where these keep every l
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from functools import cached_property
 from itertools import combinations
 
 import casadi as ca
 import numpy as np
-import scipy.sparse as sp
-from scipy.optimize import linprog
 
-from ctrlgen.core.errors import SolverError
 from ctrlgen.model.allocation import INDEPENDENT, Allocation, allocate, effort_weights
 from ctrlgen.model.model import Model
+from ctrlgen.trajectory.drive_programmes import (
+    Refutation,
+    diagonal,
+    least_excess,
+    least_squares,
+    least_worst,
+    limited_rows,
+    polished,
+)
 from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.motion import Command, Motion, samples_of
 from ctrlgen.trajectory.path_inverse import PERIODS, InverseTrajectory, PathInverse
 from ctrlgen.trajectory.sampled_inverse import SampledTrajectory
 from ctrlgen.trajectory.violations import NEGLIGIBLE, violations
 
-TOLERANCE = 1e-10  # of a share: IPOPT's of the optimality error, the linear programme's of each row
-MOST_ITERATIONS = 200
-NEAR = 1e-6  # ranges from a limit within which a drive is at it
 COARSE = 100  # samples along a path that decide for most whether its rates can be kept
+SURE = 1e-4  # of a range, by which a path must break limits for the multipliers of another path to say so: they are rounded
 FOLLOWS = 1e-2  # share of a correction that a drive takes whose rate is limited, where others can
 
 
@@ -49,7 +53,6 @@ class Wanted(Enum):
 
     LEAST = "those of least effort"
     ANY = "any that keep the limits"
-    EVIDENT = "any that keep the limits where few samples show that some do"
 
 
 class LeastEffortInverse:
@@ -64,6 +67,11 @@ class LeastEffortInverse:
         """The same of the device without the effects that have memories."""
         plain = self.inner.without_memories
         return self if plain is self.inner else LeastEffortInverse(self.model, plain, self.allocation)
+
+    @property
+    def _timed(self) -> bool:
+        """Whether the samples act on one another, by the rates of drives."""
+        return self.sample_time is not None and bool(self.model.rate_limits)
 
     def trajectory(self, command: Command, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
         """What a path takes; the drives break limits only where none keep them."""
@@ -115,10 +123,11 @@ class LeastEffortInverse:
     ) -> bool:
         """Whether `command` can be followed with a `margin`, a share of each limit; where nothing but the samples matters, judged by
         those `chosen`; with limits on rates and samples `chosen`, paths within a thousandth or so of a limit are taken as beyond it."""
+        if self._timed and chosen is not None and len(command) >= 2 * COARSE:
+            return self._evidently_keeps(command, closed, margin, periods)
         if self.model.rate_limits or self._facets is None:
             found = self._forces(command, closed, periods)
-            wanted = Wanted.ANY if chosen is None else Wanted.EVIDENT
-            found = self._allocated(found, samples_of(command)[0], closed, margin, wanted)
+            found = self._allocated(found, samples_of(command)[0], closed, margin, Wanted.ANY)
             return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
         if isinstance(command, np.ndarray) and isinstance(self.inner, PathInverse) and not self.inner.remembers:
             x, z, f = self.inner.equilibria(command if chosen is None else command[chosen])
@@ -127,8 +136,34 @@ class LeastEffortInverse:
             x, z, f = found.x, found.z, found.u
             if not found.solved:
                 return False
-        u = np.clip(self.allocation.drive.map(len(z))(z.T, f.T).full().T, *self._bounds(margin))
+        u = np.clip(self._closed_form(z, f), *self._bounds(margin))
         return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
+
+    def _evidently_keeps(self, command: Command, closed: bool, margin: float, periods: int) -> bool:
+        """Whether drives that join those of few samples keep every limit. What these samples take is looked at before all others are."""
+        n = len(command) if closed else len(command) + 1
+        k = np.unique(np.linspace(0, n - 1, COARSE).round().astype(int))
+        few = self._held_at(command, closed, k)
+        if few is not None and not self._within_reach(*few, margin):
+            return False
+        bounds, rates, gaps = self._bounds(margin), self._rate_bounds(margin), _gaps(k, n, closed)
+        coarse = None
+        if few is not None and np.any(_out(self._closed_form(*few), bounds, rates, gaps)):
+            coarse = self._coarse(self._slopes(few[0]), few[1], bounds, rates, gaps)
+            if coarse is None:
+                return False
+        found = self._forces(command, closed, periods)
+        z, f = self._held(found, samples_of(command)[0], closed)
+        if not found.solved or not self._within_reach(z, f, margin):
+            return False
+        u, B = self._closed_form(z, f), self._slopes(z)
+        if np.any(_out(u, bounds, rates, _gaps(np.arange(n), n, closed))):
+            coarse = self._coarse(B[k], f[k], bounds, rates, gaps) if coarse is None else coarse
+            joined = None if coarse is None else self._joined(k, coarse, B, f, bounds, rates, closed)
+            if joined is None:
+                return False
+            u = joined
+        return not _with_held(found, u, closed).violations(self.model, self.sample_time, closed, margin)
 
     def _allocated(
         self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
@@ -140,35 +175,45 @@ class LeastEffortInverse:
         if self.sample_time is None:
             u = self.drives(found.z, found.u, margin=margin, wanted=wanted)
             return replace(found, u=u, u_start=u[0])
-        z = np.vstack([found.z[1:], found.z[:1] if closed else found.z[-1:]])  # where each drive leads
+        z, f = self._held(found, first, closed)
+        return _with_held(found, self.drives(z, f, closed, margin, wanted), closed)
+
+    def _held(self, found: InverseTrajectory, first: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Where each held drive leads, and the force it pushes with; before an open path stands that which holds its `first` target."""
+        z = np.vstack([found.z[1:], found.z[:1] if closed else found.z[-1:]])
         if closed:
-            u = self.drives(z, found.u, closed, margin, wanted)
-            return replace(found, u=u, u_start=u[-1])
+            return z, found.u
         _, z_start, f_start = self.inner.at_rest(first)
-        u = self.drives(np.vstack([z_start, z]), np.vstack([f_start, found.u]), margin=margin, wanted=wanted)
-        return replace(found, u=u[1:], u_start=u[0])
+        return np.vstack([z_start, z]), np.vstack([f_start, found.u])
+
+    def _held_at(self, command: Command, closed: bool, places: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """The same at some `places` alone; None where these take all samples."""
+        begun = 0 if closed else 1
+        if isinstance(self.inner, InertialInverse):
+            found = self.inner.forces_at(command, closed, places[begun:] - begun)
+        else:
+            assert isinstance(command, np.ndarray)  # of devices in balance only samples are followed
+            found = self.inner.forces_at(command, closed, places[begun:] - begun)
+        if found is None or closed:
+            return found
+        _, z_start, f_start = self.inner.at_rest(samples_of(command)[0])
+        return np.vstack([z_start, found[0]]), np.vstack([f_start, found[1]])
 
     def drives(
         self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
     ) -> np.ndarray:  # fmt: skip
         """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other."""
-        timed = self.sample_time is not None and bool(self.model.rate_limits)
-        n = len(f)
-        u = self.allocation.drive.map(n)(z.T, f.T).full().T
-        low, high = (np.tile(bound, (n, 1)) for bound in self._bounds(margin))
-        out = np.any((u < low) | (u > high), axis=1)
-        if timed:
-            before = np.vstack([u[-1:] if closed else u[:1], u[:-1]])
-            slowest, fastest = self._rate_bounds(margin)
-            change = u - before
-            out[:] = np.any(out) or np.any((change < slowest) | (change > fastest))  # one sample acts on the others
+        n, u, bounds = len(f), self._closed_form(z, f), self._bounds(margin)
+        rates = self._rate_bounds(margin) if self._timed else None
+        out = _out(u, bounds, rates, _gaps(np.arange(n), n, closed))
         chosen = out if np.all(np.isfinite(u)) else np.zeros(n, dtype=bool)
         if chosen.any():
-            rates = self._rate_bounds(margin) if timed else None
-            u[chosen] = self._solved(
-                self._slopes(z[chosen]), f[chosen], u[chosen], self._bounds(margin), rates, closed, wanted
-            )
+            u[chosen] = self._solved(self._slopes(z[chosen]), f[chosen], u[chosen], bounds, rates, closed, wanted)
         return u
+
+    def _closed_form(self, z: np.ndarray, f: np.ndarray) -> np.ndarray:
+        """(n, n_u) the drives of least effort without limits."""
+        return self.allocation.drive.map(len(f))(z.T, f.T).full().T
 
     @cached_property
     def _facets(self) -> np.ndarray | None:
@@ -185,6 +230,14 @@ class LeastEffortInverse:
             if n == 1 or sizes.min() > INDEPENDENT * np.abs(B).max():
                 found.append(rows[-1])
         return np.array(found) / m.force_scale
+
+    def _within_reach(self, z: np.ndarray, f: np.ndarray, margin: float) -> bool:
+        """Whether the displacements `z` are in range, and drives within their limits give the forces `f` as far as `_facets` tell."""
+        low, high = _narrowed(self.model.z_bounds, margin)
+        slack = NEGLIGIBLE * np.where(np.isfinite(high - low), high - low, self.model.z_scale)
+        if not np.all(np.isfinite(f)) or np.any((z < low - slack) | (z > high + slack)):
+            return False
+        return self._facets is None or self._attainable(f, margin)
 
     def _attainable(self, f: np.ndarray, margin: float) -> bool:
         """Whether drives within their limits give each of the forces `f` (n, n_axes)."""
@@ -223,156 +276,83 @@ class LeastEffortInverse:
         """The programme of the module's text, begun at the closed form; where no drives keep the limits, or not those of least
         effort are `asked` for, those that break them least, or where the answer is no, perhaps the closed form."""
         m, n, n_u = self.model, len(f), self.model.u.numel()
-        if rates is not None and asked is not Wanted.LEAST and n >= 2 * COARSE:
-            few = self._interpolated(B, f, begin, bounds, rates, closed)
-            if few is not None or asked is Wanted.EVIDENT:
-                return begin if few is None else few
+        if rates is not None and asked is Wanted.ANY and n >= 2 * COARSE:
+            k = np.unique(np.linspace(0, n - 1, COARSE).round().astype(int))
+            coarse = self._coarse(B[k], f[k], bounds, rates, _gaps(k, n, closed))
+            if coarse is None:
+                return begin
+            joined = self._joined(k, coarse, B, f, bounds, rates, closed)
+            if joined is not None:
+                return joined
         span = 1 / np.sqrt(effort_weights(m) / m.drive_weights)
         shares = B * span
         size = np.linalg.norm(shares, axis=2)  # what full drives push
-        pushed = _diagonal(shares / size[:, :, None])
-        limited = _limited_rows(bounds, rates, span, np.ones(n if closed else n - 1), n)
+        pushed = diagonal(shares / size[:, :, None])
+        limited = limited_rows(bounds, rates, span, _gaps(np.arange(n), n, closed), n)
         wanted = (f / size).ravel()
-        least, excess = _least_excess(pushed, wanted, limited)
+        least, excess = least_excess(pushed, wanted, limited)
         if excess > NEGLIGIBLE or asked is not Wanted.LEAST:
             return least.reshape(n, n_u) * span
         weights = np.tile(m.drive_weights / m.drive_weights.max(), n)
-        u = _least_squares(weights, pushed, wanted, limited, (begin / span).ravel()).reshape(n, n_u) * span
-        return _polished(u, shares, f, (bounds[0] / span, bounds[1] / span), span)
+        u = least_squares(weights, pushed, wanted, limited, (begin / span).ravel()).reshape(n, n_u) * span
+        return polished(u, shares, f, (bounds[0] / span, bounds[1] / span), span)
 
-    def _interpolated(
-        self, B: np.ndarray, f: np.ndarray, begin: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
+    def _coarse(
+        self, B: np.ndarray, f: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], rates: tuple[np.ndarray, np.ndarray], gaps: np.ndarray
+    ) -> np.ndarray | None:  # fmt: skip
+        """Drives of few samples, `gaps` apart, farthest inside of the limits; None where these show that none keep them."""
+        span = 1 / np.sqrt(effort_weights(self.model) / self.model.drive_weights)
+        shares = B * span
+        size = np.linalg.norm(shares, axis=2)
+        limited, wanted = limited_rows(bounds, rates, span, gaps, len(f)), (f / size).ravel()
+        if any(r.excess(wanted, limited) > SURE for r in self._refutations):
+            return None
+        least, excess, refutation = least_worst(diagonal(shares / size[:, :, None]), wanted, limited)
+        if excess > NEGLIGIBLE and self._facets is not None:  # what refutes this path may refute the next
+            self._refutations.append(refutation)
+        return None if excess > NEGLIGIBLE else least.reshape(len(f), -1) * span
+
+    @cached_property
+    def _refutations(self) -> list[Refutation]:
+        """What has shown of paths that no drives keep their limits, for slopes B that are the same everywhere."""
+        return []
+
+    def _joined(
+        self, k: np.ndarray, coarse: np.ndarray, B: np.ndarray, f: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
         rates: tuple[np.ndarray, np.ndarray], closed: bool,
     ) -> np.ndarray | None:  # fmt: skip
-        """Drives that keep the limits, from those of `COARSE` samples; those `begin` of the closed form, which break them, where these
-        samples show that none keep them; None where neither is shown."""
-        n = len(f)
-        k = np.unique(np.linspace(0, n - 1, COARSE).round().astype(int))
-        gaps = np.append(np.diff(k), n - k[-1]) if closed else np.diff(k)
-        span = 1 / np.sqrt(effort_weights(self.model) / self.model.drive_weights)
-        shares = B[k] * span
-        size = np.linalg.norm(shares, axis=2)
-        pushed = _diagonal(shares / size[:, :, None])
-        limited = _limited_rows(bounds, rates, span, gaps, len(k))
-        least, excess = _least_worst(pushed, (f[k] / size).ravel(), limited)
-        if excess > NEGLIGIBLE:
-            return begin
-        coarse, at = least.reshape(len(k), -1) * span, np.arange(n)
+        """The drives `coarse` of the samples `k` joined by lines in time and corrected to the forces `f`; None where they break limits."""
+        n, span = len(f), 1 / np.sqrt(effort_weights(self.model) / self.model.drive_weights)
+        at = np.arange(n)
         if closed:
             k, coarse = np.append(k, n), np.vstack([coarse, coarse[:1]])
         u = np.column_stack([np.interp(at, k, own) for own in coarse.T])
         yields = np.where(np.isfinite(rates[1] - rates[0]), FOLLOWS, 1.0) * span  # most where no rate is limited
         missing = np.linalg.solve((B * yields**2) @ B.swapaxes(1, 2), f[:, :, None] - B @ u[:, :, None])
         u += (yields[:, None] ** 2 * (B.swapaxes(1, 2) @ missing))[:, :, 0]
-        change = np.diff(u, axis=0, prepend=u[-1:] if closed else u[:1])
-        kept = np.all((u >= bounds[0]) & (u <= bounds[1]) & (change >= rates[0]) & (change <= rates[1]))
-        return u if kept else None
+        return None if np.any(_out(u, bounds, rates, _gaps(at, n, closed))) else u
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """low <= A s <= high, rows without a bound left out, in shares of ranges."""
-
-    A: sp.csr_array
-    low: np.ndarray
-    high: np.ndarray
-
-    def __post_init__(self) -> None:
-        kept = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
-        for name in ("A", "low", "high"):
-            object.__setattr__(self, name, getattr(self, name)[kept])
-
-    def joined(self, other: _Rows) -> _Rows:
-        """Both."""
-        A = sp.vstack([self.A, other.A], format="csr")
-        return _Rows(A, np.append(self.low, other.low), np.append(self.high, other.high))
+def _gaps(k: np.ndarray, n: int, closed: bool) -> np.ndarray:
+    """Samples from each of `k` to the next, on a closed path of `n` also from the last to the first."""
+    return np.append(np.diff(k), n - k[-1] + k[0]) if closed else np.diff(k)
 
 
-def _diagonal(blocks: np.ndarray) -> sp.csr_array:
-    """The block diagonal matrix of `blocks` (n, rows, columns)."""
-    n = len(blocks)
-    return sp.bsr_array((blocks, np.arange(n), np.arange(n + 1))).tocsr()
-
-
-def _limited_rows(
-    bounds: tuple[np.ndarray, np.ndarray], rates: tuple[np.ndarray, np.ndarray] | None, span: np.ndarray, gaps: np.ndarray, n: int
-) -> _Rows:  # fmt: skip
-    """The limits of the drives of `n` samples, and of their changes, `gaps` times the `rates`, from each to the next, of a closed path also
-    from the last to the first."""
-    limited = _Rows(sp.eye(n * len(span), format="csr"), *(np.tile(bound / span, n) for bound in bounds))
-    if rates is None:
-        return limited
-    allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
-    step = (sp.eye(n, k=1) - sp.eye(n) + sp.eye(n, k=1 - n)).tocsr()[: len(gaps)]
-    change = sp.kron(sp.diags_array(1 / gaps) @ step, sp.diags_array(span / allowed), format="csr")
-    return limited.joined(_Rows(change, *(np.tile(bound / allowed, len(gaps)) for bound in rates)))
-
-
-def _least_worst(pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows) -> tuple[np.ndarray, float]:
-    """Drives that push as `wanted` and stay inside of limits, or break them, by the same most or least share, and that share, negative
-    inside; by a linear programme. Raises SolverError."""
-    one = sp.csr_array(np.ones((len(limited.low), 1)))
-    return _programme(pushed, wanted, limited, one, -1.0)
-
-
-def _least_excess(pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows) -> tuple[np.ndarray, float]:
-    """Drives that push as `wanted` and break limits by the least sum, and that sum; by a linear programme. Raises SolverError."""
-    return _programme(pushed, wanted, limited, sp.eye(limited.A.shape[0], format="csr"), 0.0)
-
-
-def _programme(
-    pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows, beyond: sp.csr_array, least: float
-) -> tuple[np.ndarray, float]:
-    """Minimises the sum of excesses e >= `least`, low - `beyond` e <= A s <= high + `beyond` e; s and the largest e. Raises SolverError."""
-    n, m = limited.A.shape[1], beyond.shape[1]
-    above, below = np.isfinite(limited.high), np.isfinite(limited.low)
-    A = sp.vstack(
-        [sp.hstack([limited.A, -beyond], format="csr")[above], sp.hstack([-limited.A, -beyond], format="csr")[below]]
-    )
-    answer = linprog(
-        np.append(np.zeros(n), np.ones(m)), A_ub=A, b_ub=np.append(limited.high[above], -limited.low[below]), b_eq=wanted,
-        A_eq=sp.hstack([pushed, sp.csr_array((len(wanted), m))]), method="highs", options={"primal_feasibility_tolerance": TOLERANCE},
-        bounds=np.column_stack([np.append(np.full(n, -np.inf), np.full(m, least)), np.full(n + m, np.inf)]),
-    )  # fmt: skip
-    if answer.x is None:
-        raise SolverError(f"no drives push as the path needs ({answer.message}); command a smaller or slower path")
-    return answer.x[:n], float(answer.x[n:].max(initial=least))
-
-
-def _least_squares(
-    weights: np.ndarray, pushed: sp.csr_array, wanted: np.ndarray, limited: _Rows, begin: np.ndarray
+def _out(
+    u: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], rates: tuple[np.ndarray, np.ndarray] | None, gaps: np.ndarray
 ) -> np.ndarray:
-    """The drives of least effort among those that push as `wanted` within limits, by IPOPT. Raises SolverError where it finds none."""
-    A = sp.vstack([pushed, limited.A], format="csc")
-    s = ca.MX.sym("s", A.shape[1])
-    problem = {"x": s, "f": ca.dot(weights, s**2), "g": ca.mtimes(ca.DM(A), s)}
-    options = {
-        "print_time": False,
-        "ipopt": {
-            "print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "nlp_scaling_method": "none",
-            "mu_strategy": "adaptive", "bound_relax_factor": 0.0, "jac_c_constant": "yes", "jac_d_constant": "yes",
-            "hessian_constant": "yes",
-        },
-    }  # fmt: skip
-    solver = ca.nlpsol("least_effort", "ipopt", problem, options)
-    answer = solver(x0=begin, lbg=np.append(wanted, limited.low), ubg=np.append(wanted, limited.high))
-    status = solver.stats()["return_status"]
-    if status in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
-        raise KeyboardInterrupt
-    if not solver.stats()["success"]:
-        raise SolverError(f"IPOPT found no drives of least effort ({status}); command a smaller or slower path")
-    return answer["x"].full().ravel()
+    """(n,) whether drives break their bounds; where they, or the `rates` over their `gaps`, break any limit, all do: one acts on the
+    others."""
+    out = np.any((u < bounds[0]) | (u > bounds[1]), axis=1)
+    if rates is not None:
+        change = (np.roll(u, -1, axis=0) - u)[: len(gaps)] / gaps[:, None]
+        out[:] = np.any(out) or np.any((change < rates[0]) | (change > rates[1]))
+    return out
 
 
-def _polished(
-    u: np.ndarray, shares: np.ndarray, f: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], span: np.ndarray
-) -> np.ndarray:
-    """`u` with what IPOPT's tolerance leaves of the forces `f` taken up by the drives that are not at a limit."""
-    s = u / span
-    for k, own in enumerate(shares):
-        free = own * ~np.any(np.abs(s[k] - np.array(bounds)) < NEAR, axis=0)
-        s[k] += np.linalg.lstsq(free, f[k] - own @ s[k], rcond=INDEPENDENT)[0]
-    return s * span
+def _with_held(found: InverseTrajectory, u: np.ndarray, closed: bool) -> InverseTrajectory:
+    """`found` with the held drives `u`, of an open path that before it among them."""
+    return replace(found, u=u, u_start=u[-1]) if closed else replace(found, u=u[1:], u_start=u[0])
 
 
 def _narrowed(bounds: tuple[np.ndarray, np.ndarray], margin: float) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,10 @@ class Motion:
         """The motion shifted by a vector (channels,)."""
         return Motion(self.position + shift, self.derivatives)
 
+    def at(self, chosen: np.ndarray) -> Motion:
+        """Some of its samples."""
+        return Motion(self.position[chosen], self.derivatives[:, chosen])
+
     def held(self) -> Motion:
         """With one more sample, at rest where it ends."""
         still = np.zeros((len(self.derivatives), 1, self.position.shape[1]))

@@ -179,10 +179,22 @@ class PathInverse:
         if chosen is None or self.remembers or self.moving is None or self.model.rate_limits:
             needed = self.trajectory(command, closed, periods)
             return needed.solved and not needed.violations(self.model, self.sample_time, closed, margin)
+        x, z, u, _ = self._at(command, closed, chosen)
+        return bool(np.all(np.isfinite(u))) and not violations(self.model, x, z, u, margin)
+
+    def forces_at(self, command: np.ndarray, closed: bool, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Where the drives at the samples `chosen` of a motion lead, z (n, n_axes), and these, u (n, n_u); None where the drives
+        depend on more than their own samples."""
+        if self.remembers or self.moving is None:
+            return None
+        _, _, u, z_then = self._at(command, closed, chosen)
+        return z_then, u
+
+    def _at(self, command: np.ndarray, closed: bool, chosen: np.ndarray) -> tuple[np.ndarray, ...]:
+        """x, z and u at the samples `chosen` of a motion without memories, and z at those after them."""
         x, z, _ = self.equilibria(command[chosen])
         x_then, z_then, _ = self.equilibria(command[_following(len(command), closed)[chosen]])
-        u = self._drive(x, z, x_then, z_then)
-        return bool(np.all(np.isfinite(u))) and not violations(self.model, x, z, u, margin)
+        return x, z, self._drive(x, z, x_then, z_then), z_then
 
     @cached_property
     def _equilibria(self) -> ca.Function:
