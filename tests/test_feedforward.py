@@ -9,7 +9,7 @@ import pytest
 from conftest import DEVICE
 from scipy.optimize import lsq_linear
 
-from ctrlgen import Controller, ControllerStatus, build_model, simulate
+from ctrlgen import Controller, ControllerStatus, build_model, simulate, user_device
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
@@ -136,6 +136,21 @@ def test_the_cheap_bound_of_the_stress_is_never_below_it_and_exact_for_a_lift(mo
     lift = controller.static.displacement(model.rest, np.zeros(6), [0, 0, 0, 0, 0, 2e-5])
     share = float(controller.composite_ratio(model.rest, np.zeros(6), lift))
     assert share == pytest.approx(float(controller.composite_bound(lift)), abs=1e-4) and share > 0.3
+
+
+@pytest.mark.parametrize(("low", "high"), [("-30 um", "0 um"), ("-30 um", "1 um"), ("0 um", "30 um")])
+def test_a_stress_is_limited_whatever_the_signs_of_the_displacements(low, high):
+    """The cheap bound of axes that are only pulled is as good as of those that are pushed."""
+    device = user_device(
+        "stage", parameters={"gain": "0.2 N/V", "stiffness": "1 N/um"}, drive=dict.fromkeys("xy", "150 V"),
+        axes=dict.fromkeys("xy", (low, high)), force=lambda u, p: p.gain * u.vector, restoring_force=lambda d, p: p.stiffness * d.vector,
+        limits={"stress": (lambda d, p: 1e13 * ca.sum1(ca.fabs(d.vector)), "250 MPa")},
+    )  # fmt: skip
+    controller = Controller(build_model(device), "pose", H)
+    target = np.array([25e-6, 20e-6]) * (-1 if low.startswith("-") else 1)
+    step = controller.step(controller.rest(), target, settle=True)
+    assert step.status == ControllerStatus.COMPOSITE
+    assert step.displacement == pytest.approx(target / 1.8, rel=1e-9)
 
 
 def test_a_target_beyond_the_drives_is_approached_as_far_as_they_reach(model, controller):
