@@ -94,7 +94,7 @@ class ExactJoints:
         return motions, [second, lowest(odd[1], [3, 5, 7, 9]), fourth]
 
     def of_third_order(self, q: np.ndarray, forces: np.ndarray) -> float:
-        """W . (e_3 - theta x (theta x delta)/8) - f . a_3 [J] of the motion q (12,) of first order under the `forces` f (n,), e_3 and a_3 of
+        """W . (e_3 - theta x (theta x delta)/8) - f . a_3 [J] of the motion q (12,) of first order under the `forces` f (n,), e_3, a_3 of
         what is seen of a flexure from its first body, and of travels. An expansion to deformations and travels of second order leaves
         this of the energy of fourth order out, the eighth where the axes halfway are those of the deformation to second order."""
         s = ca.SX.sym("s")
