@@ -143,6 +143,17 @@ def test_an_axial_load_stiffens_in_both_planes_of_a_flexure(tmp_path, flexure, a
         assert stiffness == pytest.approx(3 + 1.2 * p - p**2 / 175, abs=1e-3)
 
 
+def test_an_axial_load_bends_the_length_that_it_stretches_to(tmp_path):
+    """Of an extensible beam P and F act on (1 + e) l, e = P/EA: F l^3/(EI y) = 3 + (6/5 - 6 EI/(EA l^2)) p + ..., 1.12 for a blade that is
+    pushed in its plane, w = 0.4 l. Source: E. Reissner, Z. Angew. Math. Phys. 23 (1972) 795, without shear."""
+    flexure = 'kind = "blade"\nthickness = "0.2 mm"\nwidth = "8 mm"\n'
+    device, d = loaded(tmp_path, column(1, flexure, "[0, 0, 1]")), ca.SX.sym("d", 2)
+    K = ca.Function("K", [d], [ca.jacobian(force_law(device)(d), d)])
+    share = W**2 / (12 * L**2)  # EI/(EA l^2)
+    rises = [K([0.0, p * share * L]).full()[0, 0] * L**3 / (E * T * W**3 / 12) for p in (0.1, -0.1)]
+    assert (rises[0] - rises[1]) / 0.2 == pytest.approx(1.2 - 6 * share, rel=1e-6)
+
+
 def test_the_force_of_an_actuator_on_an_arm_turns_with_its_lever(tmp_path):
     """On an arm of length r that turns by theta about a pivot of stiffness k and is pushed at its end, almost along the arm, the travel is
     r (cos a sin theta - sin a (1 - cos theta)). Of k theta^2/2 the fourth order is k (5/8 tan^2 a + 1/6) (d/(r cos a))^4; the 1/6,
