@@ -3,6 +3,8 @@ force."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -29,6 +31,7 @@ from ctrlgen.devices.mechanism_second_order import SecondOrder
 from ctrlgen.model.assembly import movable
 from ctrlgen.numerics.second_order import second_order
 from ctrlgen.physics import hexapod
+from ctrlgen.physics.second_order_flexure import Segment, beam
 
 LENGTH, THICKNESS = 20e-3, 0.2e-3  # of the blades of PARALLELOGRAM
 SIX = 'channels = ["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]'
@@ -172,6 +175,15 @@ def test_a_point_flexure_is_the_same_from_both_of_its_ends(tmp_path):
     assert pytest.approx(one.J, rel=1e-9, abs=1e-12) == two.J
     assert two.pose(d) == pytest.approx(one.pose(d), rel=1e-7) and np.abs(one.pose(d)[:3]).min() > 1e-8
     assert float(two.force(d)) == pytest.approx(float(one.force(d)), rel=1e-7)
+
+
+def test_a_beam_in_pieces_is_the_same_beam():
+    """Of every two loads: each piece goes on from the rotation in which the one before it ends."""
+    whole = Segment(20e-3, 2e5, 0.8, 0.3, 0.5)
+    pieces = [replace(whole, length=share * whole.length) for share in (0.2, 0.5, 0.3)]
+    a, b = [i for i in range(6) for _ in range(6)], list(range(6)) * 6
+    one, three = (ca.DM(beam(s, ca.DM.eye(6), a, b)).full() for s in ([whole], pieces))
+    assert three == pytest.approx(one, rel=1e-10, abs=1e-12 * np.abs(one).max()) and np.count_nonzero(one) > 20
 
 
 def test_the_end_of_an_arm_on_a_notch_turns_about_the_middle_of_the_notch(tmp_path):

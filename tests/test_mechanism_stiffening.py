@@ -233,6 +233,11 @@ def test_stiffening_beside_prescribed_displacements_is_refused(tmp_path):
     assert "geometric_stiffening: of right has no effect where actuators prescribe displacements" in str(caught.value)
 
 
+def test_stiffening_of_first_order_is_refused(tmp_path):
+    with pytest.raises(InputError, match="geometric_stiffening of right is of second order"):
+        loaded(tmp_path, 'kinematics = "first_order"\n' + held())
+
+
 def test_the_energy_of_fourth_order_has_no_negative_stretching(tmp_path):
     """V_4 of a stage that is held by two blades is positive: stretching takes energy."""
     s = SecondOrder(Condensed(*with_values(loaded(tmp_path, held()))))

@@ -159,6 +159,8 @@ def test_with_inertia_feedforward_a_shaped_path_is_followed_exactly(tmp_path):
         ({"shaping": 'shaping = { kind = "ZV", frequency = "-3 Hz" }'}, "frequency"),
         ({"shaping": 'shaping = { kind = "ZV", damping_ratio = "120 %" }'}, "damping_ratio"),
         ({"shaping": 'shaping = "ZV"'}, "shaping"),
+        ({"shaping": 'shaping = { kind = "ZV", frequency = "1 mHz" }'}, "1e\\+07 samples longer, but at most 1000000"),
+        ({"shaping": 'shaping = { kind = "ZV", frequency = "11 kHz" }'}, "above half the sample_rate, 10000 Hz"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_shaped_is_a_fault(tmp_path, words, what):
