@@ -171,7 +171,7 @@ class Scenario:
         if given.frequency is not None:
             fastest = 0.5 / (self.sample_time or np.inf)
             if given.frequency.si > fastest:
-                what = f"is above half the sample_rate, {show(fastest, 'Hz', 6)}, where shaping does nothing; lower it, or raise sample_rate"
+                what = f"is above half the sample_rate, {show(fastest, 'Hz', 6)}, where shaping does nothing; lower it or raise sample_rate"
                 raise InputError(self.path, [Fault("shaping.frequency", what)])
             return make_shaper(
                 given.kind, given.frequency.si, 0.0 if given.damping_ratio is None else given.damping_ratio.si
