@@ -86,7 +86,7 @@ def run_time_constants(device: Any) -> tuple[RunTimeConstant, ...]:
         except ValueError as error:
             faults.append(f"{entry.number}: {error}")
     if stated.input is not None and not faults and stated.input not in {constant.path for constant in found}:
-        faults.append(f"input: {stated.input} is not among the constants; add it to them, or leave input out")
+        faults.append(f"input: {stated.input!r} is not among the constants; add it to them, or leave input out")
     if faults:
         raise ValueError("run_time: " + "; ".join(faults))
     return tuple(found)
