@@ -61,7 +61,7 @@ class RunTimeConstant:
     @property
     def range_text(self) -> str:
         """Such as '450 ... 650 K/W'."""
-        ends = [show(v, self.unit).removesuffix(self.unit).strip() for v in (self.low, self.high)]
+        ends = [show(v, self.unit).removesuffix(f" {self.unit}") for v in (self.low, self.high)]
         return f"{ends[0]} ... {ends[1]} {'' if self.unit == '1' else self.unit}".strip()
 
     def shown(self, si: float, digits: int = 6) -> str:
