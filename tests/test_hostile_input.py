@@ -92,6 +92,10 @@ def test_an_effect_whose_kind_is_no_text(tmp_path):
         ('controller = "fäst"\n[path]\nkind = "poses"', "controller: 'fäst' is no C identifier"),
         ("controller = 3\n[path]\nkind = 'poses'", "controller: 3: write a text in quotes"),
         ('[path]\nkind = "poses"\nperiodic = "maybe"', "path.periodic: 'maybe': write true or false"),
+        (
+            '[path]\nkind = "poses"\nfile = "p.csv"\nperiodic = true',
+            "path.periodic is of motions in time: give sample_rate",
+        ),
     ],
 )
 def test_a_scenario_that_cannot_be_one(tmp_path, path, says):
