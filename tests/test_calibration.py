@@ -162,6 +162,10 @@ def test_a_device_without_run_time_constants_is_refused():
             'constants = [{ number = "actuator.time_constant", low = "6 ms", high = "7 ms" }]',
             "is not within 6 ... 7 ms",
         ),
+        (
+            'constants = [{ number = "actuator.time_constant", low = "3 ms", high = "4 ms" }]',
+            "is not within 3 ... 4 ms",
+        ),
         ('constants = [{ number = "actuator.time_constant", low = "0 ms", high = "7 ms" }]', "out of bounds"),
         ('constants = [{ number = "actuator.time_constant", low = "4 K", high = "7 ms" }]', "wrong unit"),
         ('constants = ["actuator.ambient", "actuator.ambient"]', "is named twice"),

@@ -213,6 +213,15 @@ def test_a_lost_state_gets_the_safe_drive_until_one_starts_again_from_rest(contr
     )  # every state within its limits is one
 
 
+def test_a_state_is_lost_beyond_four_times_its_range_in_the_root_mean_square(controller):
+    hottest, farthest = (bound[1][0] for bound in (controller.nominal.x_bounds, controller.nominal.z_bounds))
+    for x, z, lost in ((3.99, 3.99, False), (4.01, 0.0, True), (0.0, 4.01, True)):
+        assert controller.is_lost(np.full(6, x * hottest), np.full(6, z * farthest)) == lost
+    one = np.zeros(6)
+    one[2] = 9.7 * farthest  # sqrt(6) times four is 9.8
+    assert not controller.is_lost(np.zeros(6), one) and controller.is_lost(np.zeros(6), 1.02 * one)
+
+
 def test_limits_that_the_stroke_implies_are_not_computed_online(controller):
     assert [limit.name for limit in controller.guarded_limits] == ["wire_stress"]
 
