@@ -171,8 +171,8 @@ def test_what_cannot_be_shaped_is_a_fault(tmp_path, words, what):
 @pytest.mark.parametrize(
     ("more", "what"),
     [
-        ('[[effect]]\nkind = "thermal_lag"\nat = "axis"\nshare = "0.2"\ntau = "0.01 s"\nsecond = "0.3"\n', "the device has effects with memories,"),
-        ('[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\n', "the device has a feedback loop"),
+        ('[[effect]]\nkind = "thermal_lag"\nat = "axis"\nshare = "0.2"\ntau = "0.01 s"\nsecond = "0.3"\n', "effects with memories,"),
+        ('[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\n', "a feedback loop"),
         ('[[effect]]\nkind = "coulomb"\nat = "axis"\nforce = "1 N"\nreach = "0.1 um"\nsmoothing = "1 um/s"\n', "and dry friction"),
     ],
 )  # fmt: skip
