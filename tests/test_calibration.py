@@ -164,10 +164,19 @@ def test_a_device_without_run_time_constants_is_refused():
             'constants = [{ number = "actuator.time_constant", low = "6 ms", high = "7 ms" }]',
             "is not within 6 ... 7 ms",
         ),
+        (
+            'constants = [{ number = "actuator.time_constant", low = "3 ms", high = "4 ms" }]',
+            "is not within 3 ... 4 ms",
+        ),
         ('constants = [{ number = "actuator.time_constant", low = "0 ms", high = "7 ms" }]', "out of bounds"),
         ('constants = [{ number = "actuator.time_constant", low = "4 K", high = "7 ms" }]', "wrong unit"),
         ('constants = ["actuator.ambient", "actuator.ambient"]', "is named twice"),
         ('constants = ["actuator.ambient"]\ninput = "actuator.young"', "is not among the constants"),
+        ("constants = []", r"1 fault\n.*run_time.constants: has 0 entries; give 1 or more"),
+        (
+            'constants = [{ number = "actuator.ambient", low = 10 }]',
+            r"1 fault\n.*constants\[0\].low: 10: write a text in quotes",
+        ),
     ],
 )
 def test_a_run_time_table_that_cannot_be_is_refused_with_what_to_do(tmp_path, stated, words):

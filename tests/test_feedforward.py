@@ -9,7 +9,7 @@ import pytest
 from conftest import DEVICE
 from scipy.optimize import lsq_linear
 
-from ctrlgen import Controller, ControllerStatus, build_model, simulate
+from ctrlgen import Controller, ControllerStatus, build_model, simulate, user_device
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
@@ -138,6 +138,21 @@ def test_the_cheap_bound_of_the_stress_is_never_below_it_and_exact_for_a_lift(mo
     assert share == pytest.approx(float(controller.composite_bound(lift)), abs=1e-4) and share > 0.3
 
 
+@pytest.mark.parametrize(("low", "high"), [("-30 um", "0 um"), ("-30 um", "1 um"), ("0 um", "30 um")])
+def test_a_stress_is_limited_whatever_the_signs_of_the_displacements(low, high):
+    """The cheap bound of axes that are only pulled is as good as of those that are pushed."""
+    device = user_device(
+        "stage", parameters={"gain": "0.2 N/V", "stiffness": "1 N/um"}, drive=dict.fromkeys("xy", "150 V"),
+        axes=dict.fromkeys("xy", (low, high)), force=lambda u, p: p.gain * u.vector, restoring_force=lambda d, p: p.stiffness * d.vector,
+        limits={"stress": (lambda d, p: 1e13 * ca.sum1(ca.fabs(d.vector)), "250 MPa")},
+    )  # fmt: skip
+    controller = Controller(build_model(device), "pose", H)
+    target = np.array([25e-6, 20e-6]) * (-1 if low.startswith("-") else 1)
+    step = controller.step(controller.rest(), target, settle=True)
+    assert step.status == ControllerStatus.COMPOSITE
+    assert step.displacement == pytest.approx(target / 1.8, rel=1e-9)
+
+
 def test_a_target_beyond_the_drives_is_approached_as_far_as_they_reach(model, controller):
     """The drive that is first at its limit is at it, and the displacement on the straight line to the target."""
     settled = controller.step(controller.rest(), np.array([0, 0, 0, 0, 0, 1e-5]), settle=True).state
@@ -196,6 +211,15 @@ def test_a_lost_state_gets_the_safe_drive_until_one_starts_again_from_rest(contr
     assert not controller.is_lost(
         np.full(6, edge), controller.nominal.z_bounds[1]
     )  # every state within its limits is one
+
+
+def test_a_state_is_lost_beyond_four_times_its_range_in_the_root_mean_square(controller):
+    hottest, farthest = (bound[1][0] for bound in (controller.nominal.x_bounds, controller.nominal.z_bounds))
+    for x, z, lost in ((3.99, 3.99, False), (4.01, 0.0, True), (0.0, 4.01, True)):
+        assert controller.is_lost(np.full(6, x * hottest), np.full(6, z * farthest)) == lost
+    one = np.zeros(6)
+    one[2] = 9.7 * farthest  # sqrt(6) times four is 9.8
+    assert not controller.is_lost(np.zeros(6), one) and controller.is_lost(np.zeros(6), 1.02 * one)
 
 
 def test_limits_that_the_stroke_implies_are_not_computed_online(controller):

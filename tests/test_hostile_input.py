@@ -82,6 +82,20 @@ def test_an_effect_whose_kind_is_no_text(tmp_path):
         ('[path]\nkind = "poses"\nfile = "a\\u0000b"', "is no name of a file"),
         (f'[path]\nkind = "poses"\nfile = "{"x" * 5000}"', "File name too long; choose a shorter name"),
         ('[[record]]\nfile = "a"', "describes a recording; name a scenario"),
+        (
+            'controller = "Fast"\n[path]\nkind = "poses"',
+            "controller: 'Fast' is no C identifier in lower case: begin with a letter",
+        ),
+        ('controller = "2fast"\n[path]\nkind = "poses"', "controller: '2fast' is no C identifier"),
+        ('controller = ""\n[path]\nkind = "poses"', "controller: '' is no C identifier"),
+        ('controller = "fast\\n"\n[path]\nkind = "poses"', "is no C identifier"),
+        ('controller = "fäst"\n[path]\nkind = "poses"', "controller: 'fäst' is no C identifier"),
+        ("controller = 3\n[path]\nkind = 'poses'", "controller: 3: write a text in quotes"),
+        ('[path]\nkind = "poses"\nperiodic = "maybe"', "path.periodic: 'maybe': write true or false"),
+        (
+            '[path]\nkind = "poses"\nfile = "p.csv"\nperiodic = true',
+            "path.periodic is of motions in time: give sample_rate",
+        ),
     ],
 )
 def test_a_scenario_that_cannot_be_one(tmp_path, path, says):

@@ -3,10 +3,13 @@ force."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICE
+from exact_joints import ExactJoints, jointed, relative
 from mechanism_files import (
     HEAD,
     PARALLELOGRAM,
@@ -15,6 +18,7 @@ from mechanism_files import (
     TWO_BODIES,
     blade,
     dm,
+    hinged,
     loaded,
     mems_hexapod_text,
     spring,
@@ -27,6 +31,7 @@ from ctrlgen.devices.mechanism_second_order import SecondOrder
 from ctrlgen.model.assembly import movable
 from ctrlgen.numerics.second_order import second_order
 from ctrlgen.physics import hexapod
+from ctrlgen.physics.second_order_flexure import Segment, beam
 
 LENGTH, THICKNESS = 20e-3, 0.2e-3  # of the blades of PARALLELOGRAM
 SIX = 'channels = ["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]'
@@ -170,6 +175,40 @@ def test_a_point_flexure_is_the_same_from_both_of_its_ends(tmp_path):
     assert pytest.approx(one.J, rel=1e-9, abs=1e-12) == two.J
     assert two.pose(d) == pytest.approx(one.pose(d), rel=1e-7) and np.abs(one.pose(d)[:3]).min() > 1e-8
     assert float(two.force(d)) == pytest.approx(float(one.force(d)), rel=1e-7)
+
+
+def test_a_beam_in_pieces_is_the_same_beam():
+    """Of every two loads: each piece goes on from the rotation in which the one before it ends."""
+    whole = Segment(20e-3, 2e5, 0.8, 0.3, 0.5)
+    pieces = [replace(whole, length=share * whole.length) for share in (0.2, 0.5, 0.3)]
+    a, b = [i for i in range(6) for _ in range(6)], list(range(6)) * 6
+    one, three = (ca.DM(beam(s, ca.DM.eye(6), a, b)).full() for s in ([whole], pieces))
+    assert three == pytest.approx(one, rel=1e-10, abs=1e-12 * np.abs(one).max()) and np.count_nonzero(one) > 20
+
+
+def test_the_end_of_an_arm_on_a_notch_turns_about_the_middle_of_the_notch(tmp_path):
+    """Nearer by r theta^2/2, r = 32 mm from there and not 30 mm from the end of the notch; what the notch shears is below 1 % of r."""
+    y, nearer = 1e-3, Expanded(loaded(tmp_path, hinged(2.0))).pose([1e-3])[3]
+    assert nearer == pytest.approx(-(y**2) / (2 * 32e-3), rel=0.01)
+
+
+def test_a_reading_of_second_order_is_seen_from_the_body_on_which_its_sensor_stands(tmp_path):
+    """A displacement and a rotation, of a body that moves against one that does, from equilibria at finite rotations."""
+    sensors = (
+        '[[reading]]\nname = "gauge"\nbody = "b"\nagainst = "a"\nat = ["17 mm", "-5 mm", "4 mm"]\nalong = [2, -1, 2]\n'
+    )
+    sensors += '[[reading]]\nname = "level"\nbody = "b"\nagainst = "a"\nabout = [1, 2, -2]\n'
+    c = Condensed(*with_values(loaded(tmp_path, jointed() + sensors)))
+    expanded, exact, d = SecondOrder(c), ExactJoints(c), np.array([0.8, -0.5]) * 2e-4
+
+    def read(sign: float) -> np.ndarray:
+        q = ca.SX(exact.held(sign * d)[0])
+        seen = dm(relative(q[:6], q[6:], ca.DM([17e-3, -5e-3, 4e-3]), halfway=False)).ravel()
+        return np.array([seen[3:] @ [2, -1, 2], seen[:3] @ [1, 2, -2]]) / 3
+
+    even = (read(1) + read(-1)) / 2
+    assert dm(expanded.sensed(ca.DM(d))).ravel() == pytest.approx(even, rel=2e-3)  # (d/l)^2 of it is of fourth order
+    assert dm(c.reading_motion) @ d == pytest.approx((read(1) - read(-1)) / 2, rel=2e-3)
 
 
 def test_the_effect_of_finite_rotation_adds_what_the_file_states_always(tmp_path):

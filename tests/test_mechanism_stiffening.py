@@ -5,7 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from mechanism_files import HEAD, PARALLELOGRAM, SILICON, blade, dm, loaded, with_values
+from exact_joints import ExactJoints, jointed
+from mechanism_files import HEAD, PARALLELOGRAM, REST, SILICON, blade, dm, loaded, with_values
 from scipy.optimize import brentq
 
 from ctrlgen import InputError, build_model, load_scenario, run, solve
@@ -88,14 +89,17 @@ def test_a_stage_whose_blades_may_come_nearer_does_not_stiffen(tmp_path):
     assert float(force_law(device)(y)) == pytest.approx(24 * EI / L**3 * y, rel=0.1 * (y / L) ** 2)
 
 
-def column(wires: int) -> str:
-    """A body on one wire, or guided by two, pushed across and along: d = (across, along)."""
+WIRE = 'kind = "wire"\ndiameter = "0.2 mm"\n'
+
+
+def column(wires: int, flexure: str = WIRE, across: str = "[1, 0, 0]") -> str:
+    """A body on one flexure, or guided by two, pushed across and along: d = (across, along)."""
     text = HEAD + SILICON + '[[body]]\nname = "stage"\n'
     for k in range(wires):
         text += (
-            f'[[element]]\nkind = "wire"\nname = "wire{k}"\nfrom = "ground"\nto = "stage"\n'
+            f'[[element]]\n{flexure}name = "wire{k}"\nfrom = "ground"\nto = "stage"\n'
             f'at = ["{20 * k - 10 * (wires - 1)} mm", "0 mm", "0 mm"]\n'
-            f'along = [0, 1, 0]\nacross = [1, 0, 0]\nlength = "20 mm"\ndiameter = "0.2 mm"\nmaterial = "silicon"\n{STIFFENS}'
+            f'along = [0, 1, 0]\nacross = {across}\nlength = "20 mm"\nmaterial = "silicon"\n{STIFFENS}'
         )
     at = f'["0 mm", "{-10 * (wires - 1)} mm", "0 mm"]'
     for name, along in (("across", "[1, 0, 0]"), ("along", "[0, 1, 0]")):
@@ -119,6 +123,73 @@ def test_an_axial_load_stiffens_and_softens_as_a_beam_column(tmp_path, wires, ex
         assert across == pytest.approx(np.polyval(series[::-1], p), abs=5e-4)
         assert across == pytest.approx(exact(p), abs=3e-4 * abs(p) ** 3 + 5e-4)
     assert across - series[0] == pytest.approx(2.4, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("flexure", "across", "bending", "area"),
+    [
+        (WIRE, "[1, 0, 0.7]", np.pi * T**4 / 64, np.pi * T**2 / 4),
+        ('kind = "blade"\nthickness = "0.2 mm"\nwidth = "0.4 mm"\n', "[1, 0, 0]", 2 * T**4 / 12, 2 * T**2),
+        ('kind = "blade"\nthickness = "0.2 mm"\nwidth = "0.4 mm"\n', "[0, 0, 1]", 8 * T**4 / 12, 2 * T**2),
+    ],
+)
+def test_an_axial_load_stiffens_in_both_planes_of_a_flexure(tmp_path, flexure, across, bending, area):
+    """3 + 6 p/5 - p^2/175 of a free end, pushed across the thickness or the width of a blade, or askew to the frame of a wire;
+    the load changes its length by p EI/(EA l^2), 7e-5 at most, and the stiffness by three to ten times as much."""
+    device, d = loaded(tmp_path, column(1, flexure, across)), ca.SX.sym("d", 2)
+    K = ca.Function("K", [d], [ca.jacobian(force_law(device)(d), d)])
+    for p in (-2.0, 2.0):
+        stiffness = K([0.0, p * bending / (L * area)]).full()[0, 0] * L**3 / (E * bending)
+        assert stiffness == pytest.approx(3 + 1.2 * p - p**2 / 175, abs=1e-3)
+
+
+def test_an_axial_load_bends_the_length_that_it_stretches_to(tmp_path):
+    """Of an extensible beam P and F act on (1 + e) l, e = P/EA: F l^3/(EI y) = 3 + (6/5 - 6 EI/(EA l^2)) p + ..., 1.12 for a blade that is
+    pushed in its plane, w = 0.4 l. Source: E. Reissner, Z. Angew. Math. Phys. 23 (1972) 795, without shear."""
+    flexure = 'kind = "blade"\nthickness = "0.2 mm"\nwidth = "8 mm"\n'
+    device, d = loaded(tmp_path, column(1, flexure, "[0, 0, 1]")), ca.SX.sym("d", 2)
+    K = ca.Function("K", [d], [ca.jacobian(force_law(device)(d), d)])
+    share = W**2 / (12 * L**2)  # EI/(EA l^2)
+    rises = [K([0.0, p * share * L]).full()[0, 0] * L**3 / (E * T * W**3 / 12) for p in (0.1, -0.1)]
+    assert (rises[0] - rises[1]) / 0.2 == pytest.approx(1.2 - 6 * share, rel=1e-6)
+
+
+def test_the_force_of_an_actuator_on_an_arm_turns_with_its_lever(tmp_path):
+    """On an arm of length r that turns by theta about a pivot of stiffness k and is pushed at its end, almost along the arm, the travel is
+    r (cos a sin theta - sin a (1 - cos theta)). Of k theta^2/2 the fourth order is k (5/8 tan^2 a + 1/6) (d/(r cos a))^4; the 1/6,
+    which is of the arm's third order, is what is left out."""
+    a, r = np.radians(80), 10e-3
+    pivot = "".join(f'theta_{x}_per_M_{x} = "{1 if x == "z" else 1e-6} rad/(N*m)"\n' for x in "xyz")
+    pivot += "".join(f'delta_{x}_per_F_{x} = "1e-6 um/N"\n' for x in "xyz")
+    push = f'at = ["10 mm", "0 mm", "0 mm"]\nalong = [{-np.sin(a)}, {np.cos(a)}, 0]'
+    rest = REST.replace('at = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]', push).replace("delta_x", "theta_z")
+    for side in (1, -1):
+        text = (
+            HEAD
+            + '[[body]]\nname = "plate"\n[[element]]\nkind = "compliance"\nname = "pivot"\nfrom = "ground"\nto = "plate"\n'
+        )
+        text += 'at = ["0 mm", "0 mm", "0 mm"]\n' + pivot + rest.replace(f"[{-np.sin(a)}", f"[{-side * np.sin(a)}")
+        s = SecondOrder(Condensed(*with_values(loaded(tmp_path, text))))
+        turned = 1 / (r * np.cos(a))  # rad/m
+        assert dm(s.cubic)[0, 0] == pytest.approx(-side * np.tan(a) / 2 * turned**3, rel=1e-4)
+        assert dm(s.quartic)[0, 0] == pytest.approx(5 / 8 * np.tan(a) ** 2 * turned**4, rel=1e-4)
+
+
+@pytest.mark.parametrize("direction", [[1.0, 0.0], [0.0, 1.0], [0.8, -0.5], [0.5, 0.9]])
+def test_the_energy_of_joints_and_the_motion_of_their_bodies_are_those_of_finite_rotations(tmp_path, direction):
+    """Order by order, from equilibria at finite travels of both signs; what is of third order in deformations and travels is left out."""
+    c = Condensed(*with_values(loaded(tmp_path, jointed())))
+    s, exact, d = SecondOrder(c), ExactJoints(c), np.array(direction) * 1e-3
+    products = dm(s.products(ca.DM(d))).ravel()
+    (first, second), V = exact.orders(d)
+    assert first == pytest.approx(np.concatenate([dm(T) @ d for T in c.twists]), rel=1e-6, abs=1e-9)
+    assert np.concatenate([dm(T) @ products for T in s.twists]) == pytest.approx(
+        second, abs=1e-5 * np.abs(second).max()
+    )
+    assert V[0] == pytest.approx(d @ dm(c.stiffness) @ d / 2, rel=1e-8)
+    assert V[1] == pytest.approx(d @ dm(s.cubic) @ products, rel=1e-5)
+    left_out = exact.of_third_order(first, dm(c.stiffness) @ d)
+    assert V[2] == pytest.approx(products @ dm(s.quartic) @ products + left_out, rel=1e-4)
 
 
 def test_force_and_pose_of_a_held_stage_come_from_one_energy(tmp_path):
@@ -160,6 +231,11 @@ def test_stiffening_beside_prescribed_displacements_is_refused(tmp_path):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, text.replace('gain = "2 N/A"', 'gain = "2 um/A"'))
     assert "geometric_stiffening: of right has no effect where actuators prescribe displacements" in str(caught.value)
+
+
+def test_stiffening_of_first_order_is_refused(tmp_path):
+    with pytest.raises(InputError, match="geometric_stiffening of right is of second order"):
+        loaded(tmp_path, 'kinematics = "first_order"\n' + held())
 
 
 def test_the_energy_of_fourth_order_has_no_negative_stretching(tmp_path):

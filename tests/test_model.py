@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.linalg import expm
 from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.devices.mems_hexapod import matrices
 from ctrlgen.effects import Effect
+from ctrlgen.model.assembly import symbolic_model
 from ctrlgen.model.discretisation import held_step, one_step_map
 from ctrlgen.model.effect_terms import REQUIREMENTS
 from ctrlgen.model.linearisation import equilibrium, linearise
@@ -217,6 +220,21 @@ def test_a_controller_of_a_model_with_free_parameters_uses_their_nominal_values(
     freed = Controller(build_model(device, free=["hexapod.height"]), "pose", 1e-3)
     plain = Controller(model, "pose", 1e-3)
     assert np.array_equal(freed.step(freed.rest(), POSE).drive, plain.step(plain.rest(), POSE).drive)
+
+
+def test_bounds_as_formulas_follow_free_numbers_and_the_nearer_of_two_limits(device):
+    model = symbolic_model(device, ["actuator.power_limit"])
+    drive, (low, high) = model.limits[0], model.bounds_formulas[0]
+    nearer = replace(
+        model, limits=(*model.limits, drive, drive), bounds_formulas=(*model.bounds_formulas, (low, 0.9 * high), (-1.0, None))
+    )  # fmt: skip
+    for m, share in ((model, 1.0), (nearer, 0.9)):
+        bounds = ca.Function("bounds", [m.p], list(m.bounds_formula(m.u)))
+        for power in (0.1, 0.2):
+            lowest, most = (v.full().ravel() for v in bounds(power))
+            assert np.array_equal(lowest, np.zeros(6)) and most == pytest.approx(share * power, rel=1e-15)
+    own = ca.Function("bounds", [model.p], list(model.bounds_formula(model.u)))(model.p_nominal)
+    assert np.array_equal([v.full().ravel() for v in own], model.u_bounds)
 
 
 def test_a_device_that_softens_to_nothing_is_refused():

@@ -17,6 +17,7 @@ from ctrlgen import Controller, InputError, build_model, load_device, load_scena
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
 from ctrlgen.calibration.files import binary
 from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.firmware.folder import generate
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.real import Real
@@ -272,6 +273,22 @@ def test_the_loader_refuses_a_constant_out_of_bounds_whose_check_sum_is_right(li
         body = head + struct.pack(f"<{count}f", *(c.default for c in library.scenario.device.given_at_start[:-1]), bad)
         status, read = library.load(body + struct.pack("<I", zlib.crc32(body)))
         assert status == REFUSED and np.all(np.isnan(read))
+
+
+def test_bounds_that_are_not_stated_are_a_fifth_of_a_number_and_twenty_kelvins_of_a_temperature(tmp_path):
+    text = '\n[run_time]\nconstants = ["actuator.ambient", "actuator.time_constant", { number = "actuator.young", high = "140 GPa" }]\n'
+    ambient, lag, young = scenario_of(tmp_path, text).device.given_at_start
+    assert (ambient.low, ambient.high) == pytest.approx((275.15, 315.15))
+    assert (lag.low, lag.high) == pytest.approx((4e-3, 6e-3))
+    assert (young.low, young.high) == pytest.approx((104e9, 140e9))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "unit", "text"),
+    [(0.01, 0.21, "1", "0.01 ... 0.21"), (1.0, 11.0, "1", "1 ... 11"), (1e-6, 2e-6, "um", "1 ... 2 um"), (0.1, 0.2, "%", "10 ... 20 %")],
+)  # fmt: skip
+def test_a_range_keeps_its_digits_whatever_its_unit(low, high, unit, text):
+    assert RunTimeConstant("a.b", "b", low, low, high, unit).range_text == text
 
 
 @pytest.mark.long

@@ -12,7 +12,7 @@ from scipy.signal import cont2discrete
 
 from ctrlgen import InputError, SolverError, build_model, load_scenario, solve
 from ctrlgen.devices import load_device
-from ctrlgen.model.quasi_static import natural_modes
+from ctrlgen.model.quasi_static import natural_modes, quasi_static
 
 AXIS = SCENARIOS / "devices" / "flexure_axis.toml"
 MASS, DAMPING, STIFFNESS, FORCE = 0.5, 30.0, 0.2e6, 10.0  # of flexure_axis.toml: kg, N*s/m, N/m, N/V
@@ -159,11 +159,27 @@ def test_with_inertia_feedforward_a_shaped_path_is_followed_exactly(tmp_path):
         ({"shaping": 'shaping = { kind = "ZV", frequency = "-3 Hz" }'}, "frequency"),
         ({"shaping": 'shaping = { kind = "ZV", damping_ratio = "120 %" }'}, "damping_ratio"),
         ({"shaping": 'shaping = "ZV"'}, "shaping"),
+        ({"shaping": 'shaping = { kind = "ZV", frequency = "1 mHz" }'}, "1e\\+07 samples longer, but at most 1000000"),
+        ({"shaping": 'shaping = { kind = "ZV", frequency = "11 kHz" }'}, "above half the sample_rate, 10000 Hz"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_shaped_is_a_fault(tmp_path, words, what):
     with pytest.raises(InputError, match=what):
         solved(tmp_path, **words)
+
+
+@pytest.mark.parametrize(
+    ("more", "what"),
+    [
+        ('[[effect]]\nkind = "thermal_lag"\nat = "axis"\nshare = "0.2"\ntau = "0.01 s"\nsecond = "0.3"\n', "effects with memories,"),
+        ('[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\n', "a feedback loop"),
+        ('[[effect]]\nkind = "coulomb"\nat = "axis"\nforce = "1 N"\nreach = "0.1 um"\nsmoothing = "1 um/s"\n', "and dry friction"),
+    ],
+)  # fmt: skip
+def test_a_drive_that_depends_on_the_motion_is_not_static(tmp_path, more, what):
+    (tmp_path / "device.toml").write_text(AXIS.read_text() + more)
+    with pytest.raises(InputError, match=f"feedforward: is static, but .*{what}"):
+        quasi_static(build_model(load_device(tmp_path / "device.toml")))
 
 
 def test_a_device_in_balance_is_shaped_for_a_stated_frequency(tmp_path):

@@ -84,7 +84,21 @@ def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Mod
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        raise InputError(path, [_fault(model, details) for details in error.errors()]) from None
+        found = error.errors()
+        wrong = [details["loc"] for details in found]
+        raise InputError(
+            path,
+            [
+                _fault(model, details)
+                for details in found
+                if details["type"] != "too_short" or not any(_inside(other, details["loc"]) for other in wrong)
+            ],
+        ) from None
+
+
+def _inside(place: Sequence[Any], outer: Sequence[Any]) -> bool:
+    """Whether a fault is of a part of what another one is of: pydantic does not count the entries of a list that are wrong."""
+    return len(place) > len(outer) and tuple(place[: len(outer)]) == tuple(outer)
 
 
 def _fault(model: type[BaseModel], details: Any) -> Fault:
@@ -106,6 +120,11 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
         )
     elif details["type"] in _REMEDY:
         message = f"{reprlib.repr(details['input'])}: {_REMEDY[details['type']]}"
+    elif details["type"] in ("too_short", "too_long"):
+        many, least, most = (details["ctx"].get(key) for key in ("actual_length", "min_length", "max_length"))
+        message = (
+            f"has {many} entries; give {least} or more" if most is None else f"has {many} entries; give {most} or fewer"
+        )
     elif details["type"] == "literal_error":
         message = f"{reprlib.repr(details['input'])} must be {details['ctx']['expected']}"
     elif details["type"] == "union_tag_invalid":
@@ -124,6 +143,7 @@ _REMEDY = {
     "float_type": "write a number without a unit",
     "float_parsing": "write a number without a unit",
     "bool_type": "write true or false",
+    "bool_parsing": "write true or false",
     "model_attributes_type": "write a table, such as { ... } or [section]",
     "model_type": "write a table, such as { ... } or [section]",
     "dict_type": 'write a table, such as { delta_z = "20 um" }',

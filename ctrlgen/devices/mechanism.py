@@ -155,6 +155,10 @@ class Mechanism(Device):
         faults, asked = [], "geometric_stiffening" if stiffens else "kinematics" if self.second_order else ""
         if asked and any(isinstance(e, Spring) and e.cubic for e in self.element):
             faults.append(f"{asked}: the second order is that of linear flexures; leave it out, or the springs' k_3")
+        if stiffens and self.kinematics == "first_order" and "kinematics" in self.model_fields_set:
+            faults.append(
+                f'kinematics: geometric_stiffening of {", ".join(stiffens)} is of second order, not of "first_order"; leave out one of them'
+            )
         if stiffens and self.actuator and self.actuator[0].kind == "displacement":
             faults.append(
                 f"geometric_stiffening: of {', '.join(stiffens)} has no effect where actuators prescribe displacements; leave it out, "

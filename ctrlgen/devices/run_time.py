@@ -61,7 +61,7 @@ class RunTimeConstant:
     @property
     def range_text(self) -> str:
         """Such as '450 ... 650 K/W'."""
-        ends = [show(v, self.unit).removesuffix(self.unit).strip() for v in (self.low, self.high)]
+        ends = [show(v, self.unit).removesuffix(f" {self.unit}") for v in (self.low, self.high)]
         return f"{ends[0]} ... {ends[1]} {'' if self.unit == '1' else self.unit}".strip()
 
     def shown(self, si: float, digits: int = 6) -> str:
@@ -86,7 +86,7 @@ def run_time_constants(device: Any) -> tuple[RunTimeConstant, ...]:
         except ValueError as error:
             faults.append(f"{entry.number}: {error}")
     if stated.input is not None and not faults and stated.input not in {constant.path for constant in found}:
-        faults.append(f"input: {stated.input} is not among the constants; add it to them, or leave input out")
+        faults.append(f"input: {stated.input!r} is not among the constants; add it to them, or leave input out")
     if faults:
         raise ValueError("run_time: " + "; ".join(faults))
     return tuple(found)

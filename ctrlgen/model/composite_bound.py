@@ -24,7 +24,7 @@ def composite_bound(model: Model, follow: str, ratios: Callable[[np.ndarray], np
     W = slope(model.rest, 0 * model.z_scale).full()
     if W.shape[0] != W.shape[1] or np.linalg.matrix_rank(W) < len(W):
         W = np.eye(model.z.numel())
-    reach = np.abs(W) @ model.z_bounds[1]  # of lambda_k over the range
+    reach = np.abs(W) @ np.max(np.abs(model.z_bounds), axis=0)  # of lambda_k over the range
     V = np.linalg.inv(W) * reach  # columns v_k, scaled to where lambda_k = reach_k
     shares = np.max([ratios(side * V) for side in (-1.0, 1.0)], axis=0)
     if not all(np.allclose(ratios(s * V), abs(s) * shares, rtol=1e-6, atol=1e-6) for s in (-0.5, 0.1)):

@@ -28,7 +28,7 @@ REQUIREMENTS = {  # the words of `Effect.requires`, in messages
     "force": "forces in N or N*m",
     "heat": "heaters",
     "sample_time": "a sample time",
-    "second_order_kinematics": "the second-order kinematics of the links",
+    "second_order_kinematics": "the second-order kinematics of the links, and a pose that is without it",
     "spatial": "a pose of six components",
     "state": "heaters, whose temperature it reads",
     "tangent_compliance": "the tangent compliance of the stages",

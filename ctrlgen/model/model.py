@@ -205,9 +205,9 @@ class Model:
         for limit, (lower, upper) in zip(self.limits, self.bounds_formulas, strict=True):
             for _, i in _positions(limit, symbol):
                 if lower is not None:
-                    low[i] = lower if low[i].is_inf() or low[i].is_minus_inf() else ca.fmax(low[i], lower)
+                    low[i] = ca.SX(lower) if low[i].is_minus_inf() else ca.fmax(low[i], lower)
                 if upper is not None:
-                    high[i] = upper if high[i].is_inf() else ca.fmin(high[i], upper)
+                    high[i] = ca.SX(upper) if high[i].is_inf() else ca.fmin(high[i], upper)
         return ca.vertcat(ca.SX(0, 1), *low), ca.vertcat(ca.SX(0, 1), *high)
 
     def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u", "rate"] | None:

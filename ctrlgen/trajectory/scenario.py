@@ -95,10 +95,10 @@ class Scenario:
         if isinstance(self.file.path, Poses) or self.file.duration is None or self.file.sample_rate is None:
             return None
         n, rate = self._sample_count(self.file.sample_rate, self.file.duration), self.file.sample_rate
-        given = self._shaping_as_given(model)
+        given, most = self._shaping_as_given(model), MOST_SAMPLES - self._longer(self.shaper(model))
 
         def target(times: float) -> Command:
-            samples = min(round(times * n), MOST_SAMPLES)
+            samples = min(round(times * n), most)
             longer = read_quantity("s", f"{samples / rate.si!r} s")
             return replace(self, file=self.file.model_copy(update={"duration": longer} | given)).target(model)
 
@@ -137,8 +137,15 @@ class Scenario:
             1 if isinstance(self.file.path, Poses) else 0
         )  # listed samples are joined by cubic splines, and not by lines
         shaper = self.shaper(model)
-        longer = 0 if shaper is None else shaper.samples(self.sample_time or 0.0)
+        longer = self._longer(shaper)
+        if shaper is not None and n + longer > MOST_SAMPLES:
+            what = f"of {show(shaper.frequency, 'Hz')} makes the path {longer:.6g} samples longer, but at most {MOST_SAMPLES} are possible"
+            raise InputError(self.path, [Fault("shaping.frequency", f"{what}: raise it, or lower sample_rate")])
         return self._tables(model, order, np.arange(n + longer) + after, shaper)[0]
+
+    def _longer(self, shaper: Shaper | None) -> int:
+        """By how many samples a path is longer that is shaped."""
+        return 0 if shaper is None else shaper.samples(self.sample_time or 0.0)
 
     def _tables(self, model: Model, order: int, at: np.ndarray, shaper: Shaper | None) -> np.ndarray:
         """(order + 1, len(at), channels) [SI, per sample^k] of the path, shaped where there is a shaper."""
@@ -153,8 +160,8 @@ class Scenario:
         return np.asarray(tables)
 
     def shaper(self, model: Model) -> Shaper | None:
-        """The impulses with which the path is convolved; None where it is not shaped. Raises InputError for a closed path, and where the
-        model has no mode and no frequency is stated."""
+        """The impulses with which the path is convolved; None where it is not shaped. Raises InputError for a closed path, for a
+        frequency too high for the samples, and where the model has no mode and none is stated."""
         given = self.file.shaping
         if given is None:
             return None
@@ -162,6 +169,10 @@ class Scenario:
             what = "leaves a mode at rest where a path ends, but this one is periodic: write from_rest = true in path, or leave it out"
             raise InputError(self.path, [Fault("shaping", what)])
         if given.frequency is not None:
+            fastest = 0.5 / (self.sample_time or np.inf)
+            if given.frequency.si > fastest:
+                what = f"is above half the sample_rate, {show(fastest, 'Hz', 6)}, where shaping does nothing; lower it or raise sample_rate"
+                raise InputError(self.path, [Fault("shaping.frequency", what)])
             return make_shaper(
                 given.kind, given.frequency.si, 0.0 if given.damping_ratio is None else given.damping_ratio.si
             )

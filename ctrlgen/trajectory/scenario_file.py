@@ -116,6 +116,8 @@ class ScenarioFile(Section):
                 )
             if self.shaping is not None:
                 raise ValueError("shaping is of motions in time: give sample_rate and duration, or leave it out")
+            if isinstance(self.path, Poses) and self.path.periodic:
+                raise ValueError("path.periodic is of motions in time: give sample_rate, or leave it out")
             if self.points is None and not isinstance(self.path, Poses):
                 raise ValueError(
                     'a static scenario needs points = N; for motion in time give sample_rate = "1 kHz" and duration'

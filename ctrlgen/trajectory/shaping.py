@@ -30,7 +30,8 @@ class Shaping(Section):
     kind: Literal["ZV", "ZVD", "ZVDD"]
     """ZV: no vibration left at the stated frequency. ZVD and ZVDD: little left at frequencies near it too, where it is not known well."""
     frequency: Annotated[Quantity, In("Hz", positive=True)] | None = None
-    """Undamped natural frequency of the mode. Left out: that of the device's own mode which is damped least, at the end of the path."""
+    """Undamped natural frequency of the mode, at most half the `sample_rate`. Left out: that of the device's own mode which is damped
+    least, at the end of the path."""
     damping_ratio: Annotated[Quantity, In("1", low=0.0, high=0.99)] | None = None
     """Its damping ratio. Left out: that of the device's own mode; with a `frequency`, zero."""
 
