@@ -4,7 +4,7 @@
 
 as `ctrlgen.diagnosis.estimation.least_squares` states it, under the noise and the discrepancy of the recording. A constant that the
 recording does not tell better than `TOLD` times what its bounds tell keeps its default; the intervals of the others then include what
-it may be within its bounds (uniform, GUM 4.3.7).
+it may be within its bounds (uniform, GUM 4.3.7), with which they are correlated (GUM 5.2).
 """
 
 from __future__ import annotations
@@ -237,10 +237,9 @@ class _Search:
         joint = every.fit(_Specimen.of(self.device, chosen, held), values, steps=0)
         order = [constants.index(c) for c in (*chosen, *held)]
         covariance = np.diag([sd_of_bounds(c) ** 2 for c in constants])
-        found = _covariance(joint)
-        for i, a in enumerate(order[: len(chosen)]):
-            for j, b in enumerate(order[: len(chosen)]):
-                covariance[a, b] = found[i, j]
+        covariance[np.ix_(order, order)] = with_held(
+            _covariance(fit), joint.covariance, np.array([sd_of_bounds(c) for c in held])
+        )
         rows = []
         for k, c in enumerate(constants):
             determined = c in chosen
@@ -272,6 +271,19 @@ class _Search:
             start, end = (float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares)
             rows.append(ReadingError(channel, unit, start, end, float(self.fitter.noise.floor[i])))
         return tuple(rows)
+
+
+def with_held(fitted: np.ndarray, joint: np.ndarray, sds: np.ndarray) -> np.ndarray:
+    """(k, k) covariance of the deviations of fitted constants c and held ones h, in this order: c - c_true = e + G (h - h_true).
+
+    e, with the covariance `fitted`, is the deviation with h known; G = dc/dh follows from the covariance `joint` (k, k) of a fit of both,
+    C_ch C_hh^-1, whatever is stated of h there. `sds` (n_h,) of h - h_true are those of the bounds, for h stays where it is.
+    """
+    n, S = len(fitted), np.diag(sds**2)
+    if not len(sds):
+        return fitted
+    G = np.linalg.solve(joint[n:, n:], joint[n:, :n]).T
+    return np.block([[fitted + G @ S @ G.T, G @ S], [S @ G.T, S]])
 
 
 def _covariance(fit: Fit) -> np.ndarray:
