@@ -99,7 +99,9 @@ def test_a_constant_on_which_the_recording_says_nothing_keeps_its_default(tmp_pa
     assert found["actuator.time_constant"].determined
 
 
-@pytest.mark.parametrize("spread", [0.3, 3.0])  # of h beforehand: the readings tell it hardly, or better than its bounds
+@pytest.mark.parametrize(
+    "spread", [0.3, 3.0]
+)  # of h beforehand: the readings tell it hardly, or better than its bounds
 def test_constants_fitted_beside_a_held_one_deviate_with_it_as_stated(rng, spread):
     """Readings X_c c + x_h h + e, c by least squares with h held at 0 while it is anything within its bounds: scores over 20,000 draws
     against the standard deviations, correlation and 95 % intervals that are stated. 3 %: three standard errors of these."""
