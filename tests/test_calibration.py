@@ -166,6 +166,16 @@ def test_the_device_file_of_the_specimen_has_its_constants_and_the_authors_comme
     assert comments and all(comment in (tmp_path / NAME).read_text() for comment in comments)
 
 
+@pytest.mark.long
+def test_readings_in_another_unit_are_refused(tmp_path):
+    shutil.copytree(RECORDING, tmp_path / "mm")
+    told = tmp_path / "mm" / "recording.toml"
+    told.write_text(told.read_text().replace('"nm"', '"mm"'))
+    with pytest.raises(InputError, match=r"reading.delta_x: is .* times the motion of the model") as error:
+        calibrate(DEVICE, tmp_path / "mm")
+    assert len(error.value.faults) == 3
+
+
 def test_a_device_without_run_time_constants_is_refused():
     with pytest.raises(InputError, match="run_time: is missing"):
         calibrate(SCENARIOS / "devices" / "mems_hexapod.toml", RECORDING)

@@ -20,6 +20,7 @@ from ctrlgen.path_timing.confirmed import Followed
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
 from ctrlgen.path_timing.optimum import Optimiser
+from ctrlgen.path_timing.repetition import crossing, largest
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.paths import Poses
 
@@ -128,6 +129,18 @@ def test_a_circle_as_large_as_a_frequency_allows_takes_just_that_long():
     optimiser = Optimiser(found.solution.model, "pose", 1e-4)
     assert optimiser.along(found.curve.scaled(largest)).duration == pytest.approx(0.02, rel=2e-3)
     assert found.repetition.even < largest < 1
+
+
+@pytest.mark.parametrize("scale", [0.013, 0.37, 1.0, 41.0])
+def test_the_largest_scale_is_found_from_below(scale):
+    """Within 0.1 %, and never above: where the time is the period, where the path is no longer possible, where a limit breaks."""
+    for behind in (lambda s: 0.8 * (s - np.log(scale)), lambda s: -0.1 if s <= np.log(scale) else 10.0):
+        assert 0.999 * scale <= crossing(behind, behind(0.0)) <= scale * (1 + 1e-12)
+    assert 0.999 * scale <= largest(lambda tried: tried <= scale) <= scale
+
+
+def test_no_scale_is_found_where_none_is_small_enough():
+    assert crossing(lambda s: 1.0, 1.0) is None and largest(lambda scale: False) is None
 
 
 # With inertia

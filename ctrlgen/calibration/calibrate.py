@@ -40,6 +40,7 @@ TOLD = (
     0.5  # of the standard deviation that its bounds alone give a constant: above, the recording does not determine it
 )
 BEYOND = "at its bound: the specimen lies beyond it, or the device file leaves something out; run ctrlgen diagnose"
+FAR_READING = 3.0  # times the model's motion (rms), by which readings may be off it: more is another unit or origin
 AT_BOUND = 1e-4  # of the range: a value so near its end was held there
 
 
@@ -134,7 +135,7 @@ def calibrate(
     """
     described = load_device(device)
     if not described.given_at_start:
-        what = 'is missing: it names the numbers that differ between specimens; write constants = ["actuator.ambient"]'
+        what = 'is missing: it names what differs between specimens; write [run_time] and under it constants = ["actuator.ambient"]'
         raise InputError(device, [Fault("run_time", what)])
     progress("reading")
     paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
@@ -250,6 +251,7 @@ class _Search:
             rows.append(CalibratedConstant(c, value, float(np.sqrt(covariance[k, k])), determined, remark))
         start = replace(self.fitter, cache={}).fit(_Specimen.of(self.device, chosen), steps=0)
         errors = self._errors(start, fit)
+        self._check_readings(fit, errors)
         more = [e.channel for e in errors if e.after > DISCREPANCY.ratio * 2 * e.noise]
         if more:
             what = "is read with more than its noise in error, whatever the constants: run ctrlgen diagnose for what is left out"
@@ -258,6 +260,17 @@ class _Search:
             self.device, inputs, self.fitter.recording, tuple(rows), covariance, errors,
             tuple(dict.fromkeys((*self.notes, *(note for note in self.fitter.noise.notes if "as stated" not in note)))),
         )  # fmt: skip
+
+    def _check_readings(self, fit: Fit, errors: Sequence[ReadingError]) -> None:
+        """Refuses readings that are farther off than the stage moves. Raises InputError."""
+        moved = np.concatenate([self.fitter.predict(fit, record) for record in self.fitter.held_out_records])
+        size = np.sqrt(np.mean(moved**2, axis=0))
+        faults = [
+            Fault(e.channel, f"is {e.after / s:.2g} times the motion of the model away from it; check its column, unit, sign and origin")
+            for e, s in zip(errors, size, strict=True) if e.after > FAR_READING * s > 0
+        ]  # fmt: skip
+        if faults:
+            raise InputError(self.fitter.recording.title, faults)
 
     def _errors(self, before: Fit, after: Fit) -> tuple[ReadingError, ...]:
         """Of held-out records, channel by channel."""

@@ -158,7 +158,7 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted) -> Run:
     for channel, p, values in zip(lifted.signal.channels, places, np.moveaxis(y, 2, 0), strict=True):
         if p is not None and (fault := _too_few(np.isfinite(values).any(axis=0), lifted)):
             raise ValueError(f"{channel} {fault}")
-    unsettled = _first_differs(y) if lifted.closed else 0
+    unsettled = first_differs(y) if lifted.closed else 0
     return Run((record.name,), drive, y[unsettled:], unsettled)
 
 
@@ -193,7 +193,7 @@ def _too_few(measured: np.ndarray, lifted: Lifted) -> str:
     return ""
 
 
-def _first_differs(y: np.ndarray) -> int:
+def first_differs(y: np.ndarray) -> int:
     """1 where the first of three or more periods differs from the others more than noise, and so was not settled; else 0."""
     if len(y) < 3:
         return 0
