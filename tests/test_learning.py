@@ -225,9 +225,10 @@ def test_noise_of_one_repetition_is_read_off_its_highest_frequencies(rng):
     assert found.se == pytest.approx(3, rel=0.15)  # the median of 500
 
 
-@pytest.mark.parametrize(("repetitions", "motion"), [(3, 0.0), (5, 0.2), (5, 2.0)])
+@pytest.mark.parametrize(("repetitions", "motion"), [(2, 0.0), (5, 0.2), (5, 2.0)])
 def test_what_repeats_scatters_about_the_truth_as_stated(repetitions, motion, rng):
-    """The sum of squares of a motion in noise, 400 times: no bias beyond what 400 tell, and the stated standard deviation within 12 %."""
+    """The sum of squares of a motion in noise, 400 times: no bias beyond what 400 tell, and the stated standard deviation, which 400 tell
+    to 3.5 %. Of two repetitions it is 17 % more, as (s^2)^2 is of an s^2 with six degrees of freedom."""
     spectrum, found = Spectrum(200, True), []
     true = motion * np.sin(2 * np.pi * np.arange(200) / 50)[:, None]
     for _ in range(400):
@@ -235,7 +236,7 @@ def test_what_repeats_scatters_about_the_truth_as_stated(repetitions, motion, rn
         found.append(spectrum.repeated(errors, np.array([np.nan]), np.ones(1)).energy(np.ones(1)))
     total, variance = np.array(found).T
     assert total.mean() == pytest.approx(np.sum(true**2), abs=4 * total.std() / np.sqrt(400))
-    assert np.sqrt(variance.mean()) == pytest.approx(total.std(), rel=0.12)
+    assert 0.92 * total.std() < np.sqrt(variance.mean()) < 1.25 * total.std()
 
 
 @pytest.mark.parametrize("repetitions", [2, 3, 10])
