@@ -290,6 +290,15 @@ def test_the_error_that_is_predicted_is_that_of_the_next_run(small, tmp_path):
     assert found.predicted_error[:, 3:] == pytest.approx(after[:, 3:], abs=0.1 * np.abs(after - before)[:, 3:].max())
 
 
+@pytest.mark.parametrize("freedom", [1, 2, 9])
+def test_noise_passes_the_threshold_once_in_seven_thousand(freedom, rng):
+    """A block of six: chi-squared of six over that of the standard error, 400,000 draws; 57 are expected, within three sigma."""
+    spectrum, draws = Spectrum(1000, True), 400_000
+    assert np.bincount(spectrum.block)[10] == 6
+    ratio = rng.chisquare(6, draws) / (rng.chisquare(6 * freedom, draws) / freedom)
+    assert 34 <= np.sum(ratio > spectrum.threshold(freedom)[spectrum.block == 10][0]) <= 80
+
+
 @pytest.mark.long
 def test_learning_brings_a_wrong_device_down_to_what_noise_allows(hundred, tmp_path):
     """From 360 nm to a few in two steps, and then it says that what is left is noise or not worth a run."""
