@@ -55,41 +55,32 @@ material = "silicon"
 """
 
 
+def pushed(body: str, name: str, at: str, gain: str, ends: tuple[str, str], travel: str) -> str:
+    """A force along x on a body, at a place along y, and delta_x as output."""
+    return f"""[[actuator]]
+name = "{name}"
+kind = "force"
+on = "{body}"
+at = ["0 mm", "{at}", "0 mm"]
+along = [1, 0, 0]
+gain = "{gain}"
+low = "{ends[0]}"
+high = "{ends[1]}"
+travel = "{travel}"
+[output]
+body = "{body}"
+at = ["0 mm", "0 mm", "0 mm"]
+channels = ["delta_x"]
+"""
+
+
 PARALLELOGRAM = f"""{HEAD}{SILICON.replace('poisson = "0.28"', 'poisson = "0.28"' + chr(10) + 'stress_limit = "300 MPa"')}
 [[body]]
 name = "stage"
-{blade("left", -10)}{blade("right", 10)}[[actuator]]
-name = "coil"
-kind = "force"
-on = "stage"
-at = ["0 mm", "-10 mm", "0 mm"]
-along = [1, 0, 0]
-gain = "2 N/A"
-low = "-1 A"
-high = "1 A"
-travel = "300 um"
-[output]
-body = "stage"
-at = ["0 mm", "0 mm", "0 mm"]
-channels = ["delta_x"]
-"""
+{blade("left", -10)}{blade("right", 10)}{pushed("stage", "coil", "-10 mm", gain="2 N/A", ends=("-1 A", "1 A"), travel="300 um")}"""
 
 
-REST = """[[actuator]]
-name = "push"
-kind = "force"
-on = "plate"
-at = ["0 mm", "0 mm", "0 mm"]
-along = [1, 0, 0]
-gain = "1 N/V"
-low = "0 V"
-high = "1 V"
-travel = "50 um"
-[output]
-body = "plate"
-at = ["0 mm", "0 mm", "0 mm"]
-channels = ["delta_x"]
-"""
+REST = pushed("plate", "push", "0 mm", gain="1 N/V", ends=("0 V", "1 V"), travel="50 um")
 
 
 SPRING = """[[element]]

@@ -286,7 +286,7 @@ def test_draws_far_off_are_counted_and_named(circle, tmp_path, turned):
     given = stated(circle, '[numbers]\n"actuator.thermal_resistance" = { sd = "5 %", source = "chosen" }', tmp_path)
     found = budget_of(circle, given, draws=200)
     pose, columns = found.drawn.pose.copy(), found.drawn.columns.copy()
-    pose[7] *= 1e4  # as of a draw that grows
+    pose[7] = -1e4 * np.abs(pose[7])  # as of a draw that grows, to either side
     columns[7] = -2 * number(circle, "actuator.thermal_resistance") if turned else columns[7]
     drawn = replace(found.drawn, pose=pose, columns=columns)
     path = UncertainPath(circle, given)

@@ -16,7 +16,7 @@ from conftest import SCENARIOS
 
 from ctrlgen import Controller, InputError, build_model, calibrate, load_device
 from ctrlgen.calibration.budgets import budgets
-from ctrlgen.calibration.calibrate import sd_of_bounds
+from ctrlgen.calibration.calibrate import sd_of_bounds, with_held
 from ctrlgen.calibration.device_file import NAME, write_calibrated_device
 from ctrlgen.core.units import to_si
 from ctrlgen.model.simulation import trace
@@ -101,6 +101,24 @@ def test_a_constant_on_which_the_recording_says_nothing_keeps_its_default(tmp_pa
     assert found["actuator.time_constant"].determined
 
 
+@pytest.mark.parametrize(
+    "spread", [0.3, 3.0]
+)  # of h beforehand: the readings tell it hardly, or better than its bounds
+def test_constants_fitted_beside_a_held_one_deviate_with_it_as_stated(rng, spread):
+    """Readings X_c c + x_h h + e, c by least squares with h held at 0 while it is anything within its bounds: scores over 20,000 draws
+    against the standard deviations, correlation and 95 % intervals that are stated. 3 %: three standard errors of these."""
+    X, x, noise, draws = rng.standard_normal((12, 2)), rng.standard_normal(12), 0.4, 20_000
+    h = rng.uniform(-1, 1, draws) * spread * np.sqrt(3)
+    y = np.outer(h, x) + noise * rng.standard_normal((draws, 12))
+    deviation = np.column_stack([np.linalg.lstsq(X, y.T, rcond=None)[0].T, -h])  # all true c are 0
+    both = np.column_stack([X, x])
+    joint = np.linalg.inv(both.T @ both / noise**2 + np.diag([0, 0, spread**-2]))
+    stated = with_held(noise**2 * np.linalg.inv(X.T @ X), joint, np.array([spread]))
+    sds = np.sqrt(np.diag(stated))
+    assert (deviation / sds).std(axis=0) == pytest.approx([1, 1, 1], abs=0.03)
+    assert np.corrcoef(deviation.T) == pytest.approx(stated / np.outer(sds, sds), abs=0.03)
+
+
 @pytest.mark.long
 def test_the_budget_of_a_path_falls_to_what_the_recording_leaves(specimen):
     before, after = budgets(specimen, SCENARIOS / "circle20", DEVICE)
@@ -148,6 +166,16 @@ def test_the_device_file_of_the_specimen_has_its_constants_and_the_authors_comme
     assert all(found[path].si == number.si for path, number in before.items() if path not in TRUE)
     comments = [line.partition("#")[2] for line in DEVICE.read_text().splitlines() if line.startswith("#")]
     assert comments and all(comment in (tmp_path / NAME).read_text() for comment in comments)
+
+
+@pytest.mark.long
+def test_readings_in_another_unit_are_refused(tmp_path):
+    shutil.copytree(RECORDING, tmp_path / "mm")
+    told = tmp_path / "mm" / "recording.toml"
+    told.write_text(told.read_text().replace('"nm"', '"mm"'))
+    with pytest.raises(InputError, match=r"reading.delta_x: is .* times the motion of the model") as error:
+        calibrate(DEVICE, tmp_path / "mm")
+    assert len(error.value.faults) == 3
 
 
 def test_a_device_without_run_time_constants_is_refused():

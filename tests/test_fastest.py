@@ -15,9 +15,12 @@ from scipy.optimize import brentq
 
 import ctrlgen
 from ctrlgen import InputError, SolverError, build_model, load_scenario, solve, user_device
+from ctrlgen.path_timing.between import error_between
+from ctrlgen.path_timing.confirmed import Followed
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
 from ctrlgen.path_timing.optimum import Optimiser
+from ctrlgen.path_timing.repetition import crossing, largest
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.paths import Poses
 
@@ -126,6 +129,18 @@ def test_a_circle_as_large_as_a_frequency_allows_takes_just_that_long():
     optimiser = Optimiser(found.solution.model, "pose", 1e-4)
     assert optimiser.along(found.curve.scaled(largest)).duration == pytest.approx(0.02, rel=2e-3)
     assert found.repetition.even < largest < 1
+
+
+@pytest.mark.parametrize("scale", [0.013, 0.37, 1.0, 41.0])
+def test_the_largest_scale_is_found_from_below(scale):
+    """Within 0.1 %, and never above: where the time is the period, where the path is no longer possible, where a limit breaks."""
+    for behind in (lambda s: 0.8 * (s - np.log(scale)), lambda s: -0.1 if s <= np.log(scale) else 10.0):
+        assert 0.999 * scale <= crossing(behind, behind(0.0)) <= scale * (1 + 1e-12)
+    assert 0.999 * scale <= largest(lambda tried: tried <= scale) <= scale
+
+
+def test_no_scale_is_found_where_none_is_small_enough():
+    assert crossing(lambda s: 1.0, 1.0) is None and largest(lambda scale: False) is None
 
 
 # With inertia
@@ -301,6 +316,22 @@ def test_between_set_points_the_circle_is_left_by_the_sagitta_at_least(circle20)
     longest = np.diff(circle20.share).max() * 2 * np.pi
     sagitta = RADIUS * (1 - np.cos(longest / 2))
     assert sagitta / 4 < np.linalg.norm(circle20.between[3:5]) < 4 * sagitta
+
+
+def test_between_set_points_the_distance_is_that_to_the_nearest_place_of_the_curve(tmp_path):
+    """24 set-points round the circle, amplifiers with a lag of one sample: e^(-t/tau) written here, and the distance from a circle. 1 nm
+    of 170: what the curve is more than its chords, R (1 - cos(pi/384)), is 0.3 nm; without the foot on the chord it would be 80."""
+    scenario, h, turn = written(tmp_path, lagging(None), ROUND, "1 kHz"), 1e-3, np.linspace(0, 1, 25)
+    model = build_model(scenario.device)
+    curve = Curve(scenario, model)
+    solution = solve(Followed.of(curve, model, scenario.file.sample_rate).scenario(turn, "t"), model)
+    worst = np.zeros(2)
+    for part in (0.25, 0.5, 0.75):
+        u, volts = solution.drive, solution.trace.x
+        off = GAIN / STIFFNESS * (u + (volts - u) * np.exp(-part * h / 1e-3)) - 15e-6
+        away = off - RADIUS * off / np.linalg.norm(off, axis=1, keepdims=True)
+        worst = np.maximum(worst, np.abs(away).max(axis=0))
+    assert worst.min() > 50e-9 and error_between(curve, solution, turn) == pytest.approx(worst, abs=1e-9)
 
 
 @pytest.mark.long

@@ -28,7 +28,7 @@ from ctrlgen.model.model import Signal
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 
-DRAWS = 10_000  # of JCGM 101 7.2.1 the smallest that gives a 95 % interval to two digits
+DRAWS = 10_000  # ends of a 95 % interval to 1.4 %; JCGM 101 7.2 would have 10^4/(1 - p) = 200,000
 FEWEST_DRAWS = 200  # the sd of as many draws is itself known to 5 %
 MOST_DRAWS = 1_000_000
 PROBABILITY = 0.999

@@ -4,7 +4,7 @@
 
 as `ctrlgen.diagnosis.estimation.least_squares` states it, under the noise and the discrepancy of the recording. A constant that the
 recording does not tell better than `TOLD` times what its bounds tell keeps its default; the intervals of the others then include what
-it may be within its bounds (uniform, GUM 4.3.7).
+it may be within its bounds (uniform, GUM 4.3.7), with which they are correlated (GUM 5.2).
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ TOLD = (
     0.5  # of the standard deviation that its bounds alone give a constant: above, the recording does not determine it
 )
 BEYOND = "at its bound: the specimen lies beyond it, or the device file leaves something out; run ctrlgen diagnose"
+FAR_READING = 3.0  # times the model's motion (rms), by which readings may be off it: more is another unit or origin
 AT_BOUND = 1e-4  # of the range: a value so near its end was held there
 
 
@@ -134,7 +135,7 @@ def calibrate(
     """
     described = load_device(device)
     if not described.given_at_start:
-        what = 'is missing: it names the numbers that differ between specimens; write constants = ["actuator.ambient"]'
+        what = 'is missing: it names what differs between specimens; write [run_time] and under it constants = ["actuator.ambient"]'
         raise InputError(device, [Fault("run_time", what)])
     progress("reading")
     paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
@@ -237,10 +238,9 @@ class _Search:
         joint = every.fit(_Specimen.of(self.device, chosen, held), values, steps=0)
         order = [constants.index(c) for c in (*chosen, *held)]
         covariance = np.diag([sd_of_bounds(c) ** 2 for c in constants])
-        found = _covariance(joint)
-        for i, a in enumerate(order[: len(chosen)]):
-            for j, b in enumerate(order[: len(chosen)]):
-                covariance[a, b] = found[i, j]
+        covariance[np.ix_(order, order)] = with_held(
+            _covariance(fit), joint.covariance, np.array([sd_of_bounds(c) for c in held])
+        )
         rows = []
         for k, c in enumerate(constants):
             determined = c in chosen
@@ -251,6 +251,7 @@ class _Search:
             rows.append(CalibratedConstant(c, value, float(np.sqrt(covariance[k, k])), determined, remark))
         start = replace(self.fitter, cache={}).fit(_Specimen.of(self.device, chosen), steps=0)
         errors = self._errors(start, fit)
+        self._check_readings(fit, errors)
         more = [e.channel for e in errors if e.after > DISCREPANCY.ratio * 2 * e.noise]
         if more:
             what = "is read with more than its noise in error, whatever the constants: run ctrlgen diagnose for what is left out"
@@ -259,6 +260,17 @@ class _Search:
             self.device, inputs, self.fitter.recording, tuple(rows), covariance, errors,
             tuple(dict.fromkeys((*self.notes, *(note for note in self.fitter.noise.notes if "as stated" not in note)))),
         )  # fmt: skip
+
+    def _check_readings(self, fit: Fit, errors: Sequence[ReadingError]) -> None:
+        """Refuses readings that are farther off than the stage moves. Raises InputError."""
+        moved = np.concatenate([self.fitter.predict(fit, record) for record in self.fitter.held_out_records])
+        size = np.sqrt(np.mean(moved**2, axis=0))
+        faults = [
+            Fault(e.channel, f"is {e.after / s:.2g} times the motion of the model away from it; check its column, unit, sign and origin")
+            for e, s in zip(errors, size, strict=True) if e.after > FAR_READING * s > 0
+        ]  # fmt: skip
+        if faults:
+            raise InputError(self.fitter.recording.title, faults)
 
     def _errors(self, before: Fit, after: Fit) -> tuple[ReadingError, ...]:
         """Of held-out records, channel by channel."""
@@ -272,6 +284,19 @@ class _Search:
             start, end = (float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares)
             rows.append(ReadingError(channel, unit, start, end, float(self.fitter.noise.floor[i])))
         return tuple(rows)
+
+
+def with_held(fitted: np.ndarray, joint: np.ndarray, sds: np.ndarray) -> np.ndarray:
+    """(k, k) covariance of the deviations of fitted constants c and held ones h, in this order: c - c_true = e + G (h - h_true).
+
+    e, with the covariance `fitted`, is the deviation with h known; G = dc/dh follows from the covariance `joint` (k, k) of a fit of both,
+    C_ch C_hh^-1, whatever is stated of h there. `sds` (n_h,) of h - h_true are those of the bounds, for h stays where it is.
+    """
+    n, S = len(fitted), np.diag(sds**2)
+    if not len(sds):
+        return fitted
+    G = np.linalg.solve(joint[n:, n:], joint[n:, :n]).T
+    return np.block([[fitted + G @ S @ G.T, G @ S], [S @ G.T, S]])
 
 
 def _covariance(fit: Fit) -> np.ndarray:

@@ -217,15 +217,7 @@ def whole_folder(out: Path) -> Iterator[Path]:
     Raises InputError when `out` cannot be written or holds somebody else's files.
     """
     try:
-        out = Path(os.path.realpath(out))
-        if out.is_symlink():
-            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(out))
-        if out.exists() and not out.is_dir():
-            raise InputError(out, [Fault("--out", "is a file; name a folder")])
-        foreign = _foreign(out)
-        if foreign:
-            what = f"holds {foreign[0]}, which ctrlgen did not make; move it away, or name an empty or new folder"
-            raise InputError(out, [Fault("--out", what)])
+        out = check_folder(out)
         out.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
     except OSError as error:
@@ -248,6 +240,24 @@ def whole_folder(out: Path) -> Iterator[Path]:
         raise
     finally:
         shutil.rmtree(retired, ignore_errors=True)
+
+
+def check_folder(out: Path) -> Path:
+    """The folder `out` without links, which `whole_folder` may replace: to be asked before long work. Raises InputError."""
+    try:
+        out = Path(os.path.realpath(out))
+        if out.is_symlink():
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(out))
+        if above := [path for path in out.parents if path.is_file()]:
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(above[0]))
+        if out.exists() and not out.is_dir():
+            raise InputError(out, [Fault("--out", "is a file; name a folder")])
+        if foreign := _foreign(out):
+            what = f"holds {foreign[0]}, which ctrlgen did not make; move it away, or name an empty or new folder"
+            raise InputError(out, [Fault("--out", what)])
+    except OSError as error:
+        raise unwritable(out, error, "--out") from None
+    return out
 
 
 def _foreign(out: Path) -> list[str]:

@@ -216,25 +216,20 @@ class _Job:
         """One run with its error beside the predicted one."""
         run, r = self.runs[j], self.repeated[j]
         predicted = None if j == 0 else self.predicted(j - 1, run.drive, self.mismatch(j))[0]
-        square = r.mean**2 - r.se**2
-        doubt = 2 * r.se**4 * (1 + 1 / r.freedom) + 4 * np.maximum(r.mean**2 - r.se**2, 0.0) * r.se**2
-        bounds = {
-            how: self._bounded(square, doubt, sign) for how, sign in (("repeating", 0), ("least", -1), ("most", 1))
-        }
+        cost, variance = r.energy(np.ones(len(self.scale)))
+        bounds = {how: self._bounded(r, sign) for how, sign in (("repeating", 0), ("least", -1), ("most", 1))}
         return RunResult(
             run.name, r.repeats, run.drive, self.spectrum.samples(r.mean) * self.scale, self._rms(r.mean**2), self._rms(r.se**2),
-            **bounds, predicted=predicted, cost=float(np.sum(square)), cost_se=float(np.sqrt(np.sum(doubt))),
+            **bounds, predicted=predicted, cost=cost, cost_se=float(np.sqrt(variance)),
         )  # fmt: skip
 
-    def _bounded(self, square: np.ndarray, doubt: np.ndarray, sign: int) -> dict[str, float]:
-        """Root mean square length [SI] by group from squares of scaled coefficients (n, n_y) with variance `doubt`: the estimate, or an end
-        of its 95 % interval."""
+    def _bounded(self, r: Repeated, sign: int) -> dict[str, float]:
+        """Root mean square length [SI] by group of what repeats: the estimate, or an end of its 95 % interval."""
         found = {}
         for g in self.groups:
-            si = self.scale[list(g.channels)] ** 2
-            total = np.sum(square[:, g.channels] * si) + sign * COVERAGE_FACTOR * np.sqrt(
-                np.sum(doubt[:, g.channels] * si**2)
-            )
+            si = np.where(np.isin(np.arange(len(self.scale)), g.channels), self.scale**2, 0.0)
+            total, variance = r.energy(si)
+            total += sign * COVERAGE_FACTOR * float(np.sqrt(variance))
             found[g.name] = float(np.sqrt(max(total, 0.0) / self.lifted.n))
         return found
 

@@ -20,6 +20,7 @@ import scipy.sparse.linalg
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.learning.lifted import Lifted, Linearised
+from ctrlgen.numerics.ipopt import check_signal
 
 STEP_WEIGHT = 1e-2  # rho: a hundredth of the signal's own weight, so that what the drives hardly move is left alone
 MOST_PROGRAMMES = 6
@@ -183,8 +184,7 @@ def _limited(
         x0=0, lbx=low, ubx=high, lbg=np.concatenate([zeros, extra_low]), ubg=np.concatenate([zeros, extra_high])
     )
     status = solver.stats()
-    if status["return_status"] in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
-        raise KeyboardInterrupt  # CasADi raises nothing else of its own inside IPOPT than a signal's
+    check_signal(status["return_status"])
     if not status["success"]:
         raise SolverError(
             f"IPOPT finds no drives for the next run ({status['return_status']}); look at the limits of the device that the recorded "

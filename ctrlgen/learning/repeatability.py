@@ -36,6 +36,15 @@ class Repeated:
         """Degrees of freedom of the standard error of each coefficient in a block; infinite where it was stated."""
         return self.repeats - 1 if self.repeats > 1 else np.inf
 
+    def energy(self, weights: np.ndarray) -> tuple[float, float]:
+        """The sum over all coefficients of `weights` (n_y,) times mean^2 - se^2, what of their squares is not noise, and its variance:
+        2 s^4 + 4 c^2 s^2 of the square of a normal mean, 2 s^4/freedom of an s^2 that is pooled over a block of as many as are summed.
+
+        c^2 is estimated by mean^2 - se^2 in the sum, where it is unbiased, not coefficient by coefficient above zero."""
+        square, s2 = self.mean**2 - self.se**2, self.se**2
+        noise = 2 * (1 + 1 / self.freedom) * np.sum((weights * s2) ** 2)
+        return float(np.sum(weights * square)), float(noise + max(4 * np.sum(weights**2 * square * s2), 0.0))
+
 
 class Spectrum:
     """Orthonormal real coefficients of n samples in blocks of neighbouring frequencies, about log(n) coefficients in each."""

@@ -70,7 +70,7 @@ def response(lifted: Lifted, changes: Sequence[Change]) -> Response | None:
     gain, se = np.full(len(size), np.nan), np.full(len(size), np.nan)
     if not moved.any():
         return Response(gain, se, 0.0, None, {})
-    gain[moved], se[moved] = _regressed([x[:, :, moved] for x in X], seen)
+    gain[moved], se[moved] = regressed([x[:, :, moved] for x in X], seen)
     total = sum(float(np.sum(y**2)) for y in seen)
     noise = sum(float(np.sum((c.sd / scale)[c.observed] ** 2)) * len(c.y) for c in changes)
     left = _left(X, seen, np.ones(len(size)))
@@ -81,7 +81,7 @@ def response(lifted: Lifted, changes: Sequence[Change]) -> Response | None:
     return Response(gain, se, unexplained, exchanged, _reasons(lifted, gain, se, exchanged))
 
 
-def _regressed(X: Sequence[np.ndarray], y: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def regressed(X: Sequence[np.ndarray], y: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """g and its standard error from parts (n, n_y, m) and observations (n, n_y) of each pair of runs."""
     normal = sum(np.einsum("kci,kcj->ij", x, x) for x in X)
     inverse = np.linalg.pinv(normal, hermitian=True)

@@ -25,6 +25,8 @@ FEWEST_MEASURED = 20  # samples of a run at which a channel must have been read,
 WIDEST_GAP = 0.1  # of the run, between samples that were read
 SETTLED = 4.0  # times the variance between periods, by which the first may differ from the others before it is left out
 OFF_PATH = 0.5  # of the path's extent, by which the model under the recorded drives may be off the path (rms)
+STILL = 0.1  # of the command's motion (rms), below which readings are not of a stage that moves
+COMMANDED = 0.2  # of the path's extent, by which a channel must be commanded to move for that to be looked at
 FAR_READING = 3.0  # times the size of the path, by which the readings may be off it (rms)
 
 
@@ -156,7 +158,7 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted) -> Run:
     for channel, p, values in zip(lifted.signal.channels, places, np.moveaxis(y, 2, 0), strict=True):
         if p is not None and (fault := _too_few(np.isfinite(values).any(axis=0), lifted)):
             raise ValueError(f"{channel} {fault}")
-    unsettled = _first_differs(y) if lifted.closed else 0
+    unsettled = first_differs(y) if lifted.closed else 0
     return Run((record.name,), drive, y[unsettled:], unsettled)
 
 
@@ -191,7 +193,7 @@ def _too_few(measured: np.ndarray, lifted: Lifted) -> str:
     return ""
 
 
-def _first_differs(y: np.ndarray) -> int:
+def first_differs(y: np.ndarray) -> int:
     """1 where the first of three or more periods differs from the others more than noise, and so was not settled; else 0."""
     if len(y) < 3:
         return 0
@@ -215,16 +217,21 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
         if off > OFF_PATH * extent:
             what = (
                 f"its drives would lead the device as described {100 * off / extent:.0f} % of the path's extent away from the path: "
-                "it is of another scenario or another device"
+                "it is of another scenario or another device, or the columns of the drives have other units"
             )
             if (shift := _shift(model / scale, command / scale, off, lifted.closed)) is not None:
                 what = f"it begins {shift} samples after the path does; let it begin where the path begins, by `rows`"
             faults.append(Fault(run.name, what))
             continue
         away = errors(run, lifted)[0].mean(axis=0) / scale
-        for channel, error in zip(lifted.signal.channels, away.T, strict=True):
-            if (far := _rms(error)) > FAR_READING * size:
+        about = (command - command.mean(axis=0)) / scale
+        for channel, error, moved, read in zip(lifted.signal.channels, away.T, about.T, runs.observed, strict=True):
+            far, moves = _rms(error), float(np.std(error + moved)) / max(_rms(moved), 1e-300)
+            if far > FAR_READING * size:
                 what = f"its {channel} is {far / size:.0f} times the path's size away from it; check the column, its unit, sign and origin"
+                faults.append(Fault(run.name, what))
+            elif read and _rms(moved) > COMMANDED * extent and moves < STILL:
+                what = f"its {channel} moves by {moves:.2g} of what is commanded; check the column, its unit, and that the stage is driven"
                 faults.append(Fault(run.name, what))
     if faults:
         raise InputError(source, faults)

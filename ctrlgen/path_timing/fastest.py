@@ -29,6 +29,7 @@ from ctrlgen.trajectory.solution import Solution, check_feasibility, solve
 
 FEWEST = 8  # samples of the fastest motion: of fewer, nothing says where between them a limit is kept
 COARSE = 32  # samples of a path, below which its set-points are few
+EXAMPLES = {"--sample-rate": "10 kHz", "--frequency": "50 Hz"}
 HIGHEST_RATE = 1e8  # Hz, of set-points: no controller is faster
 HELD_POINTS = 400  # at which it is looked at whether a path can be held
 
@@ -145,9 +146,12 @@ def _quantity(option: str, text: str) -> Quantity:
     try:
         found = read_quantity("Hz", text)
     except ValueError as error:
-        raise InputError(option, [Fault(repr(text), str(error))]) from None
+        example = "" if "for example" in str(error) else f'; write for example "{EXAMPLES[option]}"'
+        raise InputError(option, [Fault("value", f"{error}{example}")]) from None
     if found.si <= 0:
-        raise InputError(option, [Fault(repr(text), 'is not above zero; write for example "50 Hz"')])
+        raise InputError(
+            option, [Fault("value", f'{text!r} is not above zero; write for example "{EXAMPLES[option]}"')]
+        )
     return found
 
 

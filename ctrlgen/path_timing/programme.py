@@ -28,6 +28,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import SolverError
+from ctrlgen.numerics.ipopt import check_signal
 from ctrlgen.path_timing.drive_law import Law
 from ctrlgen.path_timing.timing_law import TimingLaw
 
@@ -126,8 +127,7 @@ class SpeedProgramme:
             ubx=np.concatenate([w_high.ravel("F"), free, free]),
         )  # fmt: skip
         stats = solver.stats()
-        if stats["return_status"] in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
-            raise KeyboardInterrupt  # CasADi raises nothing else of its own inside IPOPT than a signal's
+        check_signal(stats["return_status"])
         if not stats["success"]:
             raise SolverError(
                 f"IPOPT found no fastest speed along the path ({stats['return_status']} after {stats['iter_count']} iterations); "

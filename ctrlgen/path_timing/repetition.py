@@ -68,15 +68,15 @@ def at_frequency(followed: Followed, optimiser: Optimiser, frequency: Quantity, 
         share = curve.evenly(n)
         return len(share) - 1 <= period / h * (1 + 1e-9) and replace(followed, curve=curve).keeps(share)
 
-    best = _crossing(behind, float(np.log(known.duration / period)))
-    even = None if followed.model.inertial and not followed.curve.closed else _largest(at_even_speed)
+    best = crossing(behind, float(np.log(known.duration / period)))
+    even = None if followed.model.inertial and not followed.curve.closed else largest(at_even_speed)
     path = followed.curve.scenario.file.path
     diameter = path.diameter if isinstance(path, Circle) else None
     unit = written_unit(diameter.text) if diameter else ""
     return Repetition(frequency.si, best, even, diameter.si if diameter else None, unit)
 
 
-def _crossing(behind: Callable[[float], float], at_one: float) -> float | None:
+def crossing(behind: Callable[[float], float], at_one: float) -> float | None:
     """The scale at which `behind` (log scale) is zero, as it is `at_one` at the scale 1; None where it is above zero at all."""
     step, here, value = float(np.log(2)) * (1 if at_one <= 0 else -1), 0.0, at_one
     while np.log(SMALLEST) < here + step < np.log(LARGEST):
@@ -88,7 +88,7 @@ def _crossing(behind: Callable[[float], float], at_one: float) -> float | None:
     return float(np.exp(here)) if value <= 0 else None
 
 
-def _largest(holds: Callable[[float], bool]) -> float | None:
+def largest(holds: Callable[[float], bool]) -> float | None:
     """Near the largest scale at which something holds; None where it does at none."""
     scale, growth = 1.0, 2.0 if holds(1.0) else 0.5
     while (growth > 1) == holds(scale * growth):

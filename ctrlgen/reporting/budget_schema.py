@@ -6,15 +6,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from ctrlgen.reporting.result_schemas import Keys, Number, Origin
+from ctrlgen.reporting.result_schemas import ChannelGroup, Keys, Number, Origin
 
 
-class GroupEntry(Keys):
+class GroupEntry(ChannelGroup):
     """Channels of the followed signal with one kind of unit, and what all contributors make of them together."""
 
-    name: str = Field(description="translation, rotation, or 'in' a unit of another kind.")
-    unit: str = Field(description="Unit of every number of this group in the file.")
-    channels: list[str] = Field(description="Its channels.")
     combined_peak: float = Field(description="Largest combined standard uncertainty of a channel along the path.")
     combined_rms: float = Field(description="Root mean square along the path, of the channel with the largest.")
     band95: float = Field(

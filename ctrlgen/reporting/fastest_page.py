@@ -24,6 +24,7 @@ SHOWN_RUNS = 4  # runs of a limit in a table
 UNBOUND = "#bbbbbb"
 EVEN = 800  # places along the path at which even speed is drawn
 FLAT = 1e-9  # of the largest extent, below which a channel does not move
+MARKED = 120  # set-points that are dots of their own; more of them cover the colours
 ROOM = 1.15  # of the largest speed, up to which speeds are shown
 
 
@@ -162,9 +163,8 @@ def draw_fastest(found: FastestPath) -> dict[str, str]:
 
 
 def _colours(found: FastestPath) -> list[tuple[Binding, str]]:
-    """A colour for each limit that binds; the sides of one channel have one hue."""
-    channels = list(dict.fromkeys(b.side.name for b in found.bindings))
-    return [(b, COLOURS[channels.index(b.side.name) % len(COLOURS)]) for b in found.bindings[:SHOWN]]
+    """A colour for each limit that binds."""
+    return [(b, COLOURS[k % len(COLOURS)]) for k, b in enumerate(found.bindings[:SHOWN])]
 
 
 def _draw_path(found: FastestPath) -> Figure:
@@ -187,7 +187,7 @@ def _draw_path(found: FastestPath) -> Figure:
     for binding, colour in reversed(_colours(found)):
         for a, b in binding.runs:
             left.plot(*at(np.linspace(a, b, 200)), color=colour, lw=2.2, solid_capstyle="butt")
-    left.plot(*at(found.share), ".", ms=3, color="#333333")
+    left.plot(*at(found.share), ".", ms=3 if len(found.share) <= MARKED else 0.8, color="#333333")
     names = [f"{signal.channels[i]} [{signal.units[i]}]" for i in columns]
     if len(names) == 1:
         names = ["share of the path [%]", *names]
@@ -267,5 +267,5 @@ def _draw_drives(found: FastestPath) -> Figure:
         axes.axhline(from_si(bound, signal.units[0]), color="#666666", lw=0.8, ls="--")
     axes.set_xlabel("time [ms]")
     axes.set_ylabel(f"drive [{signal.units[0]}]")
-    axes.legend(fontsize=7, ncols=6)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", fontsize=7, ncols=6)
     return figure

@@ -16,7 +16,9 @@ class Times(Keys):
     own_law: Number = Field(description="Shortest by the scenario's own law of time, in whole samples.")
     even_speed: Number = Field(description="Shortest at even speed along the path, in whole samples.")
     fastest: float = Field(description="Of the set-points, in whole samples.")
-    continuous: float = Field(description="Shortest in continuous time: no set-points can be faster.")
+    continuous: float = Field(
+        description="Shortest that was found in continuous time; none is shorter where each place alone bounds the speed."
+    )
 
 
 class BindingEntry(Keys):

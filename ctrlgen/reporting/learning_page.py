@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.core.files import write_text
@@ -196,7 +197,7 @@ def draw_along(learning: Learning) -> Figure:
         axes.set_yscale("log")
         axes.set_ylabel(f"|error|, {g.name} [{g.unit}]")
     panels[-1, 0].set_xlabel("sample" if static else "time [s]")
-    panels[0, 0].legend(fontsize=8, ncols=3)
+    _legend_above(figure, panels[0, 0], SHOWN_RUNS + 1)
     return figure
 
 
@@ -215,10 +216,15 @@ def draw_drives(learning: Learning) -> Figure:
         below.plot(at, difference(learning.next.drive[:, i] - now[:, i], unit), color=colour, lw=1)
     above.set_ylabel(f"{drive.label} [{drive.units[0]}]")
     above.set_title("thin: best run so far; full: next", fontsize=8)
-    above.legend(fontsize=8, ncols=len(drive.channels))
+    _legend_above(figure, above, len(drive.channels))
     below.set_ylabel(f"next - best [{drive.units[0]}]")
     below.set_xlabel("sample" if static else "time [s]")
     return figure
+
+
+def _legend_above(figure: Figure, axes: Axes, columns: int) -> None:
+    """Outside the panels, which curves fill from edge to edge."""
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=columns, fontsize=8)
 
 
 def _shades(count: int) -> list[tuple[float, float, float, float]]:

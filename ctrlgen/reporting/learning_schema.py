@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from ctrlgen.reporting.result_schemas import Keys, Number, Origin
-
-
-class LearningGroup(Keys):
-    """Channels of the followed signal with one kind of unit."""
-
-    name: str = Field(description="translation, rotation, or 'in' a unit of another kind.")
-    unit: str = Field(description="Unit of every number of this group in the file.")
-    channels: list[str] = Field(description="Its channels.")
+from ctrlgen.reporting.result_schemas import ChannelGroup, Keys, Number, Origin
 
 
 class RunError(Keys):
@@ -61,7 +53,7 @@ class LearningRecord(Origin):
     device: str = Field(description="Name of the device.")
     signal: str = Field(description="The followed signal.")
     not_read: list[str] = Field(description="Channels without a reading: the model alone keeps them on the path.")
-    groups: list[LearningGroup] = Field(description="Translations, rotations, channels of other units.")
+    groups: list[ChannelGroup] = Field(description="Translations, rotations, channels of other units.")
     runs: list[RunEntry] = Field(description="All runs in their order.")
     actuators: list[ActuatorEntry] = Field(description="One entry a drive; empty with a single run.")
     unexplained: Number = Field(

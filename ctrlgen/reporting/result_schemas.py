@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ctrlgen.version import __version__, commit
 
 SCHEMAS = Path(__file__).parent / "schemas"
-SCHEMA_VERSION = 1  # raised when a key changes its name or meaning; one version for all three files
+SCHEMA_VERSION = 1  # raised when a key changes its name or meaning; one version for all files
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Number = float | None  # None where it is not finite
@@ -55,6 +55,14 @@ def origin(inputs: dict[str, str], seed: int | None = None, notes: tuple[str, ..
         "seed": seed,
         "notes": list(notes),
     }
+
+
+class ChannelGroup(Keys):
+    """Channels of the followed signal with one kind of unit."""
+
+    name: str = Field(description="translation, rotation, or 'in' a unit of another kind.")
+    unit: str = Field(description="Unit of every number of this group in the file.")
+    channels: list[str] = Field(description="Its channels.")
 
 
 class MarginRow(Keys):

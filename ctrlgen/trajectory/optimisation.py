@@ -24,6 +24,7 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
+from ctrlgen.numerics.ipopt import check_signal
 from ctrlgen.trajectory.path_inverse import InverseTrajectory
 from ctrlgen.trajectory.violations import violations
 
@@ -149,8 +150,7 @@ class TrajectoryProgramme:
             ubg=np.concatenate([np.tile(row_high, n), zeros]),
         )
         stats = solver.stats()
-        if stats["return_status"] in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
-            raise KeyboardInterrupt  # CasADi raises nothing else of its own inside IPOPT than a signal's
+        check_signal(stats["return_status"])
         if not stats["success"]:
             raise SolverError(
                 f"IPOPT stopped with {stats['return_status']} after {stats['iter_count']} iterations; "

@@ -274,7 +274,10 @@ def check_tightened(scenario: Scenario, model: Model) -> None:
     """Refuses the model of a device as described where the scenario asks for limits that hold for what is not known exactly. Raises
     InputError."""
     if scenario.file.robust is not None and model.probability is None:
-        what = "asks for tightened limits, which this model does not have: take ctrlgen.solve, and the model of the solution"
+        what = (
+            "asks for tightened limits, which ctrlgen run, solve, check and budget compute alone: leave it out of a copy of the "
+            "scenario (in Python take ctrlgen.solve, and the model of the solution)"
+        )
         raise InputError(scenario.path, [Fault("robust", what)])
 
 

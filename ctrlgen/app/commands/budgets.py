@@ -73,11 +73,13 @@ def budget(
     Example:  ctrlgen budget scenarios/circle20 --out out/budget
     """
     from ctrlgen.budget.error_budget import error_budget
-    from ctrlgen.core.files import whole_folder
+    from ctrlgen.core.files import check_folder, whole_folder
     from ctrlgen.reporting.budget_page import write_budget
     from ctrlgen.trajectory.scenario import load_scenario
 
     chance = _probability(probability)
+    if out_folder is not None:
+        check_folder(out_folder)
     with progress() as advance:
         found = error_budget(
             load_scenario(scenario, device), uncertainty, probability=chance, draws=draws, seed=seed, finer=finer, progress=advance

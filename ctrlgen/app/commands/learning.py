@@ -49,12 +49,14 @@ def learn(
 
     Example:  ctrlgen learn scenarios/circle20 run1 run2 --out out/learn
     """
-    from ctrlgen.core.files import whole_folder
+    from ctrlgen.core.files import check_folder, whole_folder
     from ctrlgen.firmware.player_only import generate_player
     from ctrlgen.learning.learn import learn as learn_next
     from ctrlgen.reporting.learning_page import write_learning
     from ctrlgen.trajectory.scenario import load_scenario
 
+    if out_folder is not None:
+        check_folder(out_folder)
     with progress() as advance:
         found = learn_next(load_scenario(scenario, device), recordings, progress=advance)
         if out_folder is not None:

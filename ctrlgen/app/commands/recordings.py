@@ -142,9 +142,11 @@ def calibrate(
     from ctrlgen.calibration.budgets import budgets
     from ctrlgen.calibration.calibrate import calibrate as calibrated
     from ctrlgen.calibration.device_file import NAME, write_calibrated_device
-    from ctrlgen.core.files import whole_folder
+    from ctrlgen.core.files import check_folder, whole_folder
     from ctrlgen.reporting.calibration_page import write_calibration
 
+    if out_folder is not None:
+        check_folder(out_folder)
     with progress() as advance:
         found = calibrated(device, recording, advance)
         both = None if scenario is None else budgets(found, scenario, device, advance)
