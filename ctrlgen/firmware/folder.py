@@ -108,6 +108,7 @@ def generate(
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
     """The program that `ctrlgen.verification` builds around one pair of controllers."""
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     context = {
         "real": real,
         "online": folder.online[real],
@@ -115,7 +116,8 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real,
         "n": len(model.axes),
         "nx": model.x.numel(),
         "n_s": model.n_states,
-        "m": len(controller_of(model, scenario.file.follow, scenario.sample_time).target.channels),
+        "m": len(controller.target.channels),
+        "rated": controller.rate is not None,
         "rate": scenario.sample_time is not None,
     }
     write("harness.c", context, path)

@@ -15,6 +15,7 @@ from ctrlgen.firmware.package import LICENCE, MANIFEST, input_files
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.model.model import Model
+from ctrlgen.model.null_motion import why_no_null_motion
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.version import __version__, commit, program
@@ -25,12 +26,13 @@ def check_online(scenario: Scenario, model: Model) -> None:
     faults = []
     if scenario.file.feedforward == "static":
         faults.append(Fault("feedforward", "is static, in a scenario"))
-    if model.rate_limits:
-        faults.append(
-            Fault("device", f"has limits on rates of drives ({', '.join(r.label for r in model.rate_limits)})")
-        )
-    if model.redundant:
-        faults.append(Fault("device", f"has more drives ({model.u.numel()}) than axes ({len(model.axes)})"))
+    if model.rate_limits and scenario.sample_time is None:
+        rates = ", ".join(r.label for r in model.rate_limits)
+        faults.append(Fault("sample_rate", f"is missing in the scenario of a device with limits on rates of drives ({rates})"))
+    if (why := why_no_null_motion(model)) is not None:
+        faults.append(Fault("device", why))
+    if model.redundant and model.device.given_at_start:
+        faults.append(Fault("device", "has more drives than axes, and [run_time]"))
     if faults:
         what = "the online C cannot keep to that yet: use the player (`ctrlgen solve`, `ctrlgen generate --player`)"
         raise InputError(model.name, [Fault(f.where, f"{f.what}; {what}") for f in faults])

@@ -193,7 +193,13 @@ def _rows(
             what = "hostile sequence -> model: excess over a limit"
             allowed = EXCESS_LIMIT[real] if m.x.numel() == m.n_states else EXCESS_LIMIT_WITH_MEMORY
             excess = _excess(m, chased[:, 1 : 1 + n], ref.sample_time, cold[0])
+            excess[1:][_told(chased[:, 0])] = 0.0
             rows.append(_row(build, what, "share of its bound", "1", excess, allowed))
+        if ref.controller.rate is not None:
+            what, rate = "hostile sequence: change of a drive over its rate", ref.controller.rate
+            change = np.diff(np.vstack([cold[2], chased[:, 1 : 1 + n]]), axis=0)
+            over = np.maximum(np.maximum(change - rate.rise, rate.fall - change), 0.0) / m.u_scale
+            rows.append(_row(build, what, "share of its size", "1", over, EXCESS_LIMIT[real]))
 
     solved, online = ref.solution.drive, followed[:, 1 : 1 + n]
     if not m.inertial:  # there the solved drives make up for being held, which those of the online C do not
@@ -268,6 +274,12 @@ def _drive_sets(program: Path, ref: ReferenceAnswers, online: np.ndarray) -> lis
             ("player C", run_host(program, "sample", np.arange(len(ref.solution.drive)), online.shape[1])[:, 1:])
         )
     return sets
+
+
+def _told(status: np.ndarray) -> np.ndarray:
+    """Where a status says that a limit is passed because a drive may not change faster."""
+    bits, S = status.astype(int), ControllerStatus
+    return ((bits & S.RATE) > 0) & ((bits & (S.DISPLACEMENT | S.COMPOSITE | S.STATE)) > 0)
 
 
 def _excess(model: Model, drives: np.ndarray, sample_time: float, x_0: np.ndarray) -> np.ndarray:

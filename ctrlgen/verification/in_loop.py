@@ -164,7 +164,7 @@ def _sequences(
     """What is run, its answers, and this computer's."""
     online, real, machine = folder.online[host.real], host.real, machines["online"]
     n, n_s, m = len(ref.model.axes), ref.model.n_states, ref.random.shape[1]
-    numbers = ref.model.x.numel() + n + 1 + folder.given_numbers
+    numbers = sum(part.size for part in ref.controller.rest()) + 1 + folder.given_numbers
     state, target, out = (machine.reserve(count, real) for count in (numbers, m, 2 * n + n_s))
 
     def answers(function: str, targets: np.ndarray) -> Answers:
