@@ -410,7 +410,11 @@ def run_c(device: Device, controller: Scripted, records: np.ndarray, folder: Pat
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"limiter.{end}")
     (folder / "main.c").write_text(MAIN)
-    defined = [f"-DN={N}", f"-DNX={device.n_x}", f"-DNU={N * device.rated}"] + ["-DMOVING"] * device.moving + ["-DSTATES"] * device.states
+    defined = (
+        [f"-DN={N}", f"-DNX={device.n_x}", f"-DNU={N * device.rated}"]
+        + ["-DMOVING"] * device.moving
+        + ["-DSTATES"] * device.states
+    )
     strict = [flag for flag in FLAGS if flag != "-O2"]
     for words in (
         ["gcc", *strict, "--coverage", "-O0", "-c", "limiter.c"],

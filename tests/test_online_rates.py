@@ -36,14 +36,13 @@ def heated(**other):
     """Two heaters whose temperatures lag by 20 ms: 10 K/W, not above 100 K, and 0.1 um/K."""
     words = dict(
         parameters={"tau": "20 ms", "r": "10 K/W", "g": "0.1 um/K", "k": "1 N/um"},
-        state={"a": "150 K", "b": "150 K"},
+        state={"a": ("-10 K", "100 K"), "b": ("-10 K", "100 K")},
         drive={"x": ("0 W", "30 W"), "y": ("0 W", "30 W")},
         drive_rate={"x": "1 W/ms", "y": "1 W/ms"},
         axes={"x": ("-1 um", "12 um"), "y": ("-1 um", "12 um")},
         rates=lambda u, x, p: [(p.r * u.x - x.a) / p.tau, (p.r * u.y - x.b) / p.tau],
         force=lambda x, p: [p.k * p.g * x.a, p.k * p.g * x.b],
         restoring_force=lambda d, p: p.k * d.vector,
-        limits=lambda x: {"heat_a": (x.a, "100 K"), "heat_b": (x.b, "100 K")},
     )
     return ctrlgen.user_device("heated", **(words | other))
 
@@ -78,7 +77,7 @@ def test_drives_go_toward_the_target_on_a_straight_line_as_fast_as_the_slowest_m
     last = np.zeros(2)
     for step, target in zip(answers(controller, targets), targets, strict=True):
         change = STIFFNESS / GAIN * target - last
-        share = min(1.0, *(r / c for c, r in zip(change, np.where(change > 0, RISE, FALL), strict=True) if c))
+        share = min([1.0, *(r / c for c, r in zip(change, np.where(change > 0, RISE, FALL), strict=True) if c)])
         assert np.allclose(step.drive, last + share * change, rtol=0, atol=1e-11)  # V
         assert bool(step.status & RATE) == (share < 1) and step.status in (0, RATE)
         assert np.allclose(step.displacement, GAIN / STIFFNESS * step.drive, rtol=0, atol=1e-18)
@@ -138,10 +137,10 @@ def test_a_motion_that_is_too_fast_for_its_drive_is_left_and_found_again():
     controller = controller_of(build_model(coil()), "pose", 2e-4)
     held = controller.rate.rise[0]
     assert held == pytest.approx(0.03)  # A a sample
-    step = controller.step(controller.rest(), np.array([0.0, 0.0, 4.0, 0.0]))  # 2 N take 0.2 A
+    step = controller.step(controller.rest(), np.array([0.0, 0.0, 4.0]))  # 2 N take 0.2 A
     assert step.status == RATE and step.drive == pytest.approx([held])
     for _ in range(6):
-        step = controller.step(step.state, np.array([0.0, 0.0, 4.0, 0.0]))
+        step = controller.step(step.state, np.array([0.0, 0.0, 4.0]))
     assert step.status == 0 and step.drive == pytest.approx([0.2])
 
 
@@ -163,7 +162,10 @@ def test_the_c_keeps_the_rates_as_the_controller_does(device, tmp_path):
     """Along the scenario, at random and hostile targets, in both arithmetics: status and drives, and what the model does under them."""
     path, timing = CIRCLE, 'sample_rate = "1 kHz"\nduration = "0.5 s"\n'
     if device is coil:
-        path, timing = 'kind = "line"\nstart = { axis = "-20 um" }\nend = { axis = "30 um" }\n', 'sample_rate = "5 kHz"\nduration = "0.1 s"\n'
+        path, timing = (
+            'kind = "line"\nstart = { axis = "-20 um" }\nend = { axis = "30 um" }\n',
+            'sample_rate = "5 kHz"\nduration = "0.1 s"\n',
+        )
     scenario, model = loaded(tmp_path, device(), path, timing)
     solution = solve(scenario, model)
     compared = compare(generate(scenario, model, tmp_path / "c", solution), solution)
@@ -174,6 +176,6 @@ def test_the_c_keeps_the_rates_as_the_controller_does(device, tmp_path):
 def test_rates_without_time_are_refused(tmp_path):
     poses = 'kind = "poses"\npoints = [{ x = "5 um", y = "1 um" }]\n'
     scenario, model = loaded(tmp_path, stage(), poses, "")
-    with pytest.raises(ctrlgen.InputError, match=r"sample_rate: is missing .* rate of x, rate of y"):
+    with pytest.raises(ctrlgen.InputError, match=r"sample_rate: is missing, .*rate of x, rate of y"):
         generate(scenario, model, tmp_path / "c")
     assert not (tmp_path / "c").exists()

@@ -71,7 +71,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
                     getattr(inverse, part),
                     (name, part),
                     (f"wanted_{part}", f"{name}_{part}"),
-                    named=getattr(formulas, part),
+                    named=None if formulas is None else getattr(formulas, part),
                 )
                 for part in ("displacement", "state", "drive", "advance")
                 if getattr(inverse, part).size1_out(0)
@@ -92,8 +92,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         }
     iterated = ("z", controller.newton_steps) if controller.newton_steps > 1 else None
     balance = printed.kernel(
-        static.newton, "balance", ("balance_displacement",), steps=iterated, named=inverses.static.newton
-    )
+        static.newton, "balance", ("balance_displacement",), steps=iterated,
+        named=None if inverses.static is None else inverses.static.newton,
+    )  # fmt: skip
     shares = bound = None
     if controller.guarded_limits:
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
@@ -107,7 +108,8 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     return {
         "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(model.device.title),
         "source": comment(model.device.source),
-        "device_sha256": scenario.device_sha256, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
+        "device_sha256": scenario.device_sha256, "n": n, "nu": len(drive.channels), "m": len(follow.channels),
+        "axes": model.axes, "follow": follow, "drive": drive,
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in (*model.limits, *(model.rate_limits if controller.rate else ()))],
@@ -131,6 +133,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "s_low": s_low, "s_high": s_high, "s_slack": s_slack,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
         "u_safe": controller.safe_drive, "ready": READY, "far": FAR, **limited, **start, **rates_in_c(controller),
+        "redundancy": controller.redundancy, "unlimited": UNLIMITED,
     }  # fmt: skip
 
 

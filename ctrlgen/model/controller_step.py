@@ -20,8 +20,9 @@ class ControllerStatus(IntFlag):
     DRIVE = 8  # a drive is at its limit: the target is reached later than commanded
     INPUT = 16  # the target is not a number or absurdly large: it is ignored, drives at zero or the nearest admissible value
     LOST = 32  # the state is none that the controller left: the safe drives until it is initialised again
-    # 64 is of the constants that the C is given when it starts (`ctrlgen.firmware.run_time`). A drive changes as fast as it may: the target is reached later than commanded. Beside it DISPLACEMENT, COMPOSITE and STATE say
-    # also that the device passes that limit, because a drive cannot turn back as fast as the limit asks
+    # 64 is of the constants that the C is given when it starts (`ctrlgen.firmware.run_time`). A drive changes as fast as it may: the
+    # target is reached later than commanded. Beside it DISPLACEMENT, COMPOSITE and STATE say also that the device passes that limit,
+    # because a drive cannot turn back as fast as the limit asks.
     RATE = 128
 
 

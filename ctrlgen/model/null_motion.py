@@ -34,7 +34,9 @@ class NullMotion:
     low: np.ndarray
     high: np.ndarray
 
-    def within(self, drive: np.ndarray, slowest: np.ndarray | None = None, fastest: np.ndarray | None = None) -> np.ndarray:
+    def within(
+        self, drive: np.ndarray, slowest: np.ndarray | None = None, fastest: np.ndarray | None = None
+    ) -> np.ndarray:
         """`drive` (n_u,) moved along the null space into its range as little as can be, and, as far as the range allows, into
         `slowest` ... `fastest`. Where there are no such drives, out of range."""
         u = drive.copy()
@@ -90,7 +92,11 @@ def _slope(model: Model) -> ca.SX:
 
 def _parts(model: Model) -> list[tuple[np.ndarray, np.ndarray]]:
     """(drives, what of them pushes nothing (n, k), in typical sizes) of each set of drives that act on the same axes."""
-    B = ca.Function("B", [model.z], [ca.densify(_slope(model))])(0 * model.z_scale).full() * model.u_scale / model.force_scale
+    B = (
+        ca.Function("B", [model.z], [ca.densify(_slope(model))])(0 * model.z_scale).full()
+        * model.u_scale
+        / model.force_scale
+    )
     acts = (np.abs(B) > NOTHING * np.abs(B).max()).astype(float)
     count, part = connected_components(acts.T @ acts, directed=False)
     found = []

@@ -109,11 +109,12 @@ def _rows(
     build: str, real: Real, program: Path, ref: ReferenceAnswers, compression: Compression | None
 ) -> list[ComparisonRow]:
     """All comparisons of one build."""
-    n, m = len(ref.model.axes), ref.model
-    signals = [("drive", slice(1, 1 + n)), ("displacement", slice(1 + n, 1 + 2 * n))]
-    width = 2 * n + m.n_states
+    m, n = ref.model, ref.model.u.numel()
+    at_states = 1 + n + len(m.axes)
+    signals = [("drive", slice(1, 1 + n)), ("displacement", slice(1 + n, at_states))]
+    width = at_states - 1 + m.n_states
     if m.n_states:
-        signals.append(("state", slice(1 + 2 * n, 1 + width)))
+        signals.append(("state", slice(at_states, 1 + width)))
     rows = []
 
     def add(what: str, role: str, difference: np.ndarray, limit: float, channels: slice = slice(None)) -> None:
@@ -247,7 +248,7 @@ def _shipped_test(build: str, program: Path) -> ComparisonRow:
 def _equilibria(ref: ReferenceAnswers, answers: np.ndarray) -> np.ndarray:
     """(n, channels): the model's equilibria under constant drives, by simulation, not by the inverse."""
     m = ref.model
-    n = len(m.axes)
+    n = m.u.numel()
     drives = answers[:, 1 : 1 + n]
     x, z, u = (ca.MX.sym(name, s.numel()) for name, s in (("x", m.x), ("z", m.z), ("u", m.u)))
     both = ca.Function("at_rest", [m.x, m.z, m.u, m.p], [m.settling, m.balance])
@@ -260,7 +261,7 @@ def _equilibria(ref: ReferenceAnswers, answers: np.ndarray) -> np.ndarray:
     newton = newton_solver("rest", at, w, u, step_below=1e-12, most_steps=60)
     start = np.ones((len(drives), len(scale)))
     if m.inertial:  # several displacements may balance one force, as of a pendulum: the one meant
-        start[:, len(m.rest) :] = answers[:, 1 + n : 1 + 2 * n] / m.z_scale
+        start[:, len(m.rest) :] = answers[:, 1 + n : 1 + n + len(m.axes)] / m.z_scale
     roots = newton.map(len(drives))(start.T, drives.T).full().T
     states, displacements = roots[:, : len(m.rest)] * m.x_scale + m.rest, roots[:, len(m.rest) :] * m.z_scale
     return trace(m, np.zeros(len(drives)), states, displacements, drives).signals[ref.scenario.file.follow]
@@ -306,17 +307,20 @@ def _float_limit(model: Model, role: str, size: float, ref: ReferenceAnswers) ->
     eps = float(np.finfo(np.float32).eps)
     if role != "drive":
         return ROUNDINGS * eps * size
-    n, off = len(model.axes), 1 + ROUNDINGS / 2 * eps
+    off, first, states = 1 + ROUNDINGS / 2 * eps, 1 + model.u.numel(), 1 + model.u.numel() + len(model.axes)
     if isinstance(ref.controller, MotionController):
         rounded = (ref.controller.drive_sensitivity(target) for target in ref.command[::37])
         return max(max(rounded) * ROUNDINGS / 2 * eps, ROUNDINGS * eps * size)
     kernels = ref.controller.moving or ref.controller.static
     worst = 0.0
     for before, row in zip(ref.followed[:-1:37], ref.followed[1::37], strict=False):
-        x = np.concatenate([before[1 + 2 * n :], model.rest[model.n_states :]])
-        z, wanted, state = before[1 + n : 1 + 2 * n], row[1 + n : 1 + 2 * n], row[1 + 2 * n :]
-        moved = kernels.drive(x, z, wanted * off, state * off) - kernels.drive(x, z, wanted, state)
-        worst = max(worst, float(np.max(np.abs(moved.full()))))
+        x = np.concatenate([before[states:], model.rest[model.n_states :]])
+        z, wanted, state = before[first:states], row[first:states], row[states:]
+        now = (x, z, before[1:first])
+        moved = ref.controller.drive(kernels, now, wanted * off, state * off) - ref.controller.drive(
+            kernels, now, wanted, state
+        )
+        worst = max(worst, float(np.max(np.abs(moved))))
     return max(worst, ROUNDINGS * eps * size)
 
 

@@ -85,7 +85,8 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
     samples = len(scenario.command(model))
     return {
         "real": real, "online": folder.online[real], "player": folder.player.get(real) if folder.player else None,
-        "n": len(nominal.axes), "nx": nominal.x.numel(), "n_s": nominal.n_states, "m": len(controller.input_limits),
+        "n": len(nominal.axes), "nu": nominal.u.numel(), "nx": nominal.x.numel(), "n_s": nominal.n_states,
+        "m": len(controller.input_limits),
         "rate": scenario.sample_time is not None, "bits": int(bits),
         "input_limits": controller.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
         # limits that follow from constants of the start are computed by the C, to a few of its roundings

@@ -71,7 +71,7 @@ class ReferenceAnswers:
         cold = np.tile(m.rest[:, None], (1, len(z)))
         ratio = self.controller.composite_ratio.map(len(z))(cold, 0 * z.T, z.T).full().ravel()
         z = z / np.maximum(ratio, 1.0)[:, None]
-        x, u = np.tile(m.rest, (len(z), 1)), np.zeros_like(z)
+        x, u = np.tile(m.rest, (len(z), 1)), np.zeros((len(z), m.u.numel()))
         signal = self.scenario.file.follow
         reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
         anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
@@ -106,7 +106,7 @@ class ReferenceAnswers:
         return [untimed.step(untimed.rest(), start, settle=True).drive]
 
     def _answers(self, targets: np.ndarray, start: State | None) -> np.ndarray:
-        """(n, 1 + 3 axes): status, drive, displacement, actuator state; steps from `start`, or settles at each target."""
+        """(n, 1 + drives + axes + states): status, drive, displacement, actuator state; steps from `start`, or settles at each target."""
         rows, state = [], start or self.controller.rest()
         for target in targets:
             step = self.controller.step(state, target, settle=start is None)
