@@ -14,6 +14,7 @@ from ctrlgen.trajectory.scenario import motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
+MOST_CALLS = 16  # of a random target that drives with rate limits come to in several calls
 
 
 class ReferenceAnswers:
@@ -23,6 +24,9 @@ class ReferenceAnswers:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
         self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
         self.random = self._random_targets()
+        if self.controller.rate is not None:  # fewer, each until the drives have come there, or nearly
+            calls = min(self.controller.rate.samples(*self.model.u_bounds), MOST_CALLS)
+            self.random = self.random[::MOST_CALLS].repeat(calls, axis=0)
         self.settled = self._answers(self.random, None)
         self.command, self.path = solution.command, solution.command
         if self.scenario.sample_time is None:
