@@ -271,7 +271,10 @@ def last_drive(rng: np.random.Generator, controller: Scripted, case: tuple) -> l
         return []
     mode, x, z, target = case
     unrated = Scripted(controller.model, controller.follow, controller.sample_time, controller.slack)
-    unrated.__dict__.update(controller.__dict__ | {"rate": None})
+    known = {
+        name: value for name, value in controller.__dict__.items() if name != "plausible"
+    }  # it judges the last drive too
+    unrated.__dict__.update(known | {"rate": None})
     wanted = unrated.step((x, z), target, settle=mode == "settle").drive
     fall, rise = np.maximum(FALL, -1.0), np.minimum(RISE, 1.0)
     change = np.array([rng.uniform(fall, rise), rng.uniform(-1, 1, N)][int(rng.integers(2))])

@@ -1,4 +1,4 @@
-"""More drives than axes online: the least effort within limits, one sample at a time. References are scipy's linear programmes and SLSQP."""
+"""More drives than axes online: the least effort within limits, a sample at a time. References are scipy's linear programmes and SLSQP."""
 
 from __future__ import annotations
 
@@ -66,7 +66,9 @@ def test_the_null_space_keeps_a_rate_wherever_drives_keep_it_and_push_as_wanted(
         last, step = state[2], controller.step(state, target)
         low, high = np.maximum(LOW, last - rise), np.minimum(HIGH, last + rise)
         assert np.all((step.drive >= low - 1e-9) & (step.drive <= high + 1e-9))
-        possible = linprog(np.zeros(3), A_eq=B, b_eq=forces(target), bounds=list(zip(low, high, strict=True))).status == 0
+        possible = (
+            linprog(np.zeros(3), A_eq=B, b_eq=forces(target), bounds=list(zip(low, high, strict=True))).status == 0
+        )
         if step.status == 0:
             assert np.allclose(B @ step.drive, forces(target), rtol=0, atol=1e-8)
             R = np.diag(RANGE)
@@ -96,7 +98,8 @@ def test_pairs_that_act_on_axes_of_their_own_are_chosen_each_by_itself():
     [
         (stage(drive=dict.fromkeys("abcd", "100 V"), force=lambda u, p: [p.g * (u.a + u.b + u.d), p.g * (u.c - u.b)]),
          r"drives \(a, b, c, d\) of which 2 at a time can be chosen.*use the player"),
-        (stage(force=lambda u, d, p: [p.g * (u.a + 0.5 * u.b), p.g * (1 + d.x / 1e-3) * (u.c - 0.5 * u.b)]), "slope by the drives changes.*use the player"),
+        (stage(force=lambda u, d, p: [p.g * (u.a + 0.5 * u.b), p.g * (1 + d.x / 1e-3) * (u.c - 0.5 * u.b)]),
+         "slope by the drives changes.*use the player"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_chosen_online_is_refused(device, says, tmp_path):
@@ -118,7 +121,13 @@ def test_the_shipped_vectors_of_the_platform_meet_range_and_rate():
 @pytest.mark.long
 @pytest.mark.parametrize(
     "device",
-    [stage(drive_weight=WEIGHTS), stage(drive_rate={"a": "40 V/ms"}), pairs(), heavy(drive_rate={"a": "40 V/ms"}), heavy()],
+    [
+        stage(drive_weight=WEIGHTS),
+        stage(drive_rate={"a": "40 V/ms"}),
+        pairs(),
+        heavy(drive_rate={"a": "40 V/ms"}),
+        heavy(),
+    ],
     ids=["weighted", "rated", "pairs", "inertial and rated", "inertial"],
 )
 def test_the_c_chooses_as_the_controller_does(device, tmp_path):

@@ -253,8 +253,7 @@ def rates_in_c(controller: Controller) -> dict[str, Any]:
     """What the C needs to keep limits on the rates of drives."""
     if (rate := controller.rate) is None:
         return {"rated": False, "passing": False}
-    fall, rise = np.maximum(rate.fall, -UNLIMITED), np.minimum(rate.rise, UNLIMITED)
-    return {"rated": True, "passing": controller.limits_can_be_passed, "fall": fall, "rise": rise}
+    return {"rated": True, "passing": controller.limits_can_be_passed, "fall": rate.fall, "rise": rate.rise}
 
 
 def _member(i: int, model: Model) -> str:

@@ -17,7 +17,7 @@ from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.composite_bound import composite_bound, worst_in_range
 from ctrlgen.model.controller_step import ControllerStep, State, row
-from ctrlgen.model.drive_rate import RateLimiter
+from ctrlgen.model.drive_rate import FREE, RateLimiter
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
 from ctrlgen.model.limit_reach import drive_beyond, state_beyond
 from ctrlgen.model.lost_state import Groups, is_beyond, plausible_sums
@@ -283,7 +283,7 @@ class ControllerKernels:
         """What keeps the limits on rates of drives; None for a device without, and where no time passes."""
         if self.sample_time is None or not self.nominal.rate_limits:
             return None
-        fall, rise = (bound * self.sample_time for bound in self.nominal.rate_bounds)
+        fall, rise = (np.clip(bound * self.sample_time, -FREE, FREE) for bound in self.nominal.rate_bounds)
         return RateLimiter(fall, rise, self.slacks[2])
 
     def is_lost(self, *state: np.ndarray) -> bool:

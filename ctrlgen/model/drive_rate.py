@@ -14,12 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+FREE = 1e18  # SI: the change written for a drive without a limit on its rate; its square is still a float
 LONGEST = 10**6  # samples
 
 
 @dataclass(frozen=True, eq=False)
 class RateLimiter:
-    """`fall` and `rise` (n_u,): the largest changes of the drives in one sample [SI], infinite where there is none; a change beyond
+    """`fall` and `rise` (n_u,): the largest changes of the drives in one sample [SI], `FREE` where there is no limit; a change beyond
     them by no more than `slack` is no excess."""
 
     fall: np.ndarray

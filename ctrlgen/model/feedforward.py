@@ -82,14 +82,13 @@ class Controller(ControllerKernels):
         x_next = row(k.advance(x, wanted if static else z, u))
         z_next = row(k.settle(x_next, wanted, u)) if limited else wanted
         if held:
-            status, state_wanted = status | self._passed(x_next, z_next), x_next[:n]
+            status |= self._passed(x_next, z_next) if self.limits_can_be_passed else status
+            state_wanted = x_next[:n]
         return ControllerStep(status, z_next, state_wanted, u, (x_next, z_next, *last))
 
     def _passed(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
         """The limits beyond which a device is that has come to (x, z) with its drives as fast as they may change."""
         found, n = ControllerStatus(0), self.nominal.n_states
-        if not self.limits_can_be_passed:
-            return found
         if clamp(z, *self.nominal.z_bounds, self.slacks[0])[1]:
             found |= ControllerStatus.DISPLACEMENT
         if self.state_can_be_limited and clamp(x[:n], *(b[:n] for b in self.nominal.x_bounds), self.slacks[1])[1]:
