@@ -189,6 +189,30 @@ def test_coupled_they_trace_the_circle(units, circle, tmp_path):
     assert np.all(off[:3] < 1e-12) and np.all(off[3:] < 1e-11), off
 
 
+def test_a_controller_whose_drives_have_rates_starts_settled_however_many_samples_that_takes(tmp_path, compiler):
+    """100 V at 10 V a sample, then four drives that trace a circle of three axes."""
+    scenario = load_scenario(SCENARIOS / "tilt_platform")
+    command = scenario.command(build_model(scenario.device))
+    paths = write_fmus(scenario, tmp_path / "out").paths
+    with (
+        opened(paths[0], tmp_path / "c", start_settled=True) as controller,
+        opened(paths[1], tmp_path / "p", start_settled=True) as plant,
+    ):
+        controller.begin("target", command[0])
+        plant.begin("drive", controller.get("drive"))
+        assert controller.status == 0 and controller.get("drive").shape == (4,) and np.all(controller.get("drive") > 50)
+        reached = [plant.get("pose")]
+        for target in command[1:]:
+            controller.set("target", target)
+            controller.step()
+            assert controller.status == 0
+            plant.set("drive", controller.get("drive"))
+            plant.step()
+            reached.append(plant.get("pose"))
+    off = np.abs(np.array(reached) - command).max(axis=0)
+    assert np.all(off[:2] < 1e-12) and off[2] < 1e-11, off  # rad, m: as the circle's
+
+
 def test_fmpys_own_loop_runs_the_plant(units, circle):
     names = [f"drive_{axis}" for axis in circle.model.axes]
     rows = [(1e-3 * k, *drive) for k, drive in enumerate(circle.drive[:50])]

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 from ctrlgen import Controller, ControllerStatus
+from ctrlgen.devices import Limit
 from ctrlgen.firmware.online import online_context
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.templates import write
@@ -35,6 +36,7 @@ SLACK = 2.0**-6  # coarse, so that values within it are common; a power of two k
 Z_LOW, Z_HIGH = np.array([-1.0, 0.0, -0.5]), np.array([1.0, 2.0, 0.5])
 S_LOW, S_HIGH = np.full(N, 0.0), np.full(N, 1.0)
 U_LOW, U_HIGH = np.full(N, 0.0), np.full(N, 1.0)
+FALL, RISE = np.array([-0.25, -0.125, -np.inf]), np.array([0.125, 0.25, np.inf])  # of the drives, in one sample
 TARGET_LIMIT = np.full(N, 64.0)
 OUTCOMES = ("inside", "edge", "beyond")
 TRIALS = tuple("".join(outcome) for outcome in product("+-", repeat=3))  # "+": the drives of a trial are admissible
@@ -54,6 +56,7 @@ class Device:
     rounds: int = 1  # how often a displacement that breaks a composite limit is shrunk
     moving: bool = True  # a sample time: step beside settle
     coupled: bool = True  # one displacement moves several channels
+    rated: bool = False  # drives change no faster than they may
 
     def __str__(self) -> str:
         return "-".join(
@@ -85,6 +88,8 @@ DEVICES = (
     Device(states=False, memory=True),
     Device(states=False, moving=False, composite="plain"),
     Device(moving=False, composite="none", coupled=False),
+    Device(composite="none", rated=True),
+    Device(states=False, memory=True, composite="plain", rounds=3, rated=True),
 )
 
 
@@ -135,11 +140,12 @@ def controller_of(device: Device) -> Scripted:
     signal = SimpleNamespace(channels=("a", "b", "c"), units=("m",) * N, label="signal", scale=(1.0,) * N)
     nominal = SimpleNamespace(
         axes=("a", "b", "c"), x=x, z=z, n_states=device.n_s, rest=np.full(device.n_x, 0.5), limits=(), laws=(),
+        rate_limits=(Limit("rate", "rate", ("a",), "m/s", u[0]),) * device.rated, rate_bounds=(FALL / 1e-3, RISE / 1e-3),
         z_bounds=(Z_LOW, Z_HIGH), u_bounds=(U_LOW, U_HIGH), probability=None,
         x_bounds=(np.r_[S_LOW[: device.n_s], [-np.inf] * 2 * device.memory], np.r_[S_HIGH[: device.n_s], [np.inf] * 2 * device.memory]),
         x_names=tuple(f"x{i}" for i in range(device.n_x)), x_units=("K",) * device.n_x,
         signals={"drive": signal, "displacement": signal, "state": signal if device.states else None},
-        device=SimpleNamespace(title="scripted", source="none", given_at_start=(), run_time=None),
+        redundant=False, device=SimpleNamespace(title="scripted", source="none", given_at_start=(), run_time=None),
     )  # fmt: skip
     controller = Scripted(nominal, "displacement", 1e-3 if device.moving else None, SLACK)
     controller.__dict__["named"] = NamedInverses(
@@ -159,6 +165,7 @@ def controller_of(device: Device) -> Scripted:
         nearest_slopes=np.array([[1, 0.25, 0.0625], [0.25, 1, -0.125], [0.0625, -0.125, 1]]) if device.coupled else None,
         composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
     )  # fmt: skip
+    assert device.rated == (controller.rate is not None)
     assert controller.examined_first == (
         device.memory,
         device.memory or device.moving,
@@ -258,6 +265,25 @@ def sample(
     return x, z, wanted - (0.25 if mode == "step" else 0.0) * z
 
 
+def last_drive(rng: np.random.Generator, controller: Scripted, case: tuple) -> list[np.ndarray]:
+    """Drives before a case (mode, x, z, target) from which it asks for changes within rates, within their slack, or beyond."""
+    if controller.rate is None:
+        return []
+    mode, x, z, target = case
+    unrated = Scripted(controller.model, controller.follow, controller.sample_time, controller.slack)
+    known = {
+        name: value for name, value in controller.__dict__.items() if name != "plausible"
+    }  # it judges the last drive too
+    unrated.__dict__.update(known | {"rate": None})
+    wanted = unrated.step((x, z), target, settle=mode == "settle").drive
+    fall, rise = np.maximum(FALL, -1.0), np.minimum(RISE, 1.0)
+    change = np.array([rng.uniform(fall, rise), rng.uniform(-1, 1, N)][int(rng.integers(2))])
+    if rng.integers(3) == 0:  # within the slack
+        i = int(rng.integers(2))
+        change[i] = rng.choice([RISE[i] + SLACK / 2, FALL[i] - SLACK / 2])
+    return [np.clip(wanted - change, U_LOW, U_HIGH)]
+
+
 def odd_cases(rng: np.random.Generator, device: Device) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
     """Targets that are no command, and states that nothing but a defect could leave."""
     cases = []
@@ -286,6 +312,17 @@ def odd_cases(rng: np.random.Generator, device: Device) -> list[tuple[str, np.nd
     return cases
 
 
+def spoilt_drives(rng: np.random.Generator, device: Device) -> list[tuple]:
+    """Cases whose last drive no controller left."""
+    cases = []
+    for mode, i, bad in product(("settle", "step"), range(N), (np.nan, np.inf, -np.inf, 2.0**60)):
+        for drive in ("inside", "edge", "origin"):
+            last = np.full(N, 0.5)
+            last[i] = bad
+            cases.append((mode, *sample(rng, device, (mode, *PLAIN[:-1], drive)), last))
+    return cases
+
+
 def answer(step) -> np.ndarray:
     return np.concatenate([[int(step.status)], step.drive, step.displacement, step.actuator_state, *step.state])
 
@@ -298,7 +335,7 @@ MAIN = """
 #define BAD LIMITER_INPUT
 int main(void)
 {
-    double in[1 + NX + N + N];
+    double in[1 + NX + N + N + NU];
     limiter_state s;
     limiter_output o;
     limiter_init(NULL);
@@ -311,13 +348,16 @@ int main(void)
         return 1;
     }
 #endif
-    while (fread(in, sizeof in[0], 1 + NX + N + N, stdin) == 1 + NX + N + N) {
+    while (fread(in, sizeof in[0], 1 + NX + N + N + NU, stdin) == 1 + NX + N + N + NU) {
         double out[1];
         int lost = 0;
 #if NX > 0
         memcpy(s.x, in + 1, sizeof s.x);
 #endif
         memcpy(s.z, in + 1 + NX, sizeof s.z);
+#if NU > 0
+        memcpy(s.u, in + 1 + NX + N + N, sizeof s.u);
+#endif
         if (isnan(s.z[0]) && isnan(s.z[1]) && isnan(s.z[2])) {
             memset(&s, 0, sizeof s);
         }
@@ -330,6 +370,9 @@ int main(void)
             int i;
             for (i = 0; i < N; i++) {
                 s.z[i] = NAN;
+#if NU > 0
+                s.u[i] = NAN;
+#endif
             }
 #if NX > 0
             for (i = 0; i < NX; i++) {
@@ -348,6 +391,9 @@ int main(void)
         fwrite(s.x, sizeof s.x, 1, stdout);
 #endif
         fwrite(s.z, sizeof s.z, 1, stdout);
+#if NU > 0
+        fwrite(s.u, sizeof s.u, 1, stdout);
+#endif
         if (lost) { /* it stays so until it is initialised */
             memcpy(s.z, in + 1 + NX, sizeof s.z);
             if (limiter_settle(&s, in + 1 + NX + N, &o) != LIMITER_LOST) {
@@ -367,7 +413,11 @@ def run_c(device: Device, controller: Scripted, records: np.ndarray, folder: Pat
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"limiter.{end}")
     (folder / "main.c").write_text(MAIN)
-    defined = [f"-DN={N}", f"-DNX={device.n_x}"] + ["-DMOVING"] * device.moving + ["-DSTATES"] * device.states
+    defined = (
+        [f"-DN={N}", f"-DNX={device.n_x}", f"-DNU={N * device.rated}"]
+        + ["-DMOVING"] * device.moving
+        + ["-DSTATES"] * device.states
+    )
     strict = [flag for flag in FLAGS if flag != "-O2"]
     for words in (
         ["gcc", *strict, "--coverage", "-O0", "-c", "limiter.c"],
@@ -397,16 +447,19 @@ def unvisited(folder: Path, kernels: set[str]) -> list[str]:
 
 
 def check_status(met: tuple[str, ...], calls: list, status: ControllerStatus) -> None:
-    """The status says what the decisions amount to."""
+    """The status says what the decisions amount to; beside RATE there may be more."""
     _, displacement, state, share, drive = met
     expected = ControllerStatus.DISPLACEMENT if displacement == "beyond" else ControllerStatus(0)
     expected |= ControllerStatus.STATE if state == "beyond" else ControllerStatus(0)
     expected |= ControllerStatus.DRIVE if drive not in ("inside", "edge") else ControllerStatus(0)
+    if ControllerStatus.RATE in status:
+        assert expected & ~status == 0, met
+        return
     assert status & ~ControllerStatus.COMPOSITE == expected, met
     assert bool(status & ControllerStatus.COMPOSITE) == (share == "over" or grows(calls)), met
 
 
-@pytest.mark.parametrize("device", DEVICES, ids=str)
+@pytest.mark.parametrize("device", [pytest.param(d, marks=pytest.mark.long) if d.rated else d for d in DEVICES], ids=str)
 def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(device, tmp_path):
     for program in ("gcc", "gcov"):
         if not shutil.which(program):
@@ -416,11 +469,12 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
     rng = np.random.default_rng(14)
     missing, records, answers, growing = device.combinations(), [], [], set()
 
-    def ask(mode, x, z, target):
-        calls.clear()
+    def ask(mode, x, z, target, *last):
         with np.errstate(invalid="ignore"):
-            step = twin.step((x, z), target, settle=mode == "settle")
-        records.append(np.concatenate([[float(mode == "step")], x, z, target]))
+            last = list(last) or last_drive(rng, controller, (mode, x, z, target))
+            calls.clear()
+            step = twin.step((x, z, *last), target, settle=mode == "settle")
+        records.append(np.concatenate([[float(mode == "step")], x, z, target, *last]))
         answers.append(answer(step))
         return step
 
@@ -439,7 +493,7 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
                 break
     assert not missing, (len(missing), sorted(missing)[:10])
     assert device.rounds == 1 or growing == {mode for mode, *_ in device.combinations()}
-    for case in odd_cases(rng, device):
+    for case in [*odd_cases(rng, device), *(spoilt_drives(rng, device) if device.rated else [])]:
         ask(*case)
     answers, printed = np.array(answers), run_c(device, controller, np.array(records), tmp_path)
     same = (answers == printed) | (np.isnan(answers) & np.isnan(printed))
@@ -457,10 +511,12 @@ def test_samples_of_these_devices_take_every_branch_of_the_limiter_in_python(tmp
             controller = controller_of(device)
             for wish in sorted(device.combinations()):
                 x, z, target = sample(rng, device, wish)
-                controller.step((x, z), target, settle=wish[0] == "settle")
-            for mode, x, z, target in odd_cases(rng, device):
+                last = last_drive(rng, controller, (wish[0], x, z, target))
+                controller.step((x, z, *last), target, settle=wish[0] == "settle")
+            for mode, x, z, target, *last in [*odd_cases(rng, device), *spoilt_drives(rng, device) * device.rated]:
                 with np.errstate(invalid="ignore"):
-                    controller.step((x, z), target, settle=mode == "settle")
+                    last = last or last_drive(rng, controller, (mode, x, z, target))
+                    controller.step((x, z, *last[: device.rated]), target, settle=mode == "settle")
     measured.json_report(outfile=str(tmp_path / "report.json"))
     (report,) = json.loads((tmp_path / "report.json").read_text())["files"].values()
     entered = {name: found for name, found in report["functions"].items() if name and found["executed_lines"]}

@@ -283,7 +283,7 @@ def test_with_inertia_the_held_drives_have_the_least_effort_within_the_limits(tm
         solve(*loaded(tmp_path, weak, path.replace("-12", "-16"), timing))
 
 
-def test_the_reference_controller_uses_the_weighted_pseudo_inverse_and_keeps_the_drives_limits():
+def test_the_reference_controller_takes_the_least_effort_and_keeps_the_drives_limits():
     model = build_model(stage(drive_weight=WEIGHTS))
     controller = Controller(model, "pose", 1e-3)
     R = np.diag(RANGE / np.sqrt(W))
@@ -293,8 +293,11 @@ def test_the_reference_controller_uses_the_weighted_pseudo_inverse_and_keeps_the
         assert step.status == 0
         assert np.allclose(step.drive, R @ np.linalg.pinv(B @ R) @ forces(target), rtol=0, atol=1e-9)
         state = step.state
-    step = controller.step(state, np.array([-10e-6, 10e-6]))  # b would go below zero
-    assert step.status & ControllerStatus.DRIVE
+    far = np.array([-10e-6, 10e-6])  # b would go below zero
+    step = controller.step(state, far)
+    assert step.status == 0 and np.allclose(step.drive, reference(forces(far), W), rtol=0, atol=1e-3)
+    step = controller.step(step.state, np.array([-30e-6, 10e-6]))  # no drives push so
+    assert step.status == ControllerStatus.DRIVE
     assert np.all(step.drive >= LOW) and np.all(step.drive <= HIGH)
     assert np.allclose(B @ step.drive, forces(step.displacement), rtol=0, atol=1e-9)
 

@@ -161,16 +161,16 @@ import ctrlgen
 device = ctrlgen.user_device(
     "stage",
     parameters={"g": "0.2 N/V", "k": "1 N/um"},
-    drive={"a": "100 V", "b": ("0 V", "150 V"), "c": ("-20 V", "130 V")},
+    drive={"a": "100 V", "b": ("0 V", "150 V"), "c": ("-20 V", "130 V"), "d": "10 V"},
     drive_rate={"a": "20 V/ms"},
     axes={"x": "50 um", "y": "50 um"},
-    force=lambda u, p: [p.g * (u.a + 0.5 * u.b), p.g * (u.c - 0.5 * u.b)],
+    force=lambda u, p: [p.g * (u.a + 0.5 * u.b + u.d), p.g * (u.c - 0.5 * u.b)],
     restoring_force=lambda d, p: p.k * d.vector,
 )
 """
 
 
-def test_the_online_c_is_refused_and_the_player_plays_the_drives(tmp_path):
+def test_where_two_drives_are_too_many_the_online_c_is_refused_and_the_player_plays_the_drives(tmp_path):
     (tmp_path / "stage.py").write_text(STAGE)
     circle = CIRCLE.replace("15 um", "0 um")
     (tmp_path / "scenario.toml").write_text(
@@ -179,14 +179,12 @@ def test_the_online_c_is_refused_and_the_player_plays_the_drives(tmp_path):
     for command in ("generate", "run"):
         done = run(command, tmp_path, "--out", tmp_path / "c")
         assert done.returncode == 1
-        assert (
-            "rate of a" in done.stderr and "more drives (3) than axes (2)" in done.stderr and "--player" in done.stderr
-        )
+        assert "(a, b, c, d) of which 2 at a time can be chosen" in done.stderr and "--player" in done.stderr
         assert not (tmp_path / "c").exists()
     assert run("generate", tmp_path, "--player", "--out", tmp_path / "c").returncode == 0
     assert "as it was generated" in run("check", tmp_path / "c").stdout
     shown = run("check", tmp_path / "stage.py").stdout
-    assert "-20 V/ms <= rate of a <= 20 V/ms" in shown and "3 drives for 2 axes" in shown
+    assert "-20 V/ms <= rate of a <= 20 V/ms" in shown and "4 drives for 2 axes" in shown
     scenario = load_scenario(tmp_path)
     drive = solve(scenario, build_model(scenario.device)).drive
     (source,) = (tmp_path / "c").glob("*_player_f64.c")
@@ -194,10 +192,10 @@ def test_the_online_c_is_refused_and_the_player_plays_the_drives(tmp_path):
     main = f"""#include "{name}.h"
 #include <stdio.h>
 int main(void) {{
-    double u[3];
+    double u[4];
     for (unsigned long k = 0; k < 100; k++) {{
         {name}_sample(k, u);
-        printf("%.17g %.17g %.17g\\n", u[0], u[1], u[2]);
+        printf("%.17g %.17g %.17g %.17g\\n", u[0], u[1], u[2], u[3]);
     }}
     return 0;
 }}

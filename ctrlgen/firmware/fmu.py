@@ -150,12 +150,14 @@ def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folde
         groups.append(("state", len(outputs)))
         outputs += _variables("state", m.signals["state"], "output", "discrete", 1 + len(inputs) + len(outputs))
     what = "0, or the bits 1 displacement, 2 composite limit, 4 state, 8 drive limit, 16 unusable input, 32 lost state"
+    what += ", 128 rate of a drive" if controller.rate else ""
     status = Variable(1 + len(inputs) + len(outputs), "status", "output", "discrete", what, {}, "Int32")
     return _Unit(
         "controller", core, f"online controller of {m.device.title}", inputs, outputs, status,
         _settled(status.reference + 1, "the first target"),
         {"groups": groups, "n": len(m.axes), "nu": m.u.numel(), "n_s": m.n_states,
-         "drive_start": [Real.DOUBLE.literal(v) for v in controller.safe_drive]},
+         "drive_start": [Real.DOUBLE.literal(v) for v in controller.safe_drive],
+         "rated": controller.rate is not None, "most_settling": controller.rate.samples(*m.u_bounds) if controller.rate else 0},
     )  # fmt: skip
 
 

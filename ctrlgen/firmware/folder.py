@@ -108,14 +108,17 @@ def generate(
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
     """The program that `ctrlgen.verification` builds around one pair of controllers."""
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     context = {
         "real": real,
         "online": folder.online[real],
         "player": folder.player.get(real),
         "n": len(model.axes),
+        "nu": model.u.numel(),
         "nx": model.x.numel(),
         "n_s": model.n_states,
-        "m": len(controller_of(model, scenario.file.follow, scenario.sample_time).target.channels),
+        "m": len(controller.target.channels),
+        "rated": controller.rate is not None,
         "rate": scenario.sample_time is not None,
     }
     write("harness.c", context, path)

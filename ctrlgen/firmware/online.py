@@ -71,7 +71,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
                     getattr(inverse, part),
                     (name, part),
                     (f"wanted_{part}", f"{name}_{part}"),
-                    named=getattr(formulas, part),
+                    named=None if formulas is None else getattr(formulas, part),
                 )
                 for part in ("displacement", "state", "drive", "advance")
                 if getattr(inverse, part).size1_out(0)
@@ -92,8 +92,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         }
     iterated = ("z", controller.newton_steps) if controller.newton_steps > 1 else None
     balance = printed.kernel(
-        static.newton, "balance", ("balance_displacement",), steps=iterated, named=inverses.static.newton
-    )
+        static.newton, "balance", ("balance_displacement",), steps=iterated,
+        named=None if inverses.static is None else inverses.static.newton,
+    )  # fmt: skip
     shares = bound = None
     if controller.guarded_limits:
         shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
@@ -107,10 +108,11 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     return {
         "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(model.device.title),
         "source": comment(model.device.source),
-        "device_sha256": scenario.device_sha256, "n": n, "m": len(follow.channels), "axes": model.axes, "follow": follow, "drive": drive,
+        "device_sha256": scenario.device_sha256, "n": n, "nu": len(drive.channels), "m": len(follow.channels),
+        "axes": model.axes, "follow": follow, "drive": drive,
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
         "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
-        "si": _si_text, "limits": [_limit_text(limit) for limit in model.limits],
+        "si": _si_text, "limits": [_limit_text(limit) for limit in (*model.limits, *(model.rate_limits if controller.rate else ()))],
         "reserved_for": None if model.probability is None else f"{100 * model.probability:.10g} % along {scenario.name}",
         "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
@@ -125,12 +127,13 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack,
         "cost": _cost(controller, modes[-1], motion, balance, bound, shares),
         "input_limits": controller.input_limits,
-        "plausible": [([_member(i, model.x.numel()) for i in those], most) for those, most in controller.plausible],
+        "plausible": [([_member(i, model) for i in those], most) for those, most in controller.plausible],
         "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack,
         "s_low": s_low, "s_high": s_high, "s_slack": s_slack,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
-        "u_safe": controller.safe_drive, "ready": READY, "far": FAR, **limited, **start,
+        "u_safe": controller.safe_drive, "ready": READY, "far": FAR, **limited, **start, **rates_in_c(controller),
+        "redundancy": controller.redundancy, "unlimited": UNLIMITED,
     }  # fmt: skip
 
 
@@ -240,12 +243,26 @@ def _cost(
     worst += controller.composite_rounds * (shares.operations + 1) if shares else 0
     worst += mode["advance"].operations if "advance" in mode and not advance else 0
     worst += 2 * n * n * (1 + SWEEPS) if controller.nearest_slopes is not None else 0
+    if controller.limits_can_be_passed:
+        worst += controller.composite_rounds * (shares.operations + 1) if shares else 0
+        worst += bound.operations if bound else 0
     return {"step": step, "worst": worst}
 
 
-def _member(i: int, x_count: int) -> str:
-    """Number `i` of x and then z in the C's state."""
-    return f"state->x[{i}]" if i < x_count else f"state->z[{i - x_count}]"
+def rates_in_c(controller: Controller) -> dict[str, Any]:
+    """What the C needs to keep limits on the rates of drives."""
+    if (rate := controller.rate) is None:
+        return {"rated": False, "passing": False}
+    return {"rated": True, "passing": controller.limits_can_be_passed, "fall": rate.fall, "rise": rate.rise}
+
+
+def _member(i: int, model: Model) -> str:
+    """Number `i` of x, then z, then the last drive in the C's state."""
+    for name, count in (("x", model.x.numel()), ("z", len(model.axes))):
+        if i < count:
+            return f"state->{name}[{i}]"
+        i -= count
+    return f"state->u[{i}]"
 
 
 def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:

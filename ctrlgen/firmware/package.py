@@ -150,21 +150,22 @@ def _test_calls(c: dict[str, Any]) -> int:
 
 def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
     """Rows of the README's table of memory, bytes in double and float; `chosen`: the player's form in each arithmetic."""
-    x, n, n_s, m, count = len(c["x_names"]), c["n"], c["n_s"], c["m"], len(c["rows"])
+    x, n, nu, n_s, m, count = len(c["x_names"]), c["n"], c["nu"], c["n_s"], c["m"], len(c["rows"])
     timed = len(c["timed"])
-    given = f" + {c['given_numbers']}" if c["given_numbers"] else ""
+    rated = nu if c["rated"] else 0
+    given = (f" + {rated}" if rated else "") + (f" + {c['given_numbers']}" if c["given_numbers"] else "")
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}{given}) numbers and a word, RAM, one a device"
-    output = f"`sizeof({c['online']}_output)` = ({n} + {n} + {n_s}) numbers, RAM or stack"
-    vectors = f"{count} x ({m} + {n}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
+    output = f"`sizeof({c['online']}_output)` = ({nu} + {n} + {n_s}) numbers, RAM or stack"
+    vectors = f"{count} x ({m} + {nu}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
     played = len(c["played"])
     if played:
         vectors = vectors.replace(
-            ", constants", f", {played} x {n} + {timed} x {n + 1} numbers and {played} indices of 4 B, constants"
+            ", constants", f", {played} x {nu} + {timed} x {nu + 1} numbers and {played} indices of 4 B, constants"
         )
     rows = [
-        _counted("state", x + n + 1 + c["given_numbers"], 0, state),  # a word is aligned as a number
-        _counted("output", 2 * n + n_s, 0, output),
-        _counted("vectors", count * (m + n) + played * n + timed * (n + 1), 12 * count + 4 * played, vectors),
+        _counted("state", x + n + rated + 1 + c["given_numbers"], 0, state),  # a word is aligned as a number
+        _counted("output", nu + n + n_s, 0, output),
+        _counted("vectors", count * (m + nu) + played * nu + timed * (nu + 1), 12 * count + 4 * played, vectors),
     ]
     if played:
         forms = "; ".join(

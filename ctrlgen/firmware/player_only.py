@@ -15,6 +15,7 @@ from ctrlgen.firmware.package import LICENCE, MANIFEST, input_files
 from ctrlgen.firmware.player import player_context
 from ctrlgen.firmware.templates import comment, write
 from ctrlgen.model.model import Model
+from ctrlgen.model.null_motion import why_no_null_motion
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.version import __version__, commit, program
@@ -22,18 +23,20 @@ from ctrlgen.version import __version__, commit, program
 
 def check_online(scenario: Scenario, model: Model) -> None:
     """Raises InputError for a device, or a scenario of it, whose drives the online C cannot compute yet."""
-    faults = []
+    faults, player = [], "use the player (`ctrlgen solve`, `ctrlgen generate --player`)"
+    yet = f"the online C cannot keep to that yet: {player}"
     if scenario.file.feedforward == "static":
-        faults.append(Fault("feedforward", "is static, in a scenario"))
-    if model.rate_limits:
-        faults.append(
-            Fault("device", f"has limits on rates of drives ({', '.join(r.label for r in model.rate_limits)})")
-        )
-    if model.redundant:
-        faults.append(Fault("device", f"has more drives ({model.u.numel()}) than axes ({len(model.axes)})"))
+        faults.append(Fault("feedforward", f"is static, in a scenario; {yet}"))
+    if model.rate_limits and scenario.sample_time is None:
+        rates = ", ".join(limit.label for limit in model.rate_limits)
+        what = f"is missing, and the device has limits on rates of drives ({rates}): give sample_rate and duration"
+        faults.append(Fault("sample_rate", what))
+    if (why := why_no_null_motion(model)) is not None:
+        faults.append(Fault("device", f"{why}: {player}"))
+    if model.redundant and model.device.given_at_start:
+        faults.append(Fault("run_time", f"is of a device with more drives than axes; {yet}, or leave [run_time] out"))
     if faults:
-        what = "the online C cannot keep to that yet: use the player (`ctrlgen solve`, `ctrlgen generate --player`)"
-        raise InputError(model.name, [Fault(f.where, f"{f.what}; {what}") for f in faults])
+        raise InputError(model.name, faults)
 
 
 def generate_player(solution: Solution, out: Path) -> list[Path]:
@@ -47,7 +50,7 @@ def generate_player(solution: Solution, out: Path) -> list[Path]:
     for real, compression in compress(solution).items():
         name = f"{scenario.name}_player_{real.suffix}"
         context = player_context(solution, compression, name) | {
-            "real": real, "drive": drive, "drive_unit": drive.units[0], "n": len(drive.channels), "motion": model.inertial,
+            "real": real, "drive": drive, "drive_unit": drive.units[0], "nu": len(drive.channels), "motion": model.inertial,
             "program": program(), "version": __version__, "digest": scenario.digest, "u_safe": np.clip(0.0, *model.u_bounds),
             "source": comment(model.device.source),
         }  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -17,6 +18,7 @@ from ctrlgen.model.inverse import Inverse
 
 AROUND = 8  # displacements drawn anywhere in the range, and on its corners
 MOVED = 0.05  # of its range, by which a displacement goes beyond
+HALVINGS = 45  # that find where a drive is at its rate
 STEADY = 16  # roundings of a target that must not change the status: what a processor's own roundings may amount to
 
 
@@ -96,10 +98,33 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
             yield start, Call(0.5 * (start.target + target(z)), False, False)
             if controller.nominal.inertial:
                 yield start, Call(target(z, 1.0), False, False)
+    for z in anywhere[:AROUND] if controller.rate else ():
+        for settle in (True, False):
+            yield (Call(_at_its_rate(controller, target(z), settle), settle, True),)
     absurd = np.full(len(scale), 1e9)
     yield (Call(absurd, True, True),)
     if not still:
         yield (Call(absurd, False, True),)
+
+
+def _at_its_rate(controller: Controller, target: np.ndarray, settle: bool) -> np.ndarray:
+    """The share of a `target` at which, from rest, a drive changes faster than it may by half of its slack; all of it where none does."""
+    rate, free = (
+        controller.rate,
+        type(controller)(controller.model, controller.follow, controller.sample_time, controller.slack),
+    )
+    assert rate is not None
+    free.__dict__.update(
+        {name: value for name, value in controller.__dict__.items() if name != "plausible"} | {"rate": None}
+    )
+    rest = controller.rest()
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        change = free.step(rest[:2], middle * target, settle=settle).drive - rest[2]
+        beyond = np.any(np.maximum(change - rate.rise, rate.fall - change) > rate.slack / 2)
+        low, high = (low, middle) if beyond else (middle, high)
+    return high * target
 
 
 class _Watch:
@@ -164,4 +189,12 @@ def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
         twin.__dict__["composite_bound"] = _Watch(
             controller.composite_bound, lambda value: seen.append(("bound", bool(value[0] <= 1)))
         )
+    if (rate := controller.rate) is not None:
+
+        def toward(last: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, float, bool, bool]:
+            answer = rate.toward(last, wanted)
+            seen.append(("rate", *answer[2:]))
+            return answer
+
+        twin.__dict__["rate"] = SimpleNamespace(fall=rate.fall, rise=rate.rise, toward=toward)
     return twin, seen

@@ -59,7 +59,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
     return {
         "rows": rows, "tolerance": tolerance, "unusable": UNUSABLE * command.shape[1], "beyond": min(len(command), VECTORS),
-        "lost": controller.nominal.x.numel() + len(controller.nominal.axes) + 1,
+        "lost": sum(part.size for part in controller.rest()) + 1,
     }  # fmt: skip
 
 

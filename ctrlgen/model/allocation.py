@@ -106,7 +106,7 @@ def inverse_of(model: Model, follow: str, sample_time: float | None) -> Inverse:
     balance = ca.substitute(
         model.balance, ca.vertcat(model.x, model.u, model.p), ca.vertcat(x, u, ca.DM(model.p_nominal))
     )
-    settled = newton_root(ca.substitute(balance, model.z, z), z, z, NEWTON_STEPS)
+    settled, one_step = (newton_root(ca.substitute(balance, model.z, z), z, z, steps) for steps in (NEWTON_STEPS, 1))
     still = inverse.advance(x, z, ca.SX.zeros(len(model.axes), 1))  # nothing remembers the drive
     return replace(
         inverse,
@@ -115,4 +115,5 @@ def inverse_of(model: Model, follow: str, sample_time: float | None) -> Inverse:
         ),
         advance=ca.Function("advance", [x, z, u], [still], ["x", "z", "drive"], ["result"], {"cse": True}),
         settle=ca.Function("settle", [x, z, u], [settled], ["x", "z", "drive"], ["result"], {"cse": True}),
+        newton=ca.Function("newton", [x, z, u], [one_step], ["x", "z", "drive"], ["result"], {"cse": True}),
     )

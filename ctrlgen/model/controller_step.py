@@ -8,6 +8,8 @@ from enum import IntFlag
 import casadi as ca
 import numpy as np
 
+State = tuple[np.ndarray, ...]  # x, z, and of a device whose drives have rate limits the last drive
+
 
 class ControllerStatus(IntFlag):
     """What the controller had to change. 0: the target is reached as commanded."""
@@ -17,18 +19,22 @@ class ControllerStatus(IntFlag):
     STATE = 4  # the actuator state (temperature) was set to its limit
     DRIVE = 8  # a drive is at its limit: the target is reached later than commanded
     INPUT = 16  # the target is not a number or absurdly large: it is ignored, drives at zero or the nearest admissible value
-    LOST = 32  # the state is none that the controller left: drives as for INPUT until it is initialised again
+    LOST = 32  # the state is none that the controller left: the safe drives until it is initialised again
+    # 64 is of the constants that the C is given when it starts (`ctrlgen.firmware.run_time`). A drive changes as fast as it may: the
+    # target is reached later than commanded. Beside it DISPLACEMENT, COMPOSITE and STATE say also that the device passes that limit,
+    # because a drive cannot turn back as fast as the limit asks.
+    RATE = 128
 
 
 @dataclass(frozen=True)
 class ControllerStep:
-    """One answer of the controller, SI; `state` (x, z) is the one predicted for the next sample."""
+    """One answer of the controller, SI; `state` (x, z) is the one predicted for the next sample, with rate limits (x, z, drive)."""
 
     status: ControllerStatus
     displacement: np.ndarray
     actuator_state: np.ndarray
     drive: np.ndarray
-    state: tuple[np.ndarray, np.ndarray]
+    state: State
 
 
 def row(value: ca.DM) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.assembly import TYPICAL_RATE
+from ctrlgen.model.controller_step import State
 from ctrlgen.model.feedforward import Controller, ControllerStatus, ControllerStep
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
 from ctrlgen.model.model import Model, Signal
@@ -70,14 +71,14 @@ class MotionController(Controller):
         n = self.nominal.n_states
         return bool(np.any(np.isfinite([bound[:n] for bound in self.nominal.x_bounds])))
 
-    def step(self, state: tuple[np.ndarray, np.ndarray], target: np.ndarray, *, settle: bool = False) -> ControllerStep:
-        """Drives for the motion that `target` says, or with `settle` for the equilibrium at its position. `state` (x, z) is kept where
-        the target is no command; else that of the motion follows. A state that is lost is answered with the safe drive."""
+    def step(self, state: State, target: np.ndarray, *, settle: bool = False) -> ControllerStep:
+        """Drives for the motion that `target` says, or with `settle` for the equilibrium at its position. `state` (as `rest`) is kept
+        where the target is no command; else that of the motion follows. A state that is lost is answered with the safe drive."""
         usable = bool(np.all(np.abs(target) <= self.input_limits))
         if (not settle or not usable) and self.is_lost(*state):
             return self._without_state()
         if not usable:
-            return self._without_target(self.static, *state)
+            return self._without_target(self.static, state)
         position = target[: len(self.model.signals[self.follow].channels)]
         if settle:
             return super().step(state, position, settle=True)
@@ -85,10 +86,15 @@ class MotionController(Controller):
         if broken := self._broken(x, z):
             held = super().step(state, position, settle=True)
             return ControllerStep(held.status | broken, held.displacement, held.actuator_state, held.drive, held.state)
-        low, high = self.nominal.u_bounds
+        u, (low, high) = self.chosen(u, state), self.nominal.u_bounds
         slack = self.slacks[2]
         status = ControllerStatus(0) if np.all((u >= low - slack) & (u <= high + slack)) else ControllerStatus.DRIVE
-        return ControllerStep(status, z, x[: self.nominal.n_states], np.clip(u, low, high), (x, z))
+        u, last = np.clip(u, low, high), ()
+        if self.rate is not None:
+            u, _, _, held = self.rate.toward(state[2], u)
+            u = np.clip(u, low, high)
+            status, last = status | (ControllerStatus.RATE if held else status), (u,)
+        return ControllerStep(status, z, x[: self.nominal.n_states], u, (x, z, *last))
 
     def _broken(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
         """Which limits beside those of the drives a motion breaks."""
@@ -105,7 +111,7 @@ class MotionController(Controller):
 
     def drive_rounding(
         self,
-        before: tuple[np.ndarray, np.ndarray],
+        before: State,
         target: np.ndarray,
         step: ControllerStep,
         settle: bool,

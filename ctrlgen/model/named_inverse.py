@@ -14,9 +14,10 @@ from ctrlgen.model.model import Model
 
 @dataclass(frozen=True)
 class NamedInverses:
-    """Kernels for equilibria and for the next sample with an argument "p" more, their `model`, and value and path of each number of p."""
+    """Kernels for equilibria and for the next sample with an argument "p" more, their `model`, and value and path of each number of p.
+    Of a model with more drives than axes there are none."""
 
-    static: Inverse
+    static: Inverse | None
     moving: Inverse | None
     model: Model
     numbers: list[tuple[float, str]]
@@ -33,7 +34,8 @@ def given_inverses(device: Device, follow: str, sample_time: float | None) -> Na
 
 
 def _inverses(model: Model, follow: str, sample_time: float | None) -> NamedInverses:
-    next_sample = None if sample_time is None else invert(model, follow, sample_time, symbolic=True)
+    square = not model.redundant
+    next_sample = None if sample_time is None or not square else invert(model, follow, sample_time, symbolic=True)
     paths = [symbol.name() for symbol in ca.vertsplit(model.p)]
     numbers = list(zip(model.p_nominal.tolist(), paths, strict=True))
-    return NamedInverses(invert(model, follow, None, symbolic=True), next_sample, model, numbers)
+    return NamedInverses(invert(model, follow, None, symbolic=True) if square else None, next_sample, model, numbers)

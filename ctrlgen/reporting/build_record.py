@@ -32,6 +32,7 @@ STATUS_WORDS = {
     ControllerStatus.DRIVE: "drive at its limit: as far toward the target as it reaches in one sample",
     ControllerStatus.INPUT: "target is no number, or absurd: safe drives",
     ControllerStatus.LOST: "state is no number, absurd, or was not initialised: safe drives until it is",
+    ControllerStatus.RATE: "drives change as fast as they may: the target is reached later",
 }
 
 
@@ -140,6 +141,7 @@ def interface(build: Build) -> dict[str, Any]:
         s for s in ControllerStatus
         if not (s is ControllerStatus.COMPOSITE and not controller.guarded_limits)
         and not (s is ControllerStatus.STATE and not controller.state_can_be_limited)
+        and not (s is ControllerStatus.RATE and controller.rate is None)
     ]  # fmt: skip
     return {
         "functions": {real.value: _functions(build, build.c.online[real], build.c.player.get(real)) for real in build.c.online},
@@ -147,7 +149,8 @@ def interface(build: Build) -> dict[str, Any]:
         "drive": {"label": drive.label, "channels": channels(drive)},
         "actuator_state": None if state is None else {"label": state.label, "channels": channels(state)},
         "memory": [
-            *(f"{n} [{u}]" for n, u in zip(m.x_names, m.x_units, strict=True)), *(f"displacement {a} [m]" for a in m.axes)
+            *(f"{n} [{u}]" for n, u in zip(m.x_names, m.x_units, strict=True)), *(f"displacement {a} [m]" for a in m.axes),
+            *([] if controller.rate is None else [f"last {c}" for c in channels(drive)]),
         ],
         "status": [{"value": int(s), "name": s.name, "meaning": STATUS_WORDS[s]} for s in possible],
         "limits": [

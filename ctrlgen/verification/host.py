@@ -51,7 +51,8 @@ class Host:
         self.real, model = real, reference.model
         write_harness(folder, reference.scenario, model, real, scratch / f"harness_{real.suffix}.c")
         self._program = build_host(next(iter(find_compilers())), real, folder, scratch)
-        self._drives, self._width = len(model.axes), 2 * len(model.axes) + model.n_states
+        self._drives = model.u.numel()
+        self._width = self._drives + len(model.axes) + model.n_states
 
     def followed(self, targets: np.ndarray, start: tuple[np.ndarray, ...]) -> np.ndarray:
         """Steps from the state `start` (x, z)."""

@@ -163,16 +163,17 @@ def _sequences(
 ) -> Iterator[tuple[str, Answers, np.ndarray]]:
     """What is run, its answers, and this computer's."""
     online, real, machine = folder.online[host.real], host.real, machines["online"]
-    n, n_s, m = len(ref.model.axes), ref.model.n_states, ref.random.shape[1]
-    numbers = ref.model.x.numel() + n + 1 + folder.given_numbers
-    state, target, out = (machine.reserve(count, real) for count in (numbers, m, 2 * n + n_s))
+    nu, m = ref.model.u.numel(), ref.random.shape[1]
+    answered = nu + len(ref.model.axes) + ref.model.n_states
+    numbers = sum(part.size for part in ref.controller.rest()) + 1 + folder.given_numbers
+    state, target, out = (machine.reserve(count, real) for count in (numbers, m, answered))
 
     def answers(function: str, targets: np.ndarray) -> Answers:
         for wanted in targets:
             with np.errstate(over="ignore"):
                 machine.write(target, wanted, real)
             status, count = machine.call(f"{online}_{function}", state, target, out)
-            yield machine.read(out, 2 * n + n_s, real), status, count
+            yield machine.read(out, answered, real), status, count
 
     random = ref.random[:: max(1, len(ref.random) // RANDOM)]
     if ref.scenario.sample_time is not None:
@@ -189,13 +190,13 @@ def _sequences(
     machine.call(f"{online}_init", state)
     yield "settle, random targets", answers("settle", random), host.settled(random)
     if "player" in machines:
-        player, drive = machines["player"], machines["player"].reserve(n, real)
+        player, drive = machines["player"], machines["player"].reserve(nu, real)
         samples = np.arange(len(ref.solution.drive))
 
         def played() -> Answers:
             for k in samples:
                 status, count = player.call(f"{folder.player[real]}_sample", int(k), drive)
-                yield player.read(drive, n, real), status, count
+                yield player.read(drive, nu, real), status, count
 
         yield "player, a sample", played(), host.played(samples)
 

@@ -7,12 +7,14 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from ctrlgen.model.controller_step import State
 from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.scenario import motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
+MOST_CALLS = 16  # of a random target that drives with rate limits come to in several calls
 
 
 class ReferenceAnswers:
@@ -22,13 +24,16 @@ class ReferenceAnswers:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
         self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
         self.random = self._random_targets()
+        if self.controller.rate is not None:  # fewer, each until the drives have come there, or nearly
+            calls = min(self.controller.rate.samples(*self.model.u_bounds), MOST_CALLS)
+            self.random = self.random[::MOST_CALLS].repeat(calls, axis=0)
         self.settled = self._answers(self.random, None)
         self.command, self.path = solution.command, solution.command
         if self.scenario.sample_time is None:
             self.followed = self._answers(self.command, None)
             return
         # From IPOPT's first sample on: each target is the next sample; a closed path ends where it began, an open one is held.
-        self.start = (solution.trace.x[0], solution.trace.z[0])
+        self.start = (solution.trace.x[0], solution.trace.z[0], *self._last_drive(solution))
         last = solution.command[:1] if self.scenario.closed else solution.command[-1:]
         self.path = np.vstack([solution.command, last])
         self.command = motion_targets(self.scenario, self.model) if self.model.inertial else self.path[1:]
@@ -50,7 +55,7 @@ class ReferenceAnswers:
         if not self.model.inertial:
             return 0.0
         drives = self.followed[:, 1 : 1 + self.solution.drive.shape[1]]
-        moved = simulate(self.model, drives, self.sample_time, *self.start).signals[self.scenario.file.follow]
+        moved = simulate(self.model, drives, self.sample_time, *self.start[:2]).signals[self.scenario.file.follow]
         return 2 * float(np.abs(moved - self.path).max())
 
     @property
@@ -70,7 +75,7 @@ class ReferenceAnswers:
         cold = np.tile(m.rest[:, None], (1, len(z)))
         ratio = self.controller.composite_ratio.map(len(z))(cold, 0 * z.T, z.T).full().ravel()
         z = z / np.maximum(ratio, 1.0)[:, None]
-        x, u = np.tile(m.rest, (len(z), 1)), np.zeros_like(z)
+        x, u = np.tile(m.rest, (len(z), 1)), np.zeros((len(z), m.u.numel()))
         signal = self.scenario.file.follow
         reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
         anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
@@ -93,8 +98,19 @@ class ReferenceAnswers:
         targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
         return targets
 
-    def _answers(self, targets: np.ndarray, start: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray:
-        """(n, 1 + 3 axes): status, drive, displacement, actuator state; steps from `start`, or settles at each target."""
+    def _last_drive(self, solution: Solution) -> list[np.ndarray]:
+        """The drive before the first sample, where the controller remembers it: the last of a closed path, else what holds the start."""
+        if self.controller.rate is None:
+            return []
+        if self.scenario.closed:
+            return [solution.drive[-1]]
+        untimed = controller_of(self.model, self.scenario.file.follow, None)
+        start = np.zeros(len(untimed.target.channels))
+        start[: solution.command.shape[1]] = solution.command[0]
+        return [untimed.step(untimed.rest(), start, settle=True).drive]
+
+    def _answers(self, targets: np.ndarray, start: State | None) -> np.ndarray:
+        """(n, 1 + drives + axes + states): status, drive, displacement, actuator state; steps from `start`, or settles at each target."""
         rows, state = [], start or self.controller.rest()
         for target in targets:
             step = self.controller.step(state, target, settle=start is None)

@@ -23,8 +23,8 @@ def reached(ref: ReferenceAnswers, drives: np.ndarray, followed: np.ndarray) -> 
     first = ref.solution.trace
     if ref.scenario.sample_time is not None:
         return simulate(m, drives, ref.scenario.sample_time, first.x[0], first.z[0]).signals[role]
-    n = len(m.axes)
-    z, state = followed[:, 1 + n : 1 + 2 * n], followed[:, 1 + 2 * n :]
+    n, n_u = len(m.axes), m.u.numel()
+    z, state = followed[:, 1 + n_u : 1 + n_u + n], followed[:, 1 + n_u + n :]
     x = np.hstack([state, first.x[:, m.n_states :]])
     return trace(m, np.zeros(len(z)), x, z, drives).signals[role]
 
@@ -34,14 +34,14 @@ def tracking_errors(folder: CFolder, ref: ReferenceAnswers) -> dict[str, dict[Re
 
     Raises ToolError where the C is refused.
     """
-    n = len(ref.model.axes)
+    n_u = ref.model.u.numel()
     errors: dict[str, dict[Real, np.ndarray]] = {"online C": {}}
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
         for real in Real:
             host = Host(folder, ref, real, Path(name))
             moving = ref.scenario.sample_time is not None
             followed = host.followed(ref.command, ref.start) if moving else host.settled(ref.command)
-            errors["online C"][real] = reached(ref, followed[:, 1 : 1 + n], followed) - ref.path
+            errors["online C"][real] = reached(ref, followed[:, 1 : 1 + n_u], followed) - ref.path
             if folder.player:
                 played = host.played(np.arange(len(ref.solution.drive)))[:, 1:]
                 errors.setdefault("player C", {})[real] = reached(ref, played, followed) - ref.path
