@@ -134,6 +134,22 @@ def controller(libraries):
     return Controller(build_model(device), "pose", 1e-3)
 
 
+def test_a_controller_with_another_slack_has_the_same_kernels_and_limits_of_its_own(controller):
+    wide = controller.with_slack(4e-6)
+    pairs = list(zip((controller, *controller.variants), (wide, *wide.variants), strict=True))
+    assert len(pairs) > 10
+    assert all(one.static is other.static and one.moving is other.moving for one, other in pairs)
+    for own, other in zip(wide.slacks, controller.slacks_of(4e-6), strict=True):
+        np.testing.assert_array_equal(own, other)
+    assert wide.slacks[0].max() > 1000 * controller.slacks[0].max()
+
+
+def test_the_same_controller_of_a_model_is_made_once(controller):
+    one, again = (controller_of(controller.model, "pose", 1e-3) for _ in range(2))
+    assert one is again
+    assert controller_of(controller.model, "pose", 2e-3) is not one
+
+
 def chosen(controller: Controller) -> list[dict[str, float]]:
     """The file's constants, both ends, and some drawn between."""
     stated = controller.model.device.given_at_start

@@ -6,7 +6,7 @@ It has no feedback: what it keeps of the device is the state that its own model 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -30,6 +30,11 @@ COMPOSITE_ROUNDS = 8
 
 SECANT_STEPS = 3  # of the line search toward a target that the drives cannot reach in one sample
 SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
+
+OF_SLACK = frozenset({  # what a controller works out that depends on its slack
+    "slack", "slacks", "state_can_be_limited", "_own_state_can_be_limited", "drive_can_be_limited", "_own_drive_can_be_limited",
+    "variants",
+})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,14 @@ class Controller:
         """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them."""
         model = build_model(with_constants(self.model.device, values))
         return type(self)(model, self.follow, self.sample_time, self.slack)
+
+    def with_slack(self, slack: float) -> Controller:
+        """The same controller with another slack; the kernels, and what else does not depend on it, are this one's."""
+        _ = self.static, self.moving  # worked out now, for both
+        other = replace(self, slack=slack)
+        other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in OF_SLACK})
+        other.__dict__["variants"] = tuple(variant.with_slack(slack) for variant in self.variants)
+        return other
 
     @cached_property
     def variants(self) -> tuple[Controller, ...]:
