@@ -5,11 +5,18 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks import diagnosis, job, online, target, trajectory
+from benchmarks import budget, diagnosis, job, online, target, trajectory
 from benchmarks.measure import Count, Line, Note, print_table
 from benchmarks.samples import Disagreement
 
-BENCHMARKS = {"trajectory": trajectory, "online": online, "target": target, "job": job, "diagnosis": diagnosis}
+BENCHMARKS = {
+    "trajectory": trajectory,
+    "online": online,
+    "target": target,
+    "job": job,
+    "budget": budget,
+    "diagnosis": diagnosis,
+}
 
 
 def main() -> int:
