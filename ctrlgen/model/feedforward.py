@@ -17,12 +17,12 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.model.composite_bound import composite_bound, worst_in_range
 from ctrlgen.model.controller_step import ControllerStatus, ControllerStep, clamp, row
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
+from ctrlgen.model.limits_in_reach import drive_in_reach, state_in_reach
 from ctrlgen.model.lost_state import Groups, is_beyond, plausible_sums
 from ctrlgen.model.model import Limit, Model, Signal
 from ctrlgen.model.named_inverse import NamedInverses, given_inverses, named_inverses
 from ctrlgen.model.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.model.run_time import choices, with_constants
-from ctrlgen.numerics.interval_arithmetic import bounds
 
 SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
 # The memory of an effect does not scale with the displacement, so its share of the excess is removed over several rounds.
@@ -70,11 +70,15 @@ class Controller:
     def given(self) -> NamedInverses | None:
         """The same kernels in terms of the run-time constants; None for a device without."""
         device = self.model.device
-        return given_inverses(device, self.follow, self._step_time) if device.given_at_start else None
+        if not device.given_at_start:
+            return None
+        found = given_inverses(device, self.follow, self._step_time)
+        return replace(found, model=found.model.limited_as(self.model))
 
     def at(self, values: dict[str, float]) -> Controller:
-        """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them."""
-        model = build_model(with_constants(self.model.device, values))
+        """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them. What is
+        reserved of limits is the same."""
+        model = build_model(with_constants(self.model.device, values)).limited_as(self.model)
         return type(self)(model, self.follow, self.sample_time, self.slack)
 
     def with_slack(self, slack: float) -> Controller:
@@ -183,14 +187,8 @@ class Controller:
 
     @cached_property
     def _own_state_can_be_limited(self) -> bool:
-        m, n = self.nominal, self.nominal.n_states
-        ranges = {"wanted": m.z_bounds, "z": m.z_bounds, "x": m.x_bounds}
-        for k in (self.static, self.moving or self.static) if n else ():
-            low, high = bounds(k.state, ranges)
-            slack = self._own_slacks(self.slack)[1]
-            if np.any(low < m.x_bounds[0][:n] - slack) or np.any(high > m.x_bounds[1][:n] + slack):
-                return True
-        return False
+        kernels = self.static, self.moving or self.static
+        return state_in_reach(self.nominal, kernels, self._own_slacks(self.slack)[1])
 
     @cached_property
     def drive_can_be_limited(self) -> tuple[bool, bool]:
@@ -201,18 +199,9 @@ class Controller:
 
     @cached_property
     def _own_drive_can_be_limited(self) -> tuple[bool, bool]:
-        m, n = self.nominal, self.nominal.n_states
-        low, high = m.u_bounds
-        found = []
-        for k in (self.static, self.moving or self.static):
-            ranges = {"wanted": m.z_bounds, "z": m.z_bounds, "x": m.x_bounds}
-            if n:
-                state = bounds(k.state, ranges)
-                ranges["state"] = (np.maximum(state[0], m.x_bounds[0][:n]), np.minimum(state[1], m.x_bounds[1][:n]))
-            least, most = bounds(k.drive, ranges)
-            slack = self._own_slacks(self.slack)[2]
-            found.append(not (np.all(least >= low - slack) and np.all(most <= high + slack)))
-        return found[0], found[1]
+        slack = self._own_slacks(self.slack)[2]
+        settle, step = (drive_in_reach(self.nominal, k, slack) for k in (self.static, self.moving or self.static))
+        return settle, step
 
     @property
     def target(self) -> Signal:

@@ -33,9 +33,6 @@ def check_run_time(controller: Controller) -> None:
     if model.inertial:
         what = "holds for a stage without inertia; leave [run_time] out, and generate the C anew with a calibrated device file"
         raise InputError(device.name, [Fault("run_time", what)])
-    if model.probability is not None:
-        what = "is given limits that follow its constants, and robust tightens them for the file's alone; leave out one of the two"
-        raise InputError(device.name, [Fault("run_time", what)])
     if faults := _faults(controller):
         raise InputError(device.name, faults)
 
