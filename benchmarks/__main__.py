@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks import diagnosis, job, mechanism, online, target, trajectory
+from benchmarks import budget, diagnosis, job, mechanism, online, target, trajectory
 from benchmarks.measure import Count, Line, Note, print_table
 from benchmarks.samples import Disagreement
 
 BENCHMARKS = {
-    "trajectory": trajectory, "online": online, "target": target, "job": job, "mechanism": mechanism, "diagnosis": diagnosis,
+    "trajectory": trajectory, "online": online, "target": target, "job": job, "mechanism": mechanism, "budget": budget,
+    "diagnosis": diagnosis,
 }  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
 from ctrlgen.path_timing.optimum import Optimiser
 from ctrlgen.path_timing.repetition import crossing, largest
+from ctrlgen.reporting.fastest_page import write_fastest
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.paths import Poses
 
@@ -122,13 +123,21 @@ def test_at_every_place_one_limit_binds(circle20):
 
 
 @pytest.mark.long
-def test_a_circle_as_large_as_a_frequency_allows_takes_just_that_long():
-    """0.2 %: scales are searched to 0.1 %."""
+def test_a_circle_as_large_as_a_frequency_allows_takes_just_that_long(tmp_path):
+    """0.2 %: scales are searched to 0.1 %. Its set-points are a scenario like any other, whose drives keep the limits."""
     found = ctrlgen.fastest(SCENARIOS / "circle20", sample_rate="10 kHz", frequency="50 Hz")
     largest = found.repetition.scale
     optimiser = Optimiser(found.solution.model, "pose", 1e-4)
     assert optimiser.along(found.curve.scaled(largest)).duration == pytest.approx(0.02, rel=2e-3)
     assert found.repetition.even < largest < 1
+    assert found.repetition.even < found.repetition.sampled <= largest
+    write_fastest(tmp_path, found)
+    written = load_scenario(tmp_path / "at_frequency" / "scenario" / "circle20_repeated.toml")
+    again = solve(written, build_model(written.device))
+    assert len(again.command) == 200 and again.scenario.closed  # of 10 kHz, 50 times a second
+    radius = np.ptp(again.command[:, 3]) / 2
+    assert radius == pytest.approx(found.repetition.sampled * 10e-6, rel=1e-3)  # the largest of 200 points of a circle
+    assert all(margin.distance >= 0 for margin in again.margins)
 
 
 @pytest.mark.parametrize("scale", [0.013, 0.37, 1.0, 41.0])

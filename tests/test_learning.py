@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -395,7 +396,12 @@ def test_readings_at_a_part_of_the_samples_and_a_multiple_of_the_rate_are_taken(
     y = y + NOISE * np.random.default_rng(1).standard_normal(y.shape)
     y[np.arange(len(y)) % 4 != 0] = np.nan
     write(tmp_path / "fast", hundred, np.repeat(np.tile(hundred.drive, (3, 1)), 2, axis=0), y, rate=400.0)
-    (run,) = learn(hundred.scenario, tmp_path / "fast").runs
+    found = learn(hundred.scenario, tmp_path / "fast")
+    (run,) = found.runs
+    files = {
+        f"fast/{file.name}": hashlib.sha256(file.read_bytes()).hexdigest() for file in (tmp_path / "fast").iterdir()
+    }
+    assert files.items() <= found.inputs.items() and len(files) == 2  # the measurements too
     assert run.repeats == 3 and run.repeating["translation"] == pytest.approx(bench.error(hundred.drive), rel=0.05)
 
 

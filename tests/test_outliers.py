@@ -95,3 +95,17 @@ def test_a_coarse_sensor_at_rest_is_not_stuck():
     drive = np.clip(np.sin(0.01 * np.arange(4000)), -0.5, 0.5)
     reading = np.round(drive * 200 + 0.1 * np.random.default_rng(0).standard_normal(4000))
     assert not stuck_samples(reading, drive[:, None]).any()
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_a_channel_read_at_some_rows_alone_is_judged_by_its_readings(every, rng):
+    """Between them it is known nowhere, and no reading is taken for an outlier of straight lines."""
+    t = np.arange(400 * every)
+    y = np.sin(0.02 * t / every) + 1e-3 * rng.standard_normal(len(t))
+    y[t % every != 0] = np.nan
+    drive = np.cos(0.02 * t / every)[:, None]
+    assert not outliers(y, drive).any()
+    y[200 * every] += 0.05
+    assert np.array_equal(np.flatnonzero(outliers(y, drive)), [200 * every])
+    drive[200 * every :] += 5.0  # where the drive jumps, the device may too
+    assert not outliers(y, drive).any()

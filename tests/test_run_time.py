@@ -9,6 +9,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from conftest import SCENARIOS
@@ -133,6 +134,22 @@ def libraries(tmp_path_factory):
 def controller(libraries):
     device = libraries[Real.DOUBLE].scenario.device
     return Controller(build_model(device), "pose", 1e-3)
+
+
+def test_a_controller_with_another_slack_has_the_same_kernels_and_limits_of_its_own(controller):
+    wide = controller.with_slack(4e-6)
+    pairs = list(zip((controller, *controller.variants), (wide, *wide.variants), strict=True))
+    assert len(pairs) > 10
+    assert all(one.static is other.static and one.moving is other.moving for one, other in pairs)
+    for own, other in zip(wide.slacks, controller.slacks_of(4e-6), strict=True):
+        np.testing.assert_array_equal(own, other)
+    assert wide.slacks[0].max() > 1000 * controller.slacks[0].max()
+
+
+def test_the_same_controller_of_a_model_is_made_once(controller):
+    one, again = (controller_of(controller.model, "pose", 1e-3) for _ in range(2))
+    assert one is again
+    assert controller_of(controller.model, "pose", 2e-3) is not one
 
 
 def chosen(controller: Controller) -> list[dict[str, float]]:
@@ -289,6 +306,58 @@ def test_bounds_that_are_not_stated_are_a_fifth_of_a_number_and_twenty_kelvins_o
 )  # fmt: skip
 def test_a_range_keeps_its_digits_whatever_its_unit(low, high, unit, text):
     assert RunTimeConstant("a.b", "b", low, low, high, unit).range_text == text
+
+
+RESERVES = {"temperature": (3.0, 12.0), "stroke": (1e-7, 2e-6), "drive": (0.0, 0.05)}  # K, m, W below and above
+
+
+def test_what_is_reserved_of_limits_is_reserved_of_those_that_follow_from_the_constants():
+    """A path whose limits hold for what is uncertain, `robust`: the bounds at other constants, less the same reserve."""
+    device = load_device(SCENARIOS / "devices" / "mems_hexapod_run_time.toml")
+    plain = build_model(device)
+    robust = Controller(plain.tightened(RESERVES, 0.999), "pose", 1e-3)
+    for values in (
+        {},
+        {"actuator.ambient": 288.15},
+        {"actuator.ambient": 303.15, "actuator.thermal_resistance": 460.0},
+    ):
+        own, other = Controller(plain, "pose", 1e-3).at(values).model, robust.at(values).model
+        p = [values.get(path, number) for number, path in robust.given.numbers]
+        for variable, below, above in (("x", 3.0, 12.0), ("u", 0.0, 0.05)):
+            low, high = getattr(own, f"{variable}_bounds")
+            expected = low + below, high - above
+            np.testing.assert_allclose(getattr(other, f"{variable}_bounds"), expected, rtol=1e-12)
+            symbolic = robust.given.model
+            formula = ca.Function("bounds", [symbolic.p], list(symbolic.bounds_formula(getattr(symbolic, variable))))
+            np.testing.assert_allclose([b.full().ravel() for b in formula(p)], expected, rtol=1e-12)
+        assert own.x_bounds[0][0] == pytest.approx(values.get("actuator.ambient", 295.15))
+
+
+@pytest.mark.long
+def test_the_c_of_a_robust_path_keeps_its_reserves_whatever_constants_it_is_given(tmp_path):
+    scenario = scenario_of(tmp_path, EFFECTS, ('drive = "power"', 'drive = "voltage"'))
+    model = build_model(scenario.device).tightened({"temperature": (0.0, 60.0), "stroke": (0.0, 15e-6)}, 0.999)
+    made = generate(scenario, model, tmp_path / "c")
+    library, controller = (
+        Library(scenario, made.path, Real.DOUBLE, made.online[Real.DOUBLE]),
+        Controller(model, "pose", 1e-3),
+    )
+    size = float(np.abs(controller.nominal.u_bounds[1]).max())
+    met = ControllerStatus(0)
+    for values in chosen(controller)[:4]:
+        assert library.init(values) == 0
+        reference = controller.at(values)
+        state = reference.rest()
+        for target in targets(controller):
+            step = reference.step(state, target)
+            status, answer = library.call("step", target)
+            met |= step.status
+            assert status == step.status
+            assert np.max(np.abs(answer[:6] - step.drive)) < 1e-9 * size
+            library.write_state(step.state)  # each sample from one state: a path drifts where a limit acts
+            state = library.read_state()
+            assert np.all(state[0] <= reference.nominal.x_bounds[1] + 1e-6)  # K: the tightened 490 degC
+    assert met & ControllerStatus.DISPLACEMENT
 
 
 @pytest.mark.long

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.stats import norm
@@ -171,9 +172,13 @@ class DrawnLimits:
     found: Margins
     slopes: Slopes
 
+    @cached_property
+    def _near(self) -> np.ndarray:
+        return np.asarray(self.found.margin < FAR * self.found.sd)
+
     def near(self, sample: int) -> np.ndarray:
         """(2, channels) which bounds some draws may break at a sample."""
-        return np.asarray(self.found.margin[:, sample] < FAR * self.found.sd[:, sample])
+        return self._near[:, sample]
 
     def broken(self, sample: int, values: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """(draws,) which draws, with the limited quantities (draws, channels) and deviations (draws, m), break one of those."""

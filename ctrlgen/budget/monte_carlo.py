@@ -6,7 +6,6 @@ take each sample together.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,8 +14,7 @@ import numpy as np
 
 from ctrlgen.budget.linear import Propagated, drive_deviations, player_deviation
 from ctrlgen.budget.uncertain_path import UncertainPath
-from ctrlgen.numerics.batched_evaluation import evaluate
-from ctrlgen.numerics.compiled import Compilable
+from ctrlgen.numerics.columnwise import ColumnWise
 
 STEP_ERROR = 1e-3  # of the combined uncertainty: what a step of a draw may leave
 
@@ -71,22 +69,22 @@ def draw(
     q, gain = _numbers(path, columns)
     scatter = _Scatter(path, rng, draws, 2 * m + 1)
     allowed = STEP_ERROR * linear.combined("pose", stated).max(axis=0)
-    step = _Mapped(path, path.quickest_step(linear.states, allowed), q)
-    outputs = {"pose": _Mapped(path, "pose", q), "limits": _Mapped(path, "limits", q)}
-    S = np.tile(path.start, (len(q), 1))
+    step = _OfDraws(path, path.quickest_step(linear.states, allowed), q)
+    outputs = {"pose": _OfDraws(path, "pose", q), "limits": _OfDraws(path, "limits", q)}
+    S = np.tile(path.start[:, None], len(q))
     found = np.empty((len(q), len(kept), pose.shape[1]))
     limits = np.empty((len(q), *critical.shape))
     broken = np.zeros(draws, bool)
     place = {int(k): i for i, k in enumerate(kept)}
     for k, v in enumerate(path.drive):
-        drive = v * gain + scatter.at(k)
+        drive = (v * gain + scatter.at(k)).T
         S = step(S, drive)
         sample = k - path.before
         if sample in place:
-            found[:, place[sample]] = outputs["pose"](S, drive) - pose[sample] + scatter.replayed()
+            found[:, place[sample]] = outputs["pose"](S, drive).T - pose[sample] + scatter.replayed()
         here = critical == sample
         if sample >= 0 and (np.any(here) or limited.near(sample).any()):
-            values = outputs["limits"](S, drive)
+            values = outputs["limits"](S, drive).T
             limits[:, here] = np.stack([values] * 2, axis=1)[:, here]
             broken |= limited.broken(sample, values[:draws], deviations)
     good = np.isfinite(found[:draws]).all(axis=(1, 2)) & np.isfinite(limits[:draws]).all(axis=(1, 2))
@@ -152,23 +150,14 @@ class _Scatter:
         return error
 
 
-class _Mapped:
-    """A part of the path for all draws at once, compiled where that pays."""
+class _OfDraws:
+    """A part of the path for all draws at once."""
 
     def __init__(self, path: UncertainPath, name: str, q: np.ndarray) -> None:
         constants = path.constants[name]
-        self.count = len(q)
-        self.c = np.zeros((self.count, 0))
-        if constants.numel_out(0):
-            dense = ca.Function("constants", [path.q], [ca.densify(constants(path.q))])
-            (self.c,) = evaluate(dense.map(self.count), q)
-        self.one = Compilable(path.of_sample[name])
-        self.mapped = self.one.function.map(self.count)
+        self.constants = ColumnWise(ca.Function("constants", [path.q], [ca.densify(constants(path.q))]))(q.T)
+        self.part = ColumnWise(path.of_sample[name])
 
     def __call__(self, S: np.ndarray, drive: np.ndarray) -> np.ndarray:
-        """(draws, n) from states (draws, n_s) and drives (draws, n_u)."""
-        begin = time.perf_counter()
-        (value,) = evaluate(self.mapped, S, drive, self.c)
-        if self.one.spent(time.perf_counter() - begin):
-            self.mapped = self.one.function.map(self.count)
-        return value
+        """(n, draws) from states (n_s, draws) and drives (n_u, draws)."""
+        return self.part(S, drive, self.constants)

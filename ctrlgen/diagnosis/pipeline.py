@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from ctrlgen.core.files import read_toml, whole_folder, write_text
+from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.to_json import plain
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
@@ -21,9 +18,9 @@ from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.writeback import write_next
 from ctrlgen.diagnosis.selection.result import Diagnosis
 from ctrlgen.model.assembly import build_model
+from ctrlgen.recordings.files import recording_files, sha256
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
-from ctrlgen.recordings.schema import FILE
 from ctrlgen.version import code_hash
 
 Progress = Callable[[str], None]
@@ -130,32 +127,5 @@ def _checkpoint(
 
 def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:
     """SHA-256 of every file that a diagnosis reads, by name."""
-    return {name: _digest(path) for name, path in _files(device, recordings)}
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _files(device: Path, recordings: Sequence[Path | str]) -> Iterator[tuple[str, Path]]:
-    """Name and path of every file that was read; recordings' are named from the folder that all of theirs stand in."""
-    for file in files_of(device):
-        yield file.name, file
-    tables = [given / FILE if given.is_dir() else given for given in map(Path, recordings)]
-    above = os.path.commonpath([table.resolve().parent.parent for table in tables])
-    for table in tables:
-        folder = Path(os.path.relpath(table.resolve().parent, above)).as_posix()
-        for name in dict.fromkeys([table.name, *_named(read_toml(table))]):
-            yield f"{folder}/{name}", table.parent / name
-
-
-def _named(node: Any) -> Iterator[str]:
-    """Every `file` that a recording.toml names, in any of its tables."""
-    if isinstance(node, dict):
-        if isinstance(node.get("file"), str):
-            yield node["file"]
-        for member in node.values():
-            yield from _named(member)
-    elif isinstance(node, list):
-        for member in node:
-            yield from _named(member)
+    own = [(file.name, file) for file in files_of(device)]
+    return {name: sha256(path) for name, path in (*own, *recording_files(recordings))}

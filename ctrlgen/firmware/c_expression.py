@@ -48,17 +48,19 @@ class Linear:
 
     def terms(self, node: Node) -> tuple[str, dict[int, float]] | None:
         """(array, {index: factor}); None for a node that is no such combination."""
-        left = [node]
+        known = self._known
+        left = [] if node.number in known else [node]
         while left:
             top = left[-1]
-            missing = [n for n in top.operands if n.number not in self._known]
-            if missing and top.number not in self._known:
+            operands = () if top.number in self._ends else top.operands
+            missing = [n for n in operands if n.number not in known]
+            if missing and top.number not in known:
                 left.extend(missing)
                 continue
             left.pop()
-            if top.number not in self._known:
-                self._known[top.number] = self._of(top)
-        return self._known[node.number]
+            if top.number not in known:
+                known[top.number] = self._of(top)
+        return known[node.number]
 
     def row(self, node: Node) -> bool:
         """Whether a node is printed as a row of a matrix times an array."""

@@ -75,7 +75,7 @@ class Rows:
         return any(
             node.array in self.may_be_result and node.index != i
             for i, row in enumerate(self.rows)
-            for node in reached([row], [])
+            for node in reached([row])
             if node.array
         )
 
@@ -244,23 +244,24 @@ def _shared(rows: Sequence[Node], linear: Linear) -> list[Node]:
     roots = dict(own)
     while found := _needed_by_several(roots, linear):
         roots |= {node.number: node for node in found}
-    used = {n.number for root in roots.values() for n in reached(root.operands, roots.values())}
+    used = {n.number for root in roots.values() for n in reached(root.operands, roots)}
     return [node for number, node in sorted(roots.items()) if number not in own or number in used]
 
 
 def _needed_by_several(roots: Mapping[int, Node], linear: Linear) -> list[Node]:
     """The largest expressions below several `roots`: other roots need them than need what they are a part of."""
-    needed: dict[int, frozenset[int]] = {}  # node -> the roots above it
-    above: dict[int, set[frozenset[int]]] = {}  # node -> those of each expression that it is a part of
+    own = {number: 1 << k for k, number in enumerate(roots)}  # sets of roots are bits: unions are what this costs
+    needed: dict[int, int] = {}  # node -> the roots above it
+    above: dict[int, set[int]] = {}  # node -> those of each expression that it is a part of
     order = [node for node in reached(roots.values()) if not _plain(node, linear)]
     for node in reversed(order):  # what uses a node before the node
-        those = frozenset((node.number,)) if node.number in roots else needed.get(node.number, frozenset())
+        those = own.get(node.number) or needed.get(node.number, 0)
         for operand in node.operands if those else ():  # below the row of a matrix nothing is needed by itself
-            needed[operand.number] = needed.get(operand.number, frozenset()) | those
+            needed[operand.number] = needed.get(operand.number, 0) | those
             above.setdefault(operand.number, set()).add(those)
     return [
         node for node in order
-        if node.number not in roots and len(needed.get(node.number, ())) > 1 and above[node.number] != {needed[node.number]}
+        if node.number not in roots and needed.get(node.number, 0).bit_count() > 1 and above[node.number] != {needed[node.number]}
     ]  # fmt: skip
 
 
@@ -271,8 +272,8 @@ def _plain(node: Node, linear: Linear) -> bool:
 
 def _levels(stored: Sequence[Node]) -> list[list[Node]]:
     """Stored expressions in an order in which each is known before its use."""
-    level: dict[int, int] = {}
+    level, ends = dict[int, int](), {node.number for node in stored}
     for node in stored:  # operands have lower numbers
-        below = [level[n.number] for n in reached(node.operands, stored) if n.number in level]
+        below = [level[n.number] for n in reached(node.operands, ends) if n.number in level]
         level[node.number] = 1 + max(below, default=-1)
     return [[node for node in stored if level[node.number] == k] for k in range(max(level.values(), default=-1) + 1)]

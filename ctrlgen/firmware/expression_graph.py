@@ -10,9 +10,11 @@ A number that the program is given when it starts is folded like any other, but 
 from __future__ import annotations
 
 import math
+import operator
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import casadi as ca
 import numpy as np
@@ -303,14 +305,14 @@ class Graph:
         return node
 
 
-def reached(roots: Iterable[Node], ends: Iterable[Node] = ()) -> list[Node]:
-    """The nodes that roots need, operands first, not going below `ends`."""
-    stop, seen, left = {node.number for node in ends}, dict[int, Node](), list(roots)
+def reached(roots: Iterable[Node], ends: Collection[int] = ()) -> list[Node]:
+    """The nodes that roots need, operands first, not going below those of the numbers `ends`."""
+    seen, left = dict[int, Node](), list(roots)
     while left:
         node = left.pop()
         if node.number not in seen:
             seen[node.number] = node
-            if node.number not in stop:
+            if node.number not in ends:
                 left.extend(node.operands)
     return [seen[number] for number in sorted(seen)]
 
@@ -325,6 +327,8 @@ def _one(node: Node) -> bool:
 
 
 def _computed(op: int, values: Sequence[float]) -> float:
+    if op in _EXACT and (op not in (ca.OP_DIV, ca.OP_INV) or values[-1] != 0.0):
+        return _EXACT[op](*values)
     symbols = [ca.SX.sym("a") for _ in values]
     built = _FUNCTIONS.get((op, len(values)))
     if built is None:
@@ -335,12 +339,16 @@ def _computed(op: int, values: Sequence[float]) -> float:
 
 
 _FUNCTIONS: dict[tuple[int, int], ca.Function] = {}
+_EXACT: Mapping[int, Callable[..., float]] = {  # rounded correctly everywhere: Python's result is CasADi's, without a call of CasADi
+    ca.OP_ADD: operator.add, ca.OP_SUB: operator.sub, ca.OP_MUL: operator.mul, ca.OP_DIV: operator.truediv, ca.OP_NEG: operator.neg,
+    ca.OP_SQ: lambda a: a * a, ca.OP_TWICE: lambda a: 2.0 * a, ca.OP_INV: lambda a: 1.0 / a,
+}  # fmt: skip
 
 
 def _term(node: Node) -> str:
     """A number's formula as a part of another."""
     text = node.formula or f"{node.value:.9g}"
-    depth = [text[: k + 1].count("(") - text[: k + 1].count(")") for k in range(len(text))]
+    depth = list(accumulate((character == "(") - (character == ")") for character in text))
     call = re.match(r"\w*\(", text) is not None and all(depth[k] > 0 for k in range(text.index("("), len(text) - 1))
     return text if call or re.fullmatch(r"[\w.\[\]]+", text) else f"({text})"
 

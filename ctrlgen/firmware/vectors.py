@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     The tolerance is the change of drive that four roundings of displacement and actuator state cause, or one of a number of a target
     that a limit on stress or rotation scales.
     """
-    controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
+    controller = controller if real is Real.DOUBLE else controller.with_slack(FLOAT_SLACK)
     rng = np.random.default_rng(0)
     scale = np.array(controller.target.scale)
     still = controller.sample_time is None

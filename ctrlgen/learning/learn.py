@@ -7,7 +7,6 @@ runs, each weighted by its noise and by how far its drives are from the best one
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from ctrlgen.learning.repeatability import Repeated, Spectrum
 from ctrlgen.learning.response import Change, Response, response
 from ctrlgen.learning.runs import Runs, check_belongs, errors, load_runs
 from ctrlgen.model.simulation import trace
-from ctrlgen.recordings.schema import FILE
+from ctrlgen.recordings.files import recording_files, sha256
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, closest_margins, solve
 from ctrlgen.trajectory.violations import Before, violations
@@ -108,13 +107,8 @@ def learn(
     runs = load_runs(paths, lifted)
     source = str(paths[0]) if len(paths) == 1 else "recordings"
     check_belongs(runs, lifted, source)
-    return learn_from(lifted, runs, source, _inputs(scenario, paths), progress)
-
-
-def _inputs(scenario: Scenario, paths: Sequence[Path | str]) -> dict[str, str]:
-    files = [path / FILE if path.is_dir() else path for path in map(Path, paths)]
-    read = {f"recording {k}": hashlib.sha256(file.read_bytes()).hexdigest() for k, file in enumerate(files, 1)}
-    return {**scenario.digest, **read}
+    read = {name: sha256(path) for name, path in recording_files(paths)}
+    return learn_from(lifted, runs, source, {**scenario.digest, **read}, progress)
 
 
 def learn_from(

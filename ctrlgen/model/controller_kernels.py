@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -30,6 +30,9 @@ from ctrlgen.model.run_time import choices, with_constants
 SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
 # The memory of an effect does not scale with the displacement, so its share of the excess is removed over several rounds.
 COMPOSITE_ROUNDS = 8
+
+# what a controller works out that depends on its slack
+OF_SLACK = frozenset({"slack", "slacks", "state_can_be_limited", "drive_can_be_limited", "rate", "variants"})
 
 
 @dataclass(frozen=True)
@@ -65,12 +68,24 @@ class ControllerKernels:
     def given(self) -> NamedInverses | None:
         """The same kernels in terms of the run-time constants; None for a device without."""
         device = self.model.device
-        return given_inverses(device, self.follow, self._step_time) if device.given_at_start else None
+        if not device.given_at_start:
+            return None
+        found = given_inverses(device, self.follow, self._step_time)
+        return replace(found, model=found.model.limited_as(self.model))
 
     def at(self, values: dict[str, float]) -> Self:
-        """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them."""
-        model = build_model(with_constants(self.model.device, values))
+        """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them. What is
+        reserved of limits is the same."""
+        model = build_model(with_constants(self.model.device, values)).limited_as(self.model)
         return type(self)(model, self.follow, self.sample_time, self.slack)
+
+    def with_slack(self, slack: float) -> Self:
+        """The same controller with another slack; the kernels, and what else does not depend on it, are this one's."""
+        _ = self.static, self.moving  # worked out now, for both
+        other = replace(self, slack=slack)
+        other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in OF_SLACK})
+        other.__dict__["variants"] = tuple(variant.with_slack(slack) for variant in self.variants)
+        return other
 
     @cached_property
     def variants(self) -> tuple[Self, ...]:

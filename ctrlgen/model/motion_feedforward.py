@@ -8,7 +8,7 @@ equilibrium at its position, which keeps every limit (`Controller`); a drive bey
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -132,6 +132,7 @@ class MotionController(Controller):
         return ca.Function("slope", [target], [ca.jacobian(self.motion["drive"](target), target)])
 
 
+@lru_cache(maxsize=4)  # generation and each check of what was generated ask for the same one; its kernels take long
 def controller_of(model: Model, follow: str, sample_time: float | None) -> Controller:
     """The feedforward controller of a device; one with inertia takes derivatives too."""
     return (MotionController if model.inertial else Controller)(model, follow, sample_time)

@@ -6,6 +6,7 @@ What is neither a formula of the constants nor the same at all the values of `ct
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -32,18 +33,21 @@ def check_run_time(controller: Controller) -> None:
     if model.inertial:
         what = "holds for a stage without inertia; leave [run_time] out, and generate the C anew with a calibrated device file"
         raise InputError(device.name, [Fault("run_time", what)])
-    if model.probability is not None:
-        what = "is given limits that follow its constants, and robust tightens them for the file's alone; leave out one of the two"
-        raise InputError(device.name, [Fault("run_time", what)])
-    faults: dict[str, str] = {}
+    if faults := _faults(controller):
+        raise InputError(device.name, faults)
+
+
+@lru_cache(maxsize=4)  # float and double ask for the same
+def _faults(controller: Controller) -> tuple[Fault, ...]:
+    """The constants that act on something compiled in."""
+    device, faults = controller.model.device, dict[str, str]()
     for values, variant in zip(choices(device.given_at_start), controller.variants, strict=True):
         if any(path in faults for path in values):
             continue
         if acted := _compiled_in(controller, variant, values):
             word = "acts" if len(values) == 1 else "together act"
             faults |= {", ".join(values): f"{word} on {acted}, which is compiled in: leave it out of [run_time]"}
-    if faults:
-        raise InputError(device.name, [Fault(f"run_time.constants {path}", what) for path, what in faults.items()])
+    return tuple(Fault(f"run_time.constants {path}", what) for path, what in faults.items())
 
 
 def _compiled_in(controller: Controller, variant: Controller, values: dict[str, float]) -> str:

@@ -50,9 +50,9 @@ class Followed:
         """(n, channels) the set-points at shares of the path, the end of a closed one left out, which is its beginning."""
         return self.curve.samples(share[:-1] if self.curve.closed else share)
 
-    def scenario(self, share: np.ndarray, title: str) -> Scenario:
-        """Set-points at these shares as a scenario."""
-        return retimed(self.curve.scenario, self.model, self.samples(share), self.rate, title)
+    def scenario(self, share: np.ndarray, title: str, how: str = "fastest") -> Scenario:
+        """Set-points at these shares as a scenario, whose name ends on `how` they are timed."""
+        return retimed(self.curve.scenario, self.model, self.samples(share), self.rate, title, how)
 
     def keeps(self, share: np.ndarray) -> bool:
         """Whether set-points at these shares, one each sample, keep every limit."""

@@ -122,7 +122,7 @@ def fastest(
     repetition = None
     if wanted is not None:
         progress(f"largest path at {wanted.text}")
-        repetition = at_frequency(followed, optimiser, wanted, optimum)
+        repetition = at_frequency(followed, optimiser, wanted, optimum, progress)
     between = error_between(curve, solution, share)
     return FastestPath(
         scenario, curve, optimum, share, solution, even, stated, between, repetition, _notes(followed, share)

@@ -1,4 +1,4 @@
-"""The largest path that can be repeated at a frequency."""
+"""The largest path that can be repeated at a frequency, and its set-points, which the exact inverse confirms."""
 
 from __future__ import annotations
 
@@ -13,25 +13,31 @@ from ctrlgen.core.units import Quantity, from_si, written_unit
 from ctrlgen.path_timing.confirmed import Followed
 from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.trajectory.paths import Circle
+from ctrlgen.trajectory.solution import Solution, solve
 
 SMALLEST = 1e-3  # of the path: below, it is no longer the same
 LARGEST = 1e3
 CLOSE = 1e-3  # of a scale, to which it is found
 FEWEST = 4  # samples of a period
 MOST = 20_000  # samples of a period: each scale that is tried is followed through all of them
+MOST_SHRUNK = 6  # times that a path is made smaller, by twice as much each time, until its set-points keep all limits
 IMPOSSIBLE = 10.0  # periods, as their logarithm, for a path that cannot be followed
 
 
 @dataclass(frozen=True)
 class Repetition:
     """What can be repeated at a `frequency` [Hz]: the largest `scale` of the path about its middle with the best law of time, and
-    `even` at even speed; None where no scale can. `diameter` [SI] and `unit` of a circle as stated."""
+    `even` at even speed; None where no scale can. `diameter` [SI] and `unit` of a circle as stated. `sampled` is the scale whose
+    set-points were confirmed, whole samples cost a little, and `solution` these set-points as a scenario with its drives; None where
+    no set-points were found."""
 
     frequency: float
     scale: float | None
     even: float | None
     diameter: float | None
     unit: str
+    sampled: float | None
+    solution: Solution | None
 
     def size(self, scale: float | None) -> float | None:
         """The diameter in its unit at a scale; None where there is none."""
@@ -50,8 +56,10 @@ def check_frequency(rate: Quantity, frequency: Quantity) -> None:
     raise InputError("--frequency", [Fault(frequency.text, what)])
 
 
-def at_frequency(followed: Followed, optimiser: Optimiser, frequency: Quantity, known: Optimum) -> Repetition:
-    """The largest scales at a `frequency`; `known` is the optimum at the scale 1."""
+def at_frequency(
+    followed: Followed, optimiser: Optimiser, frequency: Quantity, known: Optimum, progress: Callable[[str], None] = lambda _: None
+) -> Repetition:  # fmt: skip
+    """The largest scales at a `frequency`, with set-points; `known` is the optimum at the scale 1."""
     period, h = 1 / frequency.si, followed.sample_time
     n = int(period / h * (1 + 1e-9))
 
@@ -73,7 +81,53 @@ def at_frequency(followed: Followed, optimiser: Optimiser, frequency: Quantity, 
     path = followed.curve.scenario.file.path
     diameter = path.diameter if isinstance(path, Circle) else None
     unit = written_unit(diameter.text) if diameter else ""
-    return Repetition(frequency.si, best, even, diameter.si if diameter else None, unit)
+    progress(f"set-points at {frequency.text}")
+    sampled, share = (None, None) if best is None else _set_points(followed, optimiser, n, best)
+    if even is not None and even > (sampled or 0.0):
+        sampled, share = even, followed.curve.scaled(even).evenly(n)
+    solution = None
+    if share is not None and sampled is not None:
+        title = f"{followed.curve.scenario.file.title}: {sampled:.4g} times as large, {frequency.text}"
+        own = replace(followed, curve=followed.curve.scaled(sampled))
+        solution = solve(own.scenario(share, title, "repeated"), followed.model, progress)
+    return Repetition(frequency.si, best, even, diameter.si if diameter else None, unit, sampled, solution)
+
+
+def _set_points(
+    followed: Followed, optimiser: Optimiser, n: int, best: float
+) -> tuple[float | None, np.ndarray | None]:
+    """The largest scale found, up to `best`, at which set-points by the fastest law of time keep all limits in `n` intervals, and the
+    shares of these; None where there are none."""
+    known: dict[float, np.ndarray] = {}
+
+    def holds(scale: float) -> bool:
+        curve = followed.curve.scaled(scale)
+        try:
+            optimum = optimiser.along(curve)
+        except SolverError:
+            return False
+        spare = n - (len(optimum.samples(followed.sample_time)) - 1)
+        while spare >= 0:
+            share = optimum.samples(followed.sample_time, spare)
+            if len(share) - 1 <= n:  # each smooth piece takes whole samples
+                if replace(followed, curve=curve).keeps(share):
+                    known[scale] = share
+                return scale in known
+            spare -= 1
+        return False
+
+    fails, less = best / (1 - CLOSE), CLOSE
+    for _ in range(MOST_SHRUNK + 1):
+        scale = fails * (1 - less)
+        if holds(scale):
+            break
+        fails, less = scale, 2 * less
+    else:
+        return None, None
+    while fails - scale > CLOSE * scale * (1 + 1e-9):
+        middle = (fails + scale) / 2
+        fails, scale = (fails, middle) if holds(middle) else (middle, scale)
+    return scale, known[scale]
 
 
 def crossing(behind: Callable[[float], float], at_one: float) -> float | None:

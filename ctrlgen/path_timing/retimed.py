@@ -14,12 +14,15 @@ from ctrlgen.trajectory.paths import Poses
 from ctrlgen.trajectory.scenario import Input, Scenario
 
 
-def retimed(scenario: Scenario, model: Model, samples: np.ndarray, rate: Quantity, title: str) -> Scenario:
-    """`scenario` with the path `samples` (n, channels) [SI] at the sample `rate`: a list of poses, periodic where its path is closed.
+def retimed(
+    scenario: Scenario, model: Model, samples: np.ndarray, rate: Quantity, title: str, how: str = "fastest"
+) -> Scenario:
+    """`scenario` with the path `samples` (n, channels) [SI] at the sample `rate`: a list of poses, periodic where its path is closed;
+    its name ends on `how` they are timed.
 
     Its files are to lie beside the device's.
     """
-    file, closed, name = scenario.file, scenario.file.path.closed, f"{scenario.name}_fastest"
+    file, closed, name = scenario.file, scenario.file.path.closed, f"{scenario.name}_{how}"
     signal = model.signals[file.follow]
     moved = [i for i in range(len(signal.channels)) if np.any(samples[:, i])] or [0]
     shown = np.column_stack([from_si(samples[:, i], signal.units[i]) for i in moved])

@@ -13,6 +13,7 @@ from ctrlgen.numerics.quantisation_step import quantisation_step
 THRESHOLD = 8.0  # local standard deviations of the deviation from the chord
 WIDEST = 3  # samples in an outlier; what lasts longer may be motion
 FEWEST = 50  # finite samples below which there is no local noise to compare with
+FEWEST_WHOLE = 0.5  # of the rows, with a number in both neighbours too: with fewer the median of the deviation is that of straight lines
 WINDOW = 201  # samples over which the noise counts as local
 SIDE = 4  # samples on either side that are compared with a straight line
 ON_LINE = 0.3  # of an outlier's size: how far those may lie from the line
@@ -40,16 +41,24 @@ def outliers(values: np.ndarray, drive: np.ndarray) -> np.ndarray:
     and after the stretch by more than `THRESHOLD` sigma, all on one side, and the samples around continue on a straight
     line. sigma is the local median absolute value of the same statistic (w = 1: half the second difference), so it holds
     for coloured noise too. Nothing next to a jump of the `drive` (n, n_u) is marked, nor within ten samples after it: there
-    the device itself may move so. NaN is no outlier.
+    the device itself may move so. NaN is no outlier. A channel that is read so seldom that most rows have a neighbour without a number
+    is judged by its readings alone, one after the other: with straight lines between them the median would be that of the lines.
     """
-    n = len(values)
-    marked = np.zeros(n, dtype=bool)
-    finite = np.isfinite(values)
+    marked = np.zeros(len(values), dtype=bool)
+    finite, near_jump = np.isfinite(values), _near_jump(drive)
     if finite.sum() < FEWEST:
         return marked
+    if np.mean(finite[1:-1] & finite[:-2] & finite[2:]) < FEWEST_WHOLE:
+        marked[finite] = _off_line(values[finite], near_jump[finite])
+        return marked
+    return _off_line(values, near_jump)
+
+
+def _off_line(values: np.ndarray, near_jump: np.ndarray) -> np.ndarray:
+    """(n,) the outliers of `values` (n,), few of them without a number."""
+    n, marked, finite = len(values), np.zeros(len(values), dtype=bool), np.isfinite(values)
     y = np.interp(np.arange(n), np.flatnonzero(finite), values[finite])  # for the statistic only
     floor = max(quantisation_step(values[finite], fewest=2), ROUNDING * np.ptp(y)) / 2
-    near_jump = _near_jump(drive)
     for width in range(1, WIDEST + 1):
         off = _off_chord(y, width)
         sigma = MAD * scipy.ndimage.median_filter(np.abs(off.mean(1)), min(WINDOW, len(off)), mode="reflect")

@@ -30,17 +30,21 @@ ROOM = 1.15  # of the largest speed, up to which speeds are shown
 
 def write_fastest(out: Path, found: FastestPath) -> None:
     """Writes fastest.json, figures/path.svg, figures/binding.svg, figures/drives.svg, fastest.html and, in scenario/, the set-points as
-    a scenario into the folder `out`."""
+    a scenario into the folder `out`; those at a frequency in at_frequency/scenario/."""
     record = fastest_record(found)
     figures = draw_fastest(found)
     write_text(out / "fastest.json", json.dumps(record, indent=1) + "\n")
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
     write_inputs(out / "scenario", found.solution.scenario)
+    repeated = found.repetition.solution if found.repetition else None
+    if repeated is not None:
+        write_inputs(out / "at_frequency" / "scenario", repeated.scenario)
     page = render(
         "fastest.html.j2", f=record, figures=figures, device_title=found.solution.model.device.title, rows=motions(found),
         bindings=[(b, bound_text(b), runs_text(b)) for b in found.bindings], between=between_text(found),
         repeated=repetition_sentence(found), scenario_file=found.solution.scenario.path.name,
+        repeated_file=None if repeated is None else repeated.scenario.path.name,
     )  # fmt: skip
     write_text(out / "fastest.html", page)
 
@@ -69,7 +73,7 @@ def fastest_record(found: FastestPath) -> dict[str, Any]:
         "law": {"time_s": time.tolist(), "share": share.tolist(), "speed": _numbers(speed), "bound": _numbers(bound)},
         "set_point_shares": found.share.tolist(),
         "repetition": None if r is None else {
-            "frequency_hz": r.frequency, "scale": r.scale, "scale_even_speed": r.even,
+            "frequency_hz": r.frequency, "scale": r.scale, "scale_even_speed": r.even, "scale_set_points": r.sampled,
             "diameter": r.size(r.scale), "diameter_even_speed": r.size(r.even), "diameter_unit": r.unit,
         },
     }  # fmt: skip
@@ -149,7 +153,10 @@ def repetition_sentence(found: FastestPath) -> str:
 
     what = "largest path" if r.diameter is None else "largest circle"
     even = "" if not found.curve.closed and found.solution.model.inertial else f", at even speed {size(r.even)}"
-    return f"{what} at {show(r.frequency, 'Hz')}: {size(r.scale)} by the fastest law of time{even}"
+    points = "; no set-points of it were found that keep all limits"
+    if r.solution is not None:
+        points = f"; {len(r.solution.command)} set-points keep all limits at {size(r.sampled)}"
+    return f"{what} at {show(r.frequency, 'Hz')}: {size(r.scale)} by the fastest law of time{even}{points}"
 
 
 def draw_fastest(found: FastestPath) -> dict[str, str]:

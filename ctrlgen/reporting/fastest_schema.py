@@ -52,6 +52,7 @@ class RepetitionEntry(Keys):
     frequency_hz: float = Field(description="How often a second.")
     scale: Number = Field(description="Scale of the scenario's path, by the fastest law of time.")
     scale_even_speed: Number = Field(description="Scale at even speed.")
+    scale_set_points: Number = Field(description="Scale of the set-points in at_frequency/, which keep all limits.")
     diameter: Number = Field(description="Diameter of a circle by the fastest law of time.")
     diameter_even_speed: Number = Field(description="Diameter at even speed.")
     diameter_unit: str = Field(description="Unit of the diameters; empty where the path is no circle.")

@@ -42,7 +42,8 @@ def fastest(
     is compared with even speed and with the scenario's own law of time, each as short as it can be; a table and a figure say which
     limit binds where. The set-points at the sample rate are confirmed by the exact inverse.
 
-    In --out, scenario/ is an ordinary scenario of the set-points, for ctrlgen run, budget and verify, and player/ its C.
+    In --out, scenario/ is an ordinary scenario of the set-points, for ctrlgen run, budget and verify, and player/ its C; with
+    --frequency, at_frequency/ holds the same of the largest path.
 
     Example:  ctrlgen fastest scenarios/circle20 --frequency "50 Hz" --out out/fastest
     """
@@ -62,6 +63,8 @@ def fastest(
             with whole_folder(out_folder) as draft:
                 write_fastest(draft, found)
                 generate_player(found.solution, draft / "player")
+                if found.repetition is not None and found.repetition.solution is not None:
+                    generate_player(found.repetition.solution, draft / "at_frequency" / "player")
     print_fastest(found)
     if out_folder is not None:
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'fastest.html'))}", soft_wrap=True)
