@@ -10,6 +10,7 @@ import pytest
 
 from ctrlgen.firmware.cprint import Law, Printer, print_function
 from ctrlgen.firmware.elementary import elementary_text
+from ctrlgen.firmware.expression_graph import Graph, reached
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import FLAGS
 
@@ -167,3 +168,21 @@ def test_a_law_that_differs_between_axes_stays_in_the_loop():
     forces = ca.vertcat(2 * z[0] + 5 * z[0] ** 3, 3 * z[1] + 5 * z[1] ** 3)
     printer = Printer(Real.DOUBLE, {}, laws=[Law("restoring_force", "", ca.Function("l", [z], [forces], ["z"], ["f"]))])
     assert "restoring_force" not in printer.kernel(ca.Function("f", [z], [1 + forces], ["z"], ["r"]), "f").text
+
+
+@pytest.mark.parametrize(
+    ("law", "value"),
+    [
+        (lambda x, p: x + p, 0.0),
+        (lambda x, p: ca.if_else(p > 0.0, x, 2 * x), 0.0),
+        (lambda x, p: x**p, 2.0),
+        (lambda x, p: ca.fmin(p * x, 3.0 * ca.sin(x)), 3.0),
+        (lambda x, p: p * x, 1.0),
+    ],
+)
+def test_no_decision_is_taken_on_the_value_of_a_number_that_is_given_at_the_start(law, value):
+    """The expression keeps the number where its value in the file alone would leave it out."""
+    x, p = ca.SX.sym("x"), ca.SX.sym("p")
+    graph = Graph({"a.b": (-5.0, 5.0)})
+    rows = graph.rows(ca.Function("f", [x, p], [law(x, p)], ["x", "p"], ["y"]), {}, {"p": [(value, "a.b")]})
+    assert any(node.source is not None for node in reached(rows))
