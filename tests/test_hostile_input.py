@@ -162,6 +162,14 @@ def test_something_else_in_place_of_a_recording(tmp_path, given, says):
     refused(ctrlgen("diagnose", DEVICE, given, "--out", tmp_path / "out"), says, status=2)
 
 
+@pytest.mark.parametrize("command", ["budget", "fastest", "learn", "calibrate"])
+def test_a_result_folder_that_cannot_be_is_refused_before_anything_is_read(tmp_path, command):
+    (tmp_path / "file").touch()
+    for out, says in ((tmp_path / "file", "is a file"), (tmp_path / "file" / "below", "a file stands where a folder")):
+        words = [tmp_path / "nowhere"] * (2 if command in ("learn", "calibrate") else 1)
+        refused(ctrlgen(command, *words, "--out", out), "--out: ", says)
+
+
 @pytest.mark.parametrize("command", ["solve", "generate", "run", "verify"])
 def test_a_result_folder_that_is_a_link_to_itself(tmp_path, command):
     (tmp_path / "loop").symlink_to("loop")

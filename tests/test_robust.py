@@ -19,8 +19,9 @@ from scipy.stats import norm
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, simulate, solve
 from ctrlgen.budget.error_budget import budget_of
-from ctrlgen.budget.limits import margins, slopes_of_limits
+from ctrlgen.budget.limits import Margins, margins, slopes_of_limits
 from ctrlgen.budget.linear import propagate
+from ctrlgen.budget.robust import ChanceConstraint
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
@@ -157,6 +158,24 @@ def test_all_limits_together_have_the_probability(tmp_path):
         else:
             with pytest.raises(Unreachable, match="cannot keep all limits"):
                 solve(scenario, build_model(device))
+
+
+def test_what_scatters_has_a_tenth_of_the_risk_shared_by_samples_and_limits():
+    """Two limits at 50 samples, 90 %: z_s of 0.1 * 0.1/(2 * 50), each lasting risk half of 0.09; just kept and just not, and of draws
+    that have just that margin fewer than a tenth break one: a 25th, since z_s u_s is added at every sample (not far too large: 2 %)."""
+    n, lasting, scattered = 50, 2.0, 0.5
+    edge = norm.isf(0.09 / 2) * lasting + norm.isf(0.01 / 100) * scattered
+    ones = np.ones((2, n, 1))
+    bounds = np.array([[-1.0], [1.0]])
+
+    def at(margin):
+        return ChanceConstraint(Margins(margin * ones, lasting * ones, scattered * ones[0], bounds), 0.9)
+
+    assert at(1.0001 * edge).holds and not at(0.9999 * edge).holds
+    assert at(edge).possible == pytest.approx(0.9, abs=1e-9)
+    rng = np.random.default_rng(5)
+    y = lasting * rng.standard_normal((20_000, 1)) + scattered * rng.standard_normal((20_000, n))
+    assert 0.02 < np.mean((np.abs(y) > edge).any(axis=1)) < 0.1
 
 
 def broken(solution, draws, seed=3):
