@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import SCENARIOS
 from scipy.optimize import linprog
-from test_more_drives import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forces, heavy, loaded, reference, stage
+from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forces, heavy, loaded, reference, stage
 
 from ctrlgen import InputError, build_model, generate, load_scenario, solve
 from ctrlgen.firmware.player_only import check_online
