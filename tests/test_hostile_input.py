@@ -92,6 +92,7 @@ def test_an_effect_whose_kind_is_no_text(tmp_path):
         ('controller = "fäst"\n[path]\nkind = "poses"', "controller: 'fäst' is no C identifier"),
         ("controller = 3\n[path]\nkind = 'poses'", "controller: 3: write a text in quotes"),
         ('[path]\nkind = "poses"\nperiodic = "maybe"', "path.periodic: 'maybe': write true or false"),
+        ('[path]\nkind = "poses"\nperiodic = "yes"', "path.periodic: 'yes': write true or false"),
         (
             '[path]\nkind = "poses"\nfile = "p.csv"\nperiodic = true',
             "path.periodic is of motions in time: give sample_rate",

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.hinge import Hinge
@@ -139,7 +139,7 @@ class Beam(Flexible):
 
     length: Length
     """Length between its ends."""
-    geometric_stiffening: bool = False
+    geometric_stiffening: StrictBool = False
     """Whether it stretches where its ends are held as it bends, and an axial load makes it stiffer or softer across."""
 
     def reach(self, p: SimpleNamespace) -> Any:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, StrictBool
 from pydantic.json_schema import SkipJsonSchema
 from scipy.interpolate import make_interp_spline
 
@@ -119,7 +119,7 @@ class Curve_(Smooth_):
 class Periodic_(Curve_):
     """Base of the closed curves."""
 
-    from_rest: bool = False
+    from_rest: StrictBool = False
     """Starts and ends at rest, once along the curve with the smooth law of time. Otherwise the motion is periodic: it starts and ends
     at speed, in the steady motion."""
 
@@ -191,7 +191,7 @@ class Line(Legs_):
     """First pose, as channels with units; channels left out are zero."""
     end: Point
     """Last pose, as channels with units; channels left out are zero."""
-    even: bool = False
+    even: StrictBool = False
     """Samples evenly spaced; otherwise they follow the smooth law of time, at rest at both ends."""
 
     @property
@@ -301,7 +301,7 @@ class Poses(Path_):
     """The samples, each as channels with units; channels left out are zero."""
     file: str = ""
     """A CSV file, relative to scenario.toml: a header row of channels such as `delta_z [um]`, then one row a sample."""
-    periodic: bool = False
+    periodic: StrictBool = False
     """The first sample follows the last one. Otherwise the path ends at its last sample."""
     folder: SkipJsonSchema[Path] = Field(default=Path(), exclude=True)
     """Where `file` is looked for; set by the program."""
