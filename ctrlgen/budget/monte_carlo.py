@@ -68,8 +68,7 @@ def draw(
     columns = np.vstack([deviations, one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
     q, gain = _numbers(path, columns)
     scatter = _Scatter(path, rng, draws, 2 * m + 1)
-    allowed = STEP_ERROR * linear.combined("pose", stated).max(axis=0)
-    step = _OfDraws(path, path.quickest_step(linear.states, allowed), q)
+    step = _Steps(path, linear, q)
     outputs = {"pose": _OfDraws(path, "pose", q), "limits": _OfDraws(path, "limits", q)}
     S = np.tile(path.start[:, None], len(q))
     found = np.empty((len(q), len(kept), pose.shape[1]))
@@ -78,12 +77,13 @@ def draw(
     place = {int(k): i for i, k in enumerate(kept)}
     for k, v in enumerate(path.drive):
         drive = (v * gain + scatter.at(k)).T
-        S = step(S, drive)
         sample = k - path.before
+        here = critical == sample
+        limiting = sample >= 0 and bool(np.any(here) or limited.near(sample).any())
+        S = step(k, S, drive, limiting or sample in place)
         if sample in place:
             found[:, place[sample]] = outputs["pose"](S, drive).T - pose[sample] + scatter.replayed()
-        here = critical == sample
-        if sample >= 0 and (np.any(here) or limited.near(sample).any()):
+        if limiting:
             values = outputs["limits"](S, drive).T
             limits[:, here] = np.stack([values] * 2, axis=1)[:, here]
             broken |= limited.broken(sample, values[:draws], deviations)
@@ -161,3 +161,26 @@ class _OfDraws:
     def __call__(self, S: np.ndarray, drive: np.ndarray) -> np.ndarray:
         """(n, draws) from states (n_s, draws) and drives (n_u, draws)."""
         return self.part(S, drive, self.constants)
+
+
+class _Steps:
+    """All draws from sample to sample; where states go on without the displacement, it is found at the samples alone at which it is
+    wanted, from that of the described device."""
+
+    def __init__(self, path: UncertainPath, linear: Propagated, q: np.ndarray) -> None:
+        self.states, self.apart, self.n_x = linear.states, path.apart(), path.model.x.numel()
+        if self.apart:
+            self.step, self.balanced = _OfDraws(path, "states", q), _OfDraws(path, "balanced", q)
+        else:
+            allowed = STEP_ERROR * linear.combined("pose", path.uncertainties).max(axis=0)
+            self.step = _OfDraws(path, path.quickest_step(linear.states, allowed), q)
+
+    def __call__(self, k: int, S: np.ndarray, drive: np.ndarray, wanted: bool) -> np.ndarray:
+        """(n_s, draws) S at sample k, from the one before; where it is not `wanted`, the displacement may be an old one."""
+        if not self.apart:
+            return self.step(S, drive)
+        S[: self.n_x] = self.step(S, drive)
+        if wanted:
+            S[self.n_x :] = self.states[k, self.n_x :, None]
+            S[self.n_x :] = self.balanced(S, drive)
+        return S

@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 from ctrlgen.budget.uncertainty import AMBIENT, Uncertainties
 from ctrlgen.devices import Limit
 from ctrlgen.model.assembly import build_model, movable
-from ctrlgen.model.discretisation import NEWTON_STEPS, one_step_map, settling_time
+from ctrlgen.model.discretisation import NEWTON_STEPS, balanced, one_step_map, settling_time
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import Recursion
 from ctrlgen.trajectory.solution import Solution
@@ -73,6 +73,24 @@ class UncertainPath:
     def _following(self, newton_steps: int) -> ca.SX:
         sample = one_step_map(self.model, self.sample_time, newton_steps=newton_steps)
         return ca.substitute(ca.vertcat(sample.x, sample.z), sample.u_next, self.model.u)
+
+    def apart(self) -> bool:
+        """Whether states go on without the displacement, as those of heaters do: then it need be known at some samples only, and there are
+        parts "states", x at the next sample, and "balanced", the displacement there, which is no number for a device beyond buckling."""
+        m = self.model
+        if m.inertial or not np.isfinite(self.sample_time):
+            return False
+        if "states" not in self.of_sample:
+            x = self._following(1)[: m.x.numel()]
+            if ca.depends_on(x, m.z):
+                return False
+            self._add("states", x)
+            z = balanced(m, m.x, m.u, NEWTON_STEPS)
+            rises = ca.mmax(ca.substitute(ca.diag(ca.jacobian(m.balance, m.z)), m.z, z)) < 0
+            self._add(
+                "balanced", ca.if_else(rises, z, np.nan)
+            )  # where the restoring force does not rise, no stage stays
+        return True
 
     def _add(self, name: str, value: ca.SX) -> None:
         """A part (S, v, c) -> value, with c(q) what depends on q alone."""
