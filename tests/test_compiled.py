@@ -77,14 +77,15 @@ def test_failing_compiler_leaves_the_virtual_machine(cache, monkeypatch):
 
 
 def test_a_long_function_is_compiled_in_parts_and_gives_the_same_bits(cache, monkeypatch):
-    """Three calls of it in one function: the part that only computes is cut, what calls it is left as it is."""
+    """Three calls of it in one function: the part that only computes is cut, what calls it is left as it is. The first values are read
+    again in the last part, and in none between."""
     if compiled.compiler() is None:
         pytest.skip("no C compiler here")
     x = ca.SX.sym("x", 3)
-    y = x
+    y = first = ca.exp(-x * x)
     for k in range(200):
         y = ca.vertcat(ca.sin(y[1]) + y[2] / (k + 1), y[0] * y[1] - 0.5 * y[2], ca.cos(y[0] * y[0]))
-    step, at = ca.Function("step", [x], [y]), ca.MX.sym("at", 3)
+    step, at = ca.Function("step", [x], [y + first]), ca.MX.sym("at", 3)
     whole = ca.Function("whole", [at], [step(step(at)) + step(2 * at)])
     monkeypatch.setattr(compiled, "LARGE", 1000)
     code = compiled.c_code(whole)

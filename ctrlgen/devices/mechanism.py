@@ -358,7 +358,12 @@ class Mechanism(Device):
     def remarks(self) -> list[str]:
         """Remarks on hinge equations used outside their t/R range, and on inertia that the condensed model does not show."""
         hinges = [e for e in self.element if isinstance(e, CircularHinge)]
-        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()] + inertia_remarks(self)
+        dense = {m.name for m in self.material if m.density is not None}
+        light = [
+            f"{e.name}: a hinge has no mass of its own; count it to the bodies that it joins"
+            for e in hinges if e.material in dense
+        ]  # fmt: skip
+        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()] + light + inertia_remarks(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""

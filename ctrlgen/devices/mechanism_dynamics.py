@@ -77,7 +77,8 @@ def natural_frequencies(device: Drawing) -> np.ndarray:
 def free_modes(device: Drawing) -> Modes:
     """All modes with the drives held; none where no body has a mass.
 
-    K v = w^2 M v of all bodies, those without mass condensed first (which is exact): a stack counts with its stiffness, a force
+    K v = w^2 M v of all bodies, those without mass condensed first (which is exact), flexures with mass bent as at rest between their
+    ends: a stack counts with its stiffness, a force
     without one leaves its axis free, a prescribed displacement holds it. Cubic springs count with their slope at home, none.
     """
     c = Condensed(device, device.values())
@@ -132,13 +133,21 @@ def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
     """The mass matrix of all bodies, turns counted as displacements, and its rows that are not zero."""
     count = len(c.device.bodies)
     M = np.zeros((6 * count, 6 * count))
-    heavy: list[int] = []
+    heavy: set[int] = set()
     for i in range(count):
         if (own := c.body_mass(i)) is not None:
             M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = ca.DM(ca.evalf(ca.SX(own))).full()
-            heavy += range(6 * i, 6 * i + 6)
+            heavy |= {i}
+    for k, e in enumerate(c.elements):
+        if (own := c.flexure_mass(k, ca.DM.eye(12)[:6, :], ca.DM.eye(12)[6:, :])) is not None:
+            both = ca.DM(ca.evalf(ca.SX(own))).full()
+            ends = [(b, slice(6 * at, 6 * at + 6)) for at, b in enumerate((e.first, e.second)) if b != GROUND]
+            for i, row in ends:
+                for j, column in ends:
+                    M[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += both[row, column]
+            heavy |= {i for i, _ in ends}
     scale = _as_displacements(c.device)
-    return M * np.outer(scale, scale), heavy
+    return M * np.outer(scale, scale), [6 * i + n for i in sorted(heavy) for n in range(6)]
 
 
 def summary(device: Drawing) -> list[str]:

@@ -14,6 +14,7 @@ from ctrlgen.devices.mechanism_copies import Copied, Placed
 from ctrlgen.devices.mechanism_elements import TWIST, Direction
 from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import mechanism
+from ctrlgen.physics.flexure_mass import flexure_mass
 from ctrlgen.physics.mechanism import GROUND, Element
 from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint, move
 
@@ -115,7 +116,7 @@ class Condensed:
     def __init__(self, device: Drawing, p: SimpleNamespace) -> None:
         self.device, self.p = device, p
         self.pushes = device.actuator[0].kind != "displacement"
-        materials = {m.name: q for m, q in zip(device.material, p.material, strict=True)}
+        self.materials = {m.name: q for m, q in zip(device.material, p.material, strict=True)}
         self.frames = [_right_handed(ca.mtimes(e.turn, e.section.frame)) for e in device.placed_elements]
         self.ends = [ca.mtimes(e.turn, ca.vertcat(*p.element[e.index].at)) for e in device.placed_elements]
         self.compliances: list[Matrix | None] = []  # about their free ends, in their frames; None of springs
@@ -123,7 +124,7 @@ class Condensed:
         self.cubics: list[CubicSpring] = []
         for k, (e, R, end) in enumerate(zip(device.placed_elements, self.frames, self.ends, strict=True)):
             own = p.element[e.index]
-            C = e.section.compliance(own, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
+            C = e.section.compliance(own, self.materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
             if C is not None and float(ca.det(e.turn)) < 0:
                 C = ca.mtimes([REFLECTED, C, -REFLECTED])
             self.compliances.append(C)
@@ -234,9 +235,24 @@ class Condensed:
             ca.horzcat(about, own.mass * S), ca.horzcat(-own.mass * S, own.mass * ca.DM.eye(3))
         )  # fmt: skip
 
+    def flexure_mass(self, k: int, first: Matrix, second: Matrix) -> Matrix | None:
+        """(m, m) of element k whose ends move by the twists `first` and `second` (6, m); None of one without a mass: those that are not
+        beams, and whose material states no density."""
+        e = self.device.placed_elements[k]
+        material = self.materials.get(getattr(e.section, "material", ""))
+        if material is None or material.density is None:
+            return None
+        segments, load = (
+            e.section.segments(self.p.element[e.index], material),
+            ca.mtimes(self.elements[k].stiffness, second - first),
+        )
+        if not segments:
+            return None
+        return flexure_mass(segments, material.density, material.young, self.frames[k], self.ends[k], first, load)
+
     @property
     def mass(self) -> Matrix:
-        """(n, n) mass of the axes: that of all bodies moving as they do at rest with the axes displaced, at home.
+        """(n, n) mass of the axes: that of all bodies and flexures moving as they do at rest with the axes displaced, at home.
 
         Source: R. J. Guyan, AIAA J. 3 (1965) 380.
         """
@@ -245,6 +261,10 @@ class Condensed:
         for number, T in enumerate(self.twists):
             if (own := self.body_mass(number)) is not None:
                 M += ca.mtimes([T[:, :n].T, own, T[:, :n]])
+        for k, e in enumerate(self.elements):
+            first, second = (ca.SX.zeros(6, n) if b == GROUND else self.twists[b][:, :n] for b in (e.first, e.second))
+            if (own := self.flexure_mass(k, first, second)) is not None:
+                M += own
         return M
 
     def point(self, a: Placed) -> Matrix:

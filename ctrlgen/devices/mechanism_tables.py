@@ -27,6 +27,8 @@ class Material(Section):
     """Young's modulus."""
     poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
     """Poisson's ratio."""
+    density: Annotated[Quantity, In("kg/m^3", positive=True)] | None = None
+    """Mass per volume: with it, its blades, wires and struts have mass. Left out: none has."""
     stress_limit: Annotated[Quantity, In("MPa", positive=True)] | None = None
     """Largest stress in its blades, wires and struts and in the necks of its hinges; a limit where it is given."""
     expansion: Annotated[Quantity, In("1/K", positive=True)] | None = None

@@ -71,7 +71,9 @@ def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix],
                 K[i][j] = K[i][j] + own if j in K[i] else own
     columns = next((W.shape[1] for W in loads.values()), 0)
     right = [ca.mtimes(counted, loads[i][swap, :]) if i in loads else ca.DM.zeros(6, columns) for i in range(count)]
-    left, order, skew = set(range(count)), [], set()  # `skew`: the pairs whose K is not symmetric
+    left = set(range(count))
+    order: list[int] = []
+    skew: set[tuple[int, int]] = set()  # the pairs whose K is not symmetric
     factors: dict[int, Matrix] = {}
     while left:  # forward elimination
         k = min(left, key=lambda i: (len(K[i].keys() & left), i))
