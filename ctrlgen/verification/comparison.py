@@ -212,8 +212,8 @@ def _rows(
     solved, online = ref.solution.drive, followed[:, 1 : 1 + n]
     # with inertia the solved drives make up for being held, which those of the online C do not
     if not m.inertial and not (m.redundant and _rates_act(ref)):
-        # ten times IPOPT's own tolerance; that of the least effort is one of the effort, which hardly changes near its least
-        limit = (1e-6 if m.redundant else 1e-8) * m.u_scale.max()
+        # ten times IPOPT's own tolerance; that of the least effort is one of the effort, which hardly changes near its least and at a limit
+        limit = (1e-5 if m.redundant else 1e-8) * m.u_scale.max()
         if real is Real.FLOAT:
             limit = max(limit, _float_limit(m, "drive", np.abs(solved).max(), ref))
         add("scenario, online C - IPOPT", "drive", online - solved, limit)
