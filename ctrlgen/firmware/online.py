@@ -53,7 +53,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     }  # fmt: skip
     inverses, given = controller.named, given_ranges(controller)
     own = controller.given  # kernels in terms of the constants of the start, where there are some
-    static, moving = (own.static, own.moving) if own else (controller.static, controller.moving)
+    static, moving = (own.static or controller.static, own.moving) if own else (controller.static, controller.moving)
     laws = printed_laws(own.model if own else model, inverses.model)
     printer = Printer(
         real, ranges, {"p": inverses.numbers}, laws, given, {"p": own.numbers} if own else {}, f"{prefix}_derived"

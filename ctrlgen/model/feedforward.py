@@ -88,10 +88,10 @@ class Controller(ControllerKernels):
 
     def _passed(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
         """The limits beyond which a device is that has come to (x, z) with its drives as fast as they may change."""
-        found, n = ControllerStatus(0), self.nominal.n_states
+        found, n, (low, high) = ControllerStatus(0), self.nominal.n_states, self.nominal.x_bounds
         if clamp(z, *self.nominal.z_bounds, self.slacks[0])[1]:
             found |= ControllerStatus.DISPLACEMENT
-        if self.state_can_be_limited and clamp(x[:n], *(b[:n] for b in self.nominal.x_bounds), self.slacks[1])[1]:
+        if self.state_can_be_limited and clamp(x[:n], low[:n], high[:n], self.slacks[1])[1]:
             found |= ControllerStatus.STATE
         return found | (ControllerStatus.COMPOSITE if self._limit_composite(x, z, z)[1] > 1 + self.slack else found)
 
@@ -138,7 +138,7 @@ class Controller(ControllerKernels):
         (low, high), slack = self.nominal.u_bounds, self.slacks[2]
 
         def answer(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            state, _ = self._limited_state(k, *now[:2], displacement)
+            state, _ = self._limited_state(k, now[0], now[1], displacement)
             return state, self.drive(k, now, displacement, state)
 
         state, at_start = answer(origin)

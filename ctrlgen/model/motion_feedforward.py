@@ -89,11 +89,12 @@ class MotionController(Controller):
         u, (low, high) = self.chosen(u, state), self.nominal.u_bounds
         slack = self.slacks[2]
         status = ControllerStatus(0) if np.all((u >= low - slack) & (u <= high + slack)) else ControllerStatus.DRIVE
-        u, last = np.clip(u, low, high), ()
+        u = np.clip(u, low, high)
         if self.rate is not None:
-            u, _, _, held = self.rate.toward(state[2], u)
+            u, _, _, too_fast = self.rate.toward(state[2], u)
             u = np.clip(u, low, high)
-            status, last = status | (ControllerStatus.RATE if held else status), (u,)
+            status |= ControllerStatus.RATE if too_fast else status
+        last = () if self.rate is None else (u,)
         return ControllerStep(status, z, x[: self.nominal.n_states], u, (x, z, *last))
 
     def _broken(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
