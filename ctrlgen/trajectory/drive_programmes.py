@@ -14,6 +14,7 @@ from scipy.optimize import linprog
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.model.allocation import INDEPENDENT
+from ctrlgen.numerics.ipopt import check_signal
 
 TOLERANCE = 1e-10  # of a share: IPOPT's of the optimality error, the linear programme's of each row
 MOST_ITERATIONS = 200
@@ -137,8 +138,7 @@ def least_squares(
     solver = ca.nlpsol("least_effort", "ipopt", problem, options)
     answer = solver(x0=begin, lbg=np.append(wanted, limited.low), ubg=np.append(wanted, limited.high))
     status = solver.stats()["return_status"]
-    if status in ("User_Requested_Stop", "NonIpopt_Exception_Thrown"):
-        raise KeyboardInterrupt
+    check_signal(status)
     if not solver.stats()["success"]:
         raise SolverError(f"IPOPT found no drives of least effort ({status}); command a smaller or slower path")
     return answer["x"].full().ravel()
