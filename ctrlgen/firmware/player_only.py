@@ -33,10 +33,22 @@ def check_online(scenario: Scenario, model: Model) -> None:
         faults.append(Fault("sample_rate", what))
     if (why := why_no_null_motion(model)) is not None:
         faults.append(Fault("device", f"{why}: {player}"))
+    if any(limit.upper is not None for limit in model.composite_limits()) and (away := _ranges_without_home(model)):
+        what = (
+            f"moves {away} in a range that leaves out where it rests, toward which a displacement is scaled where another limit is met: "
+            f"{player}, or let the range begin or end there"
+        )
+        faults.append(Fault("device", what))
     if model.redundant and model.device.given_at_start:
         faults.append(Fault("run_time", f"is of a device with more drives than axes; {yet}, or leave [run_time] out"))
     if faults:
         raise InputError(model.name, faults)
+
+
+def _ranges_without_home(model: Model) -> str:
+    """The axes whose displacement cannot be zero."""
+    low, high = model.z_bounds
+    return ", ".join(axis for axis, outside in zip(model.axes, (low > 0) | (high < 0), strict=True) if outside)
 
 
 def generate_player(solution: Solution, out: Path) -> list[Path]:
