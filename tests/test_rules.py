@@ -11,6 +11,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+import three_stacks
 from conftest import SCENARIOS, effect_device
 
 from ctrlgen import Controller, build_model, load_scenario
@@ -97,7 +98,7 @@ def test_the_list_of_deviations_is_what_is_reported_no_more_no_less(folder, chec
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["circle20", "meso_circle", "xy_stage_force"])
+@pytest.mark.parametrize("name", ["circle20", "meso_circle", "xy_stage_force", "tilt_platform"])
 def test_other_devices_break_no_rule_either(name, tmp_path):
     scenario = load_scenario(SCENARIOS / name)
     folder = generate(scenario, build_model(scenario.device), tmp_path)
@@ -105,6 +106,15 @@ def test_other_devices_break_no_rule_either(name, tmp_path):
         assert check.state != "failed", [str(f) for f in check.findings if not f.permitted]
         if check.tool == STATIC[0] and check.state == "passed":
             assert listed(folder) == reported(check)
+
+
+@pytest.mark.long
+def test_more_drives_than_axes_with_inertia_and_rates_break_no_rule_either(tmp_path):
+    scenario, model = three_stacks.loaded(
+        tmp_path, three_stacks.heavy(drive_rate={"a": "5 V/ms"}), three_stacks.circle(20)
+    )
+    for check in check_rules(generate(scenario, model, tmp_path / "c")):
+        assert check.state != "failed", [str(f) for f in check.findings if not f.permitted]
 
 
 @pytest.mark.long

@@ -29,6 +29,7 @@ TIDY = {
         "-readability-magic-numbers",  # the numbers are the device's, printed from its description
         "-readability-uppercase-literal-suffix",  # 1.0f, as CMSIS and most C writes it; it hides no digit
         "-bugprone-easily-swappable-parameters",  # low and high, x and z: both are vectors of one type, called in one place
+        "-bugprone-implicit-widening-of-multiplication-result",  # 2 * i of a loop over a table's rows is below a table's size
         "-readability-function-size",  # a printed kernel is a straight list of assignments, as long as the physics
         "-readability-function-cognitive-complexity",  # it counts each maximum in such a list as a branch
     ]),
