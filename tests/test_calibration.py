@@ -22,8 +22,6 @@ from ctrlgen.core.units import to_si
 from ctrlgen.model.simulation import trace
 from ctrlgen.reporting.calibration_page import write_calibration
 
-pytestmark = pytest.mark.xdist_group("calibration")  # what its module fixtures take is made once, not in each worker
-
 DEVICE = SCENARIOS / "devices" / "mems_hexapod_run_time.toml"
 RECORDING = SCENARIOS / "hexapod_specimen"
 TRUE = {"actuator.ambient": 273.15 + 26, "actuator.thermal_resistance": 583.0, "actuator.time_constant": 4.4e-3}

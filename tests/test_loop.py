@@ -17,8 +17,6 @@ from plants.excitation import DRAWN, HELD, powers_held_out, powers_to_fit, recor
 from plants.loop import Loop, close
 from plants.mems_hexapod import MemsHexapod
 
-pytestmark = pytest.mark.xdist_group("loop")  # what its module fixtures take is made once, not in each worker
-
 
 @pytest.mark.long
 def test_the_recording_is_one_that_ctrlgen_reads(tmp_path, device):

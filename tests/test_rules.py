@@ -27,8 +27,6 @@ from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile
 from ctrlgen.verification.rules import ANALYZERS, check_rules, run_analyzer
 
-pytestmark = pytest.mark.xdist_group("rules")  # what its module fixtures take is made once, not in each worker
-
 STATIC = ("cppcheck --addon=misra", "clang-tidy", "gcc -fanalyzer", "clang --analyze")
 HOSTILE = ("sanitizers, random calls", "libFuzzer")
 
