@@ -391,7 +391,7 @@ def test_the_command_says_how_large_a_circle_a_frequency_allows(tmp_path):
         < record["times"]["stated"]
     )
     page = (tmp_path / "out" / "fastest.html").read_text()
-    assert page.count("<svg") == 3 and "largest circle" in page
+    assert page.count("<svg") == 3 and "Largest circle at 50 Hz" in page
     assert (tmp_path / "out" / "player" / "circle20_fastest_player_f64.c").is_file()
 
 
