@@ -21,7 +21,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 from scipy.optimize import brentq, minimize
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from ctrlgen.budget.limits import Margins, Slopes, margins, slopes_of_limits
 from ctrlgen.budget.linear import Propagated, propagate
@@ -145,7 +145,7 @@ class _RobustPath:
 
         place, counted = np.zeros(len(channels)), np.isfinite(start.found.bounds) & (start.found.sd.max(axis=1) > 0)
         size = start.found.sd.max(axis=1)[counted]
-        z = float(norm.isf(1 - self.robust.chance))
+        z = float(-ndtri(1 - self.robust.chance))
         for _ in range(ROUNDS):
 
             def left(p: np.ndarray, z: float = z) -> np.ndarray:  # nearly linear, which their probability is not
@@ -259,7 +259,7 @@ class ChanceConstraint:
         if not self._share:
             return f.scattered
         count = np.sum(np.isfinite(f.bounds)) * f.margin.shape[1]
-        return np.asarray(norm.isf(self._share * (1 - self.probability) / count) * f.scattered)
+        return np.asarray(-ndtri(self._share * (1 - self.probability) / count) * f.scattered)
 
     @cached_property
     def _beta(self) -> np.ndarray:
@@ -272,7 +272,7 @@ class ChanceConstraint:
 
     @cached_property
     def _risk(self) -> float:
-        return float(norm.sf(self._beta).sum())
+        return float(ndtr(-self._beta).sum())
 
     @property
     def holds(self) -> bool:
@@ -287,14 +287,14 @@ class ChanceConstraint:
     @cached_property
     def quantile(self) -> float:
         """z of the back-off."""
-        z = float(norm.isf(self._allowed))
+        z = float(-ndtri(self._allowed))
 
         def risk(raised: float) -> float:
-            return float(norm.sf(np.maximum(self._beta, raised)).sum() - self._allowed)
+            return float(ndtr(-np.maximum(self._beta, raised)).sum() - self._allowed)
 
         if self.holds or risk(z) <= 0:  # of a single limit that is short, but for rounding
             return z
-        return float(brentq(risk, z, norm.isf(self._allowed / self._beta.size) + 1))
+        return float(brentq(risk, z, 1 - ndtri(self._allowed / self._beta.size)))
 
     @property
     def reserve(self) -> np.ndarray:
