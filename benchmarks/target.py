@@ -15,6 +15,7 @@ from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.folder import CFolder, generate
 from ctrlgen.firmware.real import Real
+from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.verification.cores import BASE, CORES, INSTALL, Core, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import MISSING, Machine, available
 
@@ -61,15 +62,20 @@ def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -
     program = scratch / f"{name}.elf"
     cross_compile(COMPILER, core, [c.path / f"{name}.c"], c.path, f"{name}_init", program)
     machine = Machine(core, program)
-    state, target, out = (machine.reserve(count, real) for count in (2 * n, samples.command.shape[1], 3 * n))
+    numbers = (2 * n + 1, samples.command.shape[1], 3 * n)  # of the state also the word that says it was initialised
+    state, target, out = (machine.reserve(count, real) for count in numbers)
 
-    def call(function: str, wanted: np.ndarray) -> int:
+    def call(function: str, wanted: np.ndarray) -> tuple[int, int]:
         machine.write(target, wanted, real)
-        return machine.call(f"{name}_{function}", state, target, out)[1]
+        return machine.call(f"{name}_{function}", state, target, out)
 
     machine.call(f"{name}_init", state)
-    call("settle", samples.command[-1])
-    return max(call("step", t) for t in samples.command), max(call("step", t) for t in samples.jumps())
+    circle = [call("settle", samples.command[-1]), *(call("step", t) for t in samples.command)]
+    jumps = [call("step", t) for t in samples.jumps()]
+    lost = ControllerStatus.LOST | ControllerStatus.INPUT
+    if any(status for status, _ in circle) or any(status & lost for status, _ in jumps):
+        raise Disagreement("the circle meets a limit, or the controller is lost, on the emulated core")
+    return max(count for _, count in circle[1:]), max(count for _, count in jumps)
 
 
 def _peer(
