@@ -41,7 +41,6 @@ NOT_ENTERED = (
     r"^for \(i = 0; i < \d+; i\+\+\)",  # a loop behind one of those
     r"is_lost\(state\)|lost == 0|_LOST\)|drive_inside\(",  # drives that no displacement in range brings to a limit
     r"^return \(\(\(?d0 \* d0",  # the same, or the order in which axes leave their range
-    r"_DRIVE : 0U;",  # motions that meet the limit of the drive alone: the vectors at rest do not
     r"^if \(offset >= |^if \(segment >= count\)|next <= k",  # a knot of the curve between two samples, which pieces may place on them
 )
 

@@ -18,6 +18,7 @@ from ctrlgen.model.inverse import Inverse
 
 AROUND = 8  # displacements drawn anywhere in the range, and on its corners
 MOVED = 0.05  # of its range, by which a displacement goes beyond
+GROWING = (1, 4, 16, 64, 256)  # of its usual size, a highest derivative
 HALVINGS = 45  # that find where a drive is at its rate
 STEADY = 16  # roundings of a target that must not change the status: what a processor's own roundings may amount to
 
@@ -98,6 +99,9 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
             yield start, Call(0.5 * (start.target + target(z)), False, False)
             if controller.nominal.inertial:
                 yield start, Call(target(z, 1.0), False, False)
+    if controller.nominal.inertial and not still:
+        for driving in _driven(controller, target(middle)):
+            yield starts[0], Call(driving, False, False)
     for z in anywhere[:AROUND] if controller.rate else ():
         for settle in (True, False):
             yield (Call(_at_its_rate(controller, target(z), settle), settle, True),)
@@ -105,6 +109,15 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
     yield (Call(absurd, True, True),)
     if not still:
         yield (Call(absurd, False, True),)
+
+
+def _driven(controller: Controller, target: np.ndarray) -> Iterator[np.ndarray]:
+    """`target` with ever larger highest derivatives of one axis: only the drive limits them."""
+    scale = np.array(controller.target.scale)
+    for i in range(len(scale) - len(controller.nominal.axes), len(scale)):
+        for size in GROWING:
+            for way in (1, -1):
+                yield target + way * size * scale[i] * np.eye(len(scale))[i]
 
 
 def _at_its_rate(controller: Controller, target: np.ndarray, settle: bool) -> np.ndarray:
