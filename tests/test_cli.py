@@ -54,6 +54,23 @@ def test_help_names_every_command_and_a_first_step():
     assert first == ("example", "circle20 --to scenarios") and then == ("run", "scenarios/circle20 --out out/circle20")
 
 
+@pytest.mark.parametrize(
+    "words, left_out",
+    [
+        (["--help"], {"numpy", "scipy", "casadi", "pint", "matplotlib", "ctrlgen.devices"}),
+        (["run", "--help"], {"numpy", "scipy", "casadi", "pint", "matplotlib", "ctrlgen.devices"}),
+        (["check", str(DEVICE)], {"scipy.optimize", "matplotlib", "ctrlgen.reporting", "ctrlgen.diagnosis"}),
+    ],
+)
+def test_a_command_starts_without_what_it_does_not_use(words, left_out):
+    """Importing all of it takes seconds."""
+    program = "import sys; from ctrlgen.app.cli import execute; status = execute(); print(*sys.modules); sys.exit(status)"
+    done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stdout.splitlines()[-1].split())
+    assert "ctrlgen.app.cli" in loaded and not loaded & left_out
+
+
 def test_a_misspelt_command_or_option_is_answered_with_the_right_one():
     assert "Did you mean 'run'" in ctrlgen("rum").stderr
     done = ctrlgen("run", SCENARIOS / "circle20")

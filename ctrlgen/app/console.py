@@ -8,25 +8,22 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.measure import Measurement
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ctrlgen.app import pipeline
 from ctrlgen.core.errors import CtrlgenError
 from ctrlgen.core.units import from_si, show
-from ctrlgen.recordings.recording import Recording
-from ctrlgen.reporting import report
-from ctrlgen.trajectory.metrics import in_unit
 
 if TYPE_CHECKING:
+    from ctrlgen.app import pipeline
     from ctrlgen.app.batch import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
     from ctrlgen.diagnosis.selection.result import Diagnosis
     from ctrlgen.model.model import Model
+    from ctrlgen.recordings.recording import Recording
     from ctrlgen.reporting.build_record import Build
     from ctrlgen.reproduce.row import PrintedNumber
     from ctrlgen.trajectory.scenario import Scenario
@@ -47,6 +44,8 @@ def print_shaper(scenario: Scenario, model: Model) -> None:
 
 def print_solution(outcome: pipeline.Outcome) -> None:
     """Title, tracking error, margins and expectations."""
+    from ctrlgen.reporting.report import robust_sentence
+
     solution = outcome.solution
     scenario = solution.scenario
     rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
@@ -58,12 +57,12 @@ def print_solution(outcome: pipeline.Outcome) -> None:
     print_shaper(scenario, solution.model)
     if solution.between_samples is not None:
         signal = solution.model.signals[scenario.file.follow]
-        error = np.abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)
+        error = abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)
         for channel, unit, at, between in zip(
             signal.channels, signal.units, error, solution.between_samples, strict=True
         ):
             out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
-    if (sentence := report.robust_sentence(solution)) is not None:
+    if (sentence := robust_sentence(solution)) is not None:
         out.print(sentence, markup=False, soft_wrap=True)
     robust: tuple[Column, ...] = (("reserved", "right"),) if sentence is not None else ()
     table = table_of(
@@ -90,12 +89,14 @@ def print_solution(outcome: pipeline.Outcome) -> None:
         out.print(f"expected: {good} of {len(outcome.expected)} values in range")
     for e in outcome.expected:
         if not e.passed:
-            measured, low, high = (f"{in_unit(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
+            measured, low, high = (f"{from_si(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
             out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
 
 
 def print_comparison(outcome: pipeline.Outcome) -> None:
     """One line per arithmetic and comparison."""
+    from ctrlgen.reporting.report import worst_rows
+
     if outcome.comparison is None or outcome.c is None:
         return
     comparison, c = outcome.comparison, outcome.c
@@ -105,7 +106,7 @@ def print_comparison(outcome: pipeline.Outcome) -> None:
     for missing in comparison.missing:
         out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
     table = table_of(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
-    for row in report.worst_rows(comparison):
+    for row in worst_rows(comparison):
         if row["passed"] and row["what"].endswith("CasADi"):
             continue
         unit = "" if row["unit"] == "1" else f" {row['unit']}"
@@ -359,7 +360,7 @@ def print_workspace(found: pipeline.WorkspaceSummary) -> None:
     table = table_of(("from", "left"), *((place(base), "right") for base in found.bases), ("anywhere", "right"))
     for i, (channel, unit) in named:
         rounding = 1e-9 * signal_.scale[i]
-        ends = (np.where(np.abs(r[i]) > rounding, r[i], 0.0) for r in (*found.ranges, found.extent))
+        ends = ([v if abs(v) > rounding else 0.0 for v in r[i]] for r in (*found.ranges, found.extent))
         table.add_row(
             escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
         )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from ctrlgen.budget.finer_model import FinerModel, ModelDifference, difference_to, load_finer
 from ctrlgen.budget.limits import DrawnLimits, Safety, critical_samples, margins, safeties, slopes_of_limits
@@ -119,7 +119,7 @@ class ErrorBudget:
     @property
     def factor(self) -> float:
         """Coverage factor k of the 95 % band, GUM 6.3: deviations are normal to first order."""
-        return float(ndtri(0.5 + COVERAGE / 2))
+        return float(scipy.special.ndtri(0.5 + COVERAGE / 2))
 
     def peak(self, group: Group) -> float:
         """The largest combined standard uncertainty of a group [SI]."""
@@ -382,7 +382,7 @@ def agreement(group: Group, combined: np.ndarray, drawn: Drawn, path: UncertainP
     sd, mean = deviations.std(axis=0, ddof=1), deviations.mean(axis=0)
     low, high = np.quantile(deviations, [0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2], axis=0)
     compared = (linear >= COMPARED * linear.max()) & (linear > 0)
-    expected = float(ndtri(0.5 + COVERAGE / 2)) * linear
+    expected = float(scipy.special.ndtri(0.5 + COVERAGE / 2)) * linear
 
     def off(values: np.ndarray, against: np.ndarray) -> float:
         return float(np.abs(values[compared] / against[compared] - 1).max(initial=0.0))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy
 
 from ctrlgen.budget.linear import Propagated
 from ctrlgen.budget.monte_carlo import Drawn
@@ -193,7 +193,7 @@ def safeties(
     path: UncertainPath, found: Margins, slopes: Slopes, drawn: Drawn | None, critical: np.ndarray, probability: float
 ) -> tuple[Safety, ...]:
     """Each bound of each limit where it is least safe; `critical` (2, channels) are the samples of the draws."""
-    z = float(ndtri(probability))
+    z = float(scipy.special.ndtri(probability))
     least, rows = found.least(z), []
     places = [limit.name for limit, _ in path.channels]
     for limit in path.limits:
@@ -207,7 +207,7 @@ def safeties(
             rows.append(
                 Safety(
                     limit, limit.channels[i - own[0]], "lower" if side == 0 else "upper", k, float(found.bounds[side, i]), margin, sd,
-                    margin - z * sd, float(ndtr(margin / sd)) if sd else float(margin >= 0),
+                    margin - z * sd, float(scipy.special.ndtr(margin / sd)) if sd else float(margin >= 0),
                     _drawn_margin(drawn, slopes, side, k, i, float(found.bounds[side, i]), probability),
                 )
             )  # fmt: skip
@@ -227,4 +227,4 @@ def _drawn_margin(
 
 def critical_samples(found: Margins, probability: float) -> np.ndarray:
     """(2, channels) the sample at which each limited quantity is nearest to its lower and to its upper bound, at the `probability`."""
-    return np.asarray(np.argmin(found.least(float(ndtri(probability))), axis=1))
+    return np.asarray(np.argmin(found.least(float(scipy.special.ndtri(probability))), axis=1))

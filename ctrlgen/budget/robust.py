@@ -20,8 +20,7 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import brentq, minimize
-from scipy.special import ndtr, ndtri
+import scipy
 
 from ctrlgen.budget.limits import Margins, Slopes, margins, slopes_of_limits
 from ctrlgen.budget.linear import Propagated, propagate
@@ -145,14 +144,14 @@ class _RobustPath:
 
         place, counted = np.zeros(len(channels)), np.isfinite(start.found.bounds) & (start.found.sd.max(axis=1) > 0)
         size = start.found.sd.max(axis=1)[counted]
-        z = float(-ndtri(1 - self.robust.chance))
+        z = float(-scipy.special.ndtri(1 - self.robust.chance))
         for _ in range(ROUNDS):
 
             def left(p: np.ndarray, z: float = z) -> np.ndarray:  # nearly linear, which their probability is not
                 least = ChanceConstraint(at(p)[0], self.robust.chance).left(z).min(axis=1)
                 return np.asarray(least[counted] / size - CUSHION)
 
-            answer = minimize(
+            answer = scipy.optimize.minimize(
                 lambda p: float(error(p)[0]), place, jac=lambda p: _slope(error, p, low, high)[0], method="SLSQP",
                 bounds=list(zip(low, high, strict=True)), options={"ftol": 1e-4, "maxiter": MOST_STEPS},
                 constraints={"type": "ineq", "fun": left, "jac": lambda p, left=left: _slope(left, p, low, high)},
@@ -259,7 +258,7 @@ class ChanceConstraint:
         if not self._share:
             return f.scattered
         count = np.sum(np.isfinite(f.bounds)) * f.margin.shape[1]
-        return np.asarray(-ndtri(self._share * (1 - self.probability) / count) * f.scattered)
+        return np.asarray(-scipy.special.ndtri(self._share * (1 - self.probability) / count) * f.scattered)
 
     @cached_property
     def _beta(self) -> np.ndarray:
@@ -272,7 +271,7 @@ class ChanceConstraint:
 
     @cached_property
     def _risk(self) -> float:
-        return float(ndtr(-self._beta).sum())
+        return float(scipy.special.ndtr(-self._beta).sum())
 
     @property
     def holds(self) -> bool:
@@ -287,14 +286,14 @@ class ChanceConstraint:
     @cached_property
     def quantile(self) -> float:
         """z of the back-off."""
-        z = float(-ndtri(self._allowed))
+        z = float(-scipy.special.ndtri(self._allowed))
 
         def risk(raised: float) -> float:
-            return float(ndtr(-np.maximum(self._beta, raised)).sum() - self._allowed)
+            return float(scipy.special.ndtr(-np.maximum(self._beta, raised)).sum() - self._allowed)
 
         if self.holds or risk(z) <= 0:  # of a single limit that is short, but for rounding
             return z
-        return float(brentq(risk, z, 1 - ndtri(self._allowed / self._beta.size)))
+        return float(scipy.optimize.brentq(risk, z, 1 - scipy.special.ndtri(self._allowed / self._beta.size)))
 
     @property
     def reserve(self) -> np.ndarray:

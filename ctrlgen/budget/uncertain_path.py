@@ -15,7 +15,7 @@ from math import ceil, inf
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from ctrlgen.budget.uncertainty import AMBIENT, Uncertainties
 from ctrlgen.devices import Limit
@@ -201,7 +201,7 @@ def holding_drive(solution: Solution) -> np.ndarray:
         ca.vertcat(ca.vertcat(ca.SX(0, 1), m.starting) / np.maximum(m.x_scale, 1e-300), m.balance / m.force_scale),
         ca.vertcat(m.x, m.z, m.p), ca.vertcat(trace.x[0], trace.z[0], m.p_nominal),
     )])  # fmt: skip
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         lambda w: still(w * m.u_scale).full().ravel(), solution.drive[0] / m.u_scale, xtol=1e-15, gtol=1e-15
     )
     return found.x * m.u_scale

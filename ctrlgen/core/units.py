@@ -10,18 +10,21 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pint
 from annotated_types import GroupedMetadata
-from pint.util import UnitsContainer, to_units_container
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+if TYPE_CHECKING:
+    import pint
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf)\s*(.*?)\s*$", re.IGNORECASE)
 
 
 @cache
 def _registry() -> pint.UnitRegistry:
+    import pint  # takes a fifth of a second to import, its definitions as long to read
+
     registry: pint.UnitRegistry = pint.UnitRegistry(
         autoconvert_offset_to_baseunit=True, cache_folder=None, on_redefinition="ignore"
     )
@@ -193,6 +196,8 @@ def split_unit(unit: str, words: tuple[str, ...]) -> tuple[dict[str, float], str
 
     ({"channel": 1.0, "travel": -2.0}, "s ** 2") for 'channel*s^2/travel^2'.
     """
+    from pint.util import UnitsContainer, to_units_container
+
     powers: Any = UnitsContainer(to_units_container(unit))  # its powers are typed as any number, complex too
     placed = {word: float(power) for word, power in powers.items() if word in words}
     return placed, str(powers.remove(placed))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism_model import Condensed, Drawing
@@ -103,7 +103,7 @@ def free_modes(device: Drawing) -> Modes:
     light = [i for i in range(6 * count) if i not in heavy]
     follows = -np.linalg.solve(K[np.ix_(light, light)], K[np.ix_(light, heavy)])
     K_h = K[np.ix_(heavy, heavy)] + K[np.ix_(heavy, light)] @ follows
-    squares, shapes = eigh((K_h + K_h.T) / 2, M[np.ix_(heavy, heavy)])
+    squares, shapes = scipy.linalg.eigh((K_h + K_h.T) / 2, M[np.ix_(heavy, heavy)])
     motions = np.zeros((6 * count, len(squares)))
     motions[heavy], motions[light] = shapes, follows @ shapes
     return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), motions, M)
@@ -120,7 +120,7 @@ def guyan_modes(device: Drawing) -> Modes:
     if not (c.pushes and heavy) or np.linalg.eigvalsh(inert).min() <= INERT * np.linalg.eigvalsh(inert).max():
         return Modes(np.zeros(0), moved[:, :0], M)
     K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
-    squares, shapes = eigh((K + K.T) / 2, inert)
+    squares, shapes = scipy.linalg.eigh((K + K.T) / 2, inert)
     return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), moved @ shapes, M)
 
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
+import scipy
 from pydantic import Field, model_validator
-from scipy.linalg import eigh
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import (
@@ -356,7 +356,7 @@ def natural_frequencies(device: MemsHexapod) -> np.ndarray:
     J = hexapod.jacobian(p.hexapod, xy_stage.stage_compliance(p.stage, p.actuator))
     K = home_stiffness(lambda d: xy_stage.force(d, p.stage, p.actuator))
     M, K = (ca.DM(ca.evalf(ca.SX(matrix))).full() for matrix in (hexapod.mass(p.hexapod, p.dynamics, J), K))
-    return np.sqrt(eigh(K, M, eigvals_only=True)) / (2 * np.pi)
+    return np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True)) / (2 * np.pi)
 
 
 def matrices(device: MemsHexapod) -> dict[str, Any]:

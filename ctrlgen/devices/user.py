@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 
 import casadi as ca
 import numpy as np
-from pydantic import ConfigDict, create_model
+from pydantic import create_model
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
@@ -27,19 +27,13 @@ from ctrlgen.devices.section import Section
 from ctrlgen.devices.user_arguments import PLACEHOLDER, SECTIONS, ArgumentReader
 from ctrlgen.devices.user_physics import PhysicsBuilder, UserDescription
 
-NO_SOURCE = ConfigDict(use_attribute_docstrings=False)  # classes made at run time: looking for their text takes 30 ms
-
 
 class UserNumbers(Section):
     """A table of a user's parameters."""
 
-    model_config = NO_SOURCE
-
 
 class UserDevice(Device):
     """A device whose physics is its user's functions; made by `user_device`, never read from a file."""
-
-    model_config = NO_SOURCE
 
     kind: str = "user"
     description: ClassVar[UserDescription]

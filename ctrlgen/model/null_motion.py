@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import null_space
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from ctrlgen.model.allocation import INDEPENDENT
 from ctrlgen.model.model import Model
@@ -98,10 +97,10 @@ def _parts(model: Model) -> list[tuple[np.ndarray, np.ndarray]]:
         / model.force_scale
     )
     acts = (np.abs(B) > NOTHING * np.abs(B).max()).astype(float)
-    count, part = connected_components(acts.T @ acts, directed=False)
+    count, part = scipy.sparse.csgraph.connected_components(acts.T @ acts, directed=False)
     found = []
     for k in range(count):
         columns = np.flatnonzero(part == k)
         rows = np.any(acts[:, columns] > 0, axis=1)
-        found.append((columns, null_space(B[np.ix_(rows, columns)], rcond=INDEPENDENT)))
+        found.append((columns, scipy.linalg.null_space(B[np.ix_(rows, columns)], rcond=INDEPENDENT)))
     return found

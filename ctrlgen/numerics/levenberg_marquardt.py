@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import lsq_linear
+import scipy
 
 NEGLIGIBLE = 0.01  # squared standard deviations: a step that promises less ends the search
 PROBE = 0.1  # share of a step from which the curvature along it is taken
@@ -98,7 +98,7 @@ def _damped_step(
         w, V = np.linalg.eigh(H[np.ix_(free, free)] / np.outer(scale, scale))
         root = np.sqrt(np.maximum(w, 0.0) + damping)
         A, b = root[:, None] * V.T, -(V.T @ (gradient[free] / scale)) / root
-        step[free] = lsq_linear(A, b, (least[free] * scale, most[free] * scale), method="bvls").x / scale
+        step[free] = scipy.optimize.lsq_linear(A, b, (least[free] * scale, most[free] * scale), method="bvls").x / scale
     return step
 
 

@@ -16,7 +16,7 @@ from math import comb
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
@@ -116,7 +116,9 @@ class BalancedPath:
         self.law, self.closed, self.share, self.ends = law, closed, share, (float(share[0]), float(share[-1]))
         if closed:
             values = np.vstack([values[:-1], values[:1]])
-        self._spline = make_interp_spline(share, values, DEGREE, bc_type="periodic" if closed else None)
+        self._spline = scipy.interpolate.make_interp_spline(
+            share, values, DEGREE, bc_type="periodic" if closed else None
+        )
         self._n_x = law.model.x.numel()
 
     def states(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import Quantity, from_si, written_unit
@@ -136,7 +136,7 @@ def crossing(behind: Callable[[float], float], at_one: float) -> float | None:
     while np.log(SMALLEST) < here + step < np.log(LARGEST):
         there = behind(here + step)
         if (there <= 0) != (value <= 0):
-            root = brentq(behind, *sorted((here, here + step)), xtol=CLOSE / 4)
+            root = scipy.optimize.brentq(behind, *sorted((here, here + step)), xtol=CLOSE / 4)
             return float(np.exp(root - CLOSE / 4))  # on the safe side
         here, value = here + step, there
     return float(np.exp(here)) if value <= 0 else None

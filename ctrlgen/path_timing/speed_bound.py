@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ctrlgen.path_timing.drive_law import BalancedPath
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
@@ -125,5 +125,5 @@ def landed(share: np.ndarray, steps: np.ndarray, more: int = 0) -> np.ndarray:
         return float(walk(factor, count)[-1] - share[-1])
 
     most = float(np.nextafter(1.0, 0.0))
-    factor = most if beyond(most) <= 0 else float(brentq(beyond, 0.0, most, xtol=1e-15))
+    factor = most if beyond(most) <= 0 else float(scipy.optimize.brentq(beyond, 0.0, most, xtol=1e-15))
     return np.append(walk(factor, count)[:count], share[-1])

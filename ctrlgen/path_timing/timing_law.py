@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BPoly
+import scipy
 
 DENSE = 20  # places in each interval between nodes at which the law is inverted
 
@@ -26,8 +26,8 @@ class TimingLaw:
         return float(self.time[-1] - self.time[0])
 
     @cached_property
-    def _curve(self) -> BPoly:
-        return BPoly.from_derivatives(self.time, np.column_stack([self.share, self.derivatives]))
+    def _curve(self) -> scipy.interpolate.BPoly:
+        return scipy.interpolate.BPoly.from_derivatives(self.time, np.column_stack([self.share, self.derivatives]))
 
     def at(self, time: np.ndarray, order: int = 0) -> np.ndarray:
         """The share, or its derivative of this order by time."""

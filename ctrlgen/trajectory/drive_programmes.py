@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+import scipy  # its optimize takes a while to import, and comes when it is used
 import scipy.sparse as sp
-from scipy.optimize import linprog
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.model.allocation import INDEPENDENT
@@ -107,7 +107,7 @@ def _programme(
     n, m = limited.A.shape[1], beyond.shape[1]
     given = np.isfinite(limited.bounds)
     A = sp.vstack([sp.hstack([limited.A, -beyond]), sp.hstack([-limited.A, -beyond])], format="csr")[given]
-    answer = linprog(
+    answer = scipy.optimize.linprog(
         np.append(np.zeros(n), np.ones(m)), A_ub=A, b_ub=limited.bounds[given], b_eq=wanted,
         A_eq=sp.hstack([pushed, sp.csr_array((len(wanted), m))]), method="highs", options={"primal_feasibility_tolerance": TOLERANCE},
         bounds=np.column_stack([np.append(np.full(n, -np.inf), np.full(m, least)), np.full(n + m, np.inf)]),

@@ -14,9 +14,9 @@ from typing import Annotated, Any, Literal
 
 import casadi as ca
 import numpy as np
+import scipy
 from pydantic import AfterValidator, Field, StrictBool
 from pydantic.json_schema import SkipJsonSchema
-from scipy.interpolate import make_interp_spline
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import In, Quantity, read_quantity, same_dimension, written_unit
@@ -333,9 +333,11 @@ class Poses(Path_):
             raise InputError("path", [Fault("points", what)])
         if self.periodic:
             ring = np.vstack([listed, listed[:1]])
-            spline = make_interp_spline(np.arange(len(ring)), ring, 2 * order + 1, bc_type="periodic")
+            spline = scipy.interpolate.make_interp_spline(np.arange(len(ring)), ring, 2 * order + 1, bc_type="periodic")
             return np.stack([spline(at, k, extrapolate="periodic") for k in range(order + 1)])
-        spline = make_interp_spline(np.arange(len(listed)), listed, 2 * order + 1, bc_type=(still, still))
+        spline = scipy.interpolate.make_interp_spline(
+            np.arange(len(listed)), listed, 2 * order + 1, bc_type=(still, still)
+        )
         return np.stack([spline(np.clip(at, 0, len(listed) - 1), k) for k in range(order + 1)])
 
 

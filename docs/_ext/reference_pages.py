@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from conventions_figure import draw_conventions
+from described_schema import DescribedSchema
 from pydantic import BaseModel
 
 OUT = Path(__file__).resolve().parents[1] / "reference" / "generated"
@@ -176,7 +177,7 @@ def model_section(
     model: type[BaseModel], title: str, level: int = 2, passed_over: tuple[str, ...] = (), prefix: str = ""
 ) -> list[str]:
     """A schema as tables: the file itself, then every table in it."""
-    schema = model.model_json_schema()
+    schema = model.model_json_schema(schema_generator=DescribedSchema)
     definitions = dict(schema.get("$defs", {}), prefix=prefix)
     schema["properties"] = {k: v for k, v in schema["properties"].items() if k not in passed_over}
     lines = [

@@ -74,7 +74,6 @@ def budget(
     """
     from ctrlgen.budget.error_budget import error_budget
     from ctrlgen.core.files import check_folder, whole_folder
-    from ctrlgen.reporting.budget_page import write_budget
     from ctrlgen.trajectory.scenario import load_scenario
 
     chance = _probability(probability)
@@ -85,6 +84,8 @@ def budget(
             load_scenario(scenario, device), uncertainty, probability=chance, draws=draws, seed=seed, finer=finer, progress=advance
         )  # fmt: skip
         if out_folder is not None:
+            from ctrlgen.reporting.budget_page import write_budget
+
             advance("report")
             with whole_folder(out_folder) as draft:
                 write_budget(draft, found)

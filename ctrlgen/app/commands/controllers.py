@@ -1,16 +1,19 @@
-"""Scenarios and their C: run, solve, generate, compare, verify, fmu."""
+"""Scenarios and their C: run, solve, generate, compare, verify, fmu. The work is imported by the command that does it."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from ctrlgen.app import pipeline
 from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, OutFolder, ScenarioPath, app
 from ctrlgen.app.console import out, print_build, print_comparison, print_solution, progress
-from ctrlgen.trajectory.scenario import load_scenario
+
+if TYPE_CHECKING:
+    from ctrlgen.app.pipeline import Outcome
+    from ctrlgen.trajectory.scenario import Scenario
 
 
 @app.command(rich_help_panel=SCENARIO_PANEL)
@@ -22,8 +25,10 @@ def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = Non
 
     Example:  ctrlgen run scenarios/circle20 --out out/circle20
     """
+    from ctrlgen.app import pipeline
+
     with progress(pipeline.STEPS) as advance:
-        outcome = pipeline.run(load_scenario(scenario, device), out_folder, advance)
+        outcome = pipeline.run(_read(scenario, device), out_folder, advance)
     print_solution(outcome)
     print_comparison(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
@@ -36,8 +41,10 @@ def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = N
 
     Example:  ctrlgen solve scenarios/raster --out out/raster
     """
+    from ctrlgen.app import pipeline
+
     with progress(2) as advance:
-        outcome = pipeline.solve_into(load_scenario(scenario, device), out_folder, advance)
+        outcome = pipeline.solve_into(_read(scenario, device), out_folder, advance)
     print_solution(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
@@ -49,24 +56,29 @@ def generate(
     out_folder: OutFolder,
     device: OtherDevice = None,
     player: Annotated[
-        bool, typer.Option("--player", help="Write only the player of the solved trajectory, which any device has.")
+        bool,
+        typer.Option(
+            "--player", help="Write only the player of the solved trajectory, which needs no inverse on the target."
+        ),
     ] = False,
 ) -> None:
     """Write the C of a scenario: online controller and player, double and float; needs no compiler.
 
-    Leaves in --out a folder that drops into a firmware project as it is; its README.md says how. A device whose drives have limits on
-    their rates, or are more than its axes, has no online controller yet: --player writes the player alone.
+    Leaves in --out a folder that drops into a firmware project as it is; its README.md says how. Where the online
+    controller cannot do what the scenario asks, the error says why; --player then writes the player alone.
 
     Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
     """
+    from ctrlgen.app import pipeline
+
     if player:
         with progress(2) as advance:
-            written = pipeline.player_into(load_scenario(scenario, device), out_folder, advance)
+            written = pipeline.player_into(_read(scenario, device), out_folder, advance)
         for path in written:
             out.print(str(path), soft_wrap=True, markup=False)
         return
     with progress(2) as advance:
-        c = pipeline.generate_into(load_scenario(scenario, device), out_folder, advance)
+        c = pipeline.generate_into(_read(scenario, device), out_folder, advance)
     for name in [*c.online.values(), *c.player.values()]:
         out.print(f"{out_folder / name}.c", soft_wrap=True, markup=False)
     out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
@@ -78,8 +90,10 @@ def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
 
     Example:  ctrlgen compare scenarios/circle20
     """
+    from ctrlgen.app import pipeline
+
     with progress(pipeline.STEPS - 1) as advance:
-        outcome = pipeline.compare_only(load_scenario(scenario, device), advance)
+        outcome = pipeline.compare_only(_read(scenario, device), advance)
     print_comparison(outcome)
     _exit(outcome)
 
@@ -106,8 +120,10 @@ def verify(
 
     Example:  ctrlgen verify scenarios/circle20 --out out/verify
     """
+    from ctrlgen.app import pipeline
+
     with progress(pipeline.VERIFY_STEPS) as advance:
-        build = pipeline.verify(load_scenario(scenario, device), out_folder, advance, quick)
+        build = pipeline.verify(_read(scenario, device), out_folder, advance, quick)
     print_build(build)
     out.print(f"[bold]page[/bold]  {escape(str(out_folder / 'build.html'))}", soft_wrap=True)
     if not build.passed:
@@ -130,7 +146,9 @@ def fmu(
 
     Example:  ctrlgen fmu scenarios/circle20 --out out/fmu
     """
-    made = pipeline.fmus_into(load_scenario(scenario, device), out_folder, fmi)
+    from ctrlgen.app import pipeline
+
+    made = pipeline.fmus_into(_read(scenario, device), out_folder, fmi)
     for path in made.paths:
         out.print(str(path), soft_wrap=True, markup=False)
     out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)
@@ -138,7 +156,14 @@ def fmu(
         out.print(made.remark, markup=False, soft_wrap=True)
 
 
-def _exit(outcome: pipeline.Outcome) -> None:
+def _read(scenario: Path, device: Path | None) -> Scenario:
+    """The scenario, with another device where one is named."""
+    from ctrlgen.trajectory.scenario import load_scenario
+
+    return load_scenario(scenario, device)
+
+
+def _exit(outcome: Outcome) -> None:
     if not outcome.passed:
         out.print("[red]out of tolerance[/red]")
         raise typer.Exit(1)

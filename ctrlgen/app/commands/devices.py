@@ -1,4 +1,4 @@
-"""Devices and the papers' numbers: check, bode, workspace, reproduce."""
+"""Devices and the papers' numbers: check, bode, workspace, reproduce. The work is imported by the command that does it."""
 
 from __future__ import annotations
 
@@ -8,23 +8,9 @@ from typing import Annotated
 
 import typer
 
-from ctrlgen.app import pipeline
 from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app
-from ctrlgen.app.console import err, out, print_recording, print_reproduced, print_shaper, print_workspace, progress
-from ctrlgen.core.errors import Fault, InputError, Unreachable
-from ctrlgen.core.files import read_toml
-from ctrlgen.core.units import show
-from ctrlgen.devices import load_device
-from ctrlgen.devices.mechanism import Mechanism
-from ctrlgen.devices.mechanism_dynamics import summary
-from ctrlgen.devices.sensor import describe
-from ctrlgen.firmware.package import MANIFEST, verify_package
-from ctrlgen.model.assembly import build_model
-from ctrlgen.recordings.reader import load_recordings
-from ctrlgen.recordings.schema import FILE as RECORDING
-from ctrlgen.trajectory.frame import Frame
-from ctrlgen.trajectory.scenario import load_scenario, model_of
-from ctrlgen.trajectory.solution import check_feasibility, check_motion, check_static
+from ctrlgen.app.console import err, out, print_reproduced, print_workspace, progress
+from ctrlgen.core.errors import Fault, InputError
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)
@@ -51,79 +37,9 @@ def check(
 
     Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
     """
-    if device_path is not None:
-        print_recording(load_recordings([file], build_model(load_device(device_path))))
-        return
-    if (file / RECORDING).is_file() or (file.name == RECORDING and file.is_file()):
-        raise InputError(file, [Fault("--device", "is missing; name the device file that this recording was made on")])
-    if (file / MANIFEST).is_file():
-        if faults := verify_package(file):
-            raise InputError(file, faults)
-        out.print(f"{file}: every file is as it was generated", markup=False)
-        return
-    if file.is_dir() or (file.suffix != ".py" and "kind" not in read_toml(file)):
-        scenario = load_scenario(file)
-        model = model_of(scenario)
-        command = scenario.command(model)
-        out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
-        print_shaper(scenario, model)
-        try:
-            if scenario.file.robust is not None:
-                from ctrlgen.budget.robust import solve  # scipy takes a moment to import
-                from ctrlgen.reporting.report import robust_sentence
+    from ctrlgen.app.check import check as checked
 
-                out.print(str(robust_sentence(solve(scenario, model))), markup=False, soft_wrap=True)
-                return
-            if scenario.file.feedforward == "static":
-                _, needed = check_static(scenario, model)
-            elif model.inertial:
-                *_, needed = check_motion(scenario, model)
-            else:
-                _, needed = check_feasibility(scenario, model, command)
-        except Unreachable as error:
-            if scenario.file.outcome == "solved":
-                raise
-            out.print(f"as expected: {error}", markup=False, soft_wrap=True)
-            return
-        unsettled = (
-            "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
-        )
-        if model.inertial:
-            unsettled = "no drive was found in the first place: solve it to know why"
-        out.print(
-            "the path can be followed within every limit" if needed.exact else unsettled, markup=False, soft_wrap=True
-        )
-        return
-    device = load_device(file)
-    model = build_model(device)
-    if figure is not None:
-        from ctrlgen.reporting.mechanism_figure import draw_mechanism  # matplotlib takes a second to import
-
-        if not isinstance(device, Mechanism):
-            raise InputError("--figure", [Fault(device.name, 'is no mechanism; only kind = "mechanism" is drawn')])
-        draw_mechanism(device, _picture("--figure", figure))
-    numbers = list(device.quantities())
-    unsourced = [path for path, q in numbers if q.source is None]
-    out.print(
-        f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators",
-        markup=False,
-    )
-    if model.redundant:
-        weights = ", ".join(f"{w:g}" for w in model.drive_weights)
-        out.print(
-            f"  {model.u.numel()} drives for {len(model.axes)} axes: those of least effort, weights {weights}",
-            markup=False,
-        )
-    for line in summary(device) if isinstance(device, Mechanism) else ():
-        out.print(f"  {line}", markup=False, soft_wrap=True)
-    for limit in (*model.limits, *model.rate_limits):
-        low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
-        out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
-    units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
-    for sensor in device.sensor:
-        out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
-    for remark in device.remarks():
-        out.print(f"  note: {remark}", markup=False, soft_wrap=True)
+    checked(file, device_path, _picture("--figure", figure) if figure is not None else None)
 
 
 def _picture(option: str, path: Path) -> Path:
@@ -143,7 +59,10 @@ def bode(
 
     Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --out bode.svg --at delta_x=5um,delta_z=20um
     """
-    from ctrlgen.reporting.bode import draw_bode  # python-control takes most of a second to import
+    from ctrlgen.devices import load_device
+    from ctrlgen.model.assembly import build_model
+    from ctrlgen.reporting.bode import draw_bode
+    from ctrlgen.trajectory.frame import Frame
 
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
@@ -170,7 +89,10 @@ def workspace(
 
     Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
     """
-    print_workspace(pipeline.map_workspace(load_device(device), at or [], out_folder))
+    from ctrlgen.app.pipeline import map_workspace
+    from ctrlgen.devices import load_device
+
+    print_workspace(map_workspace(load_device(device), at or [], out_folder))
     out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
 
 
@@ -189,7 +111,7 @@ def reproduce(
 
     Example:  ctrlgen reproduce S3 --differing
     """
-    from ctrlgen.reproduce import all as everything  # takes seconds to import; no other command needs it
+    from ctrlgen.reproduce import all as everything
     from ctrlgen.reproduce.row import ReproductionStatus
     from ctrlgen.reproduce.s3_hinges import NEEDS_FEM
 

@@ -48,9 +48,7 @@ def fastest(
     Example:  ctrlgen fastest scenarios/circle20 --frequency "50 Hz" --out out/fastest
     """
     from ctrlgen.core.files import check_folder, whole_folder
-    from ctrlgen.firmware.player_only import generate_player
     from ctrlgen.path_timing.fastest import fastest as fastest_path
-    from ctrlgen.reporting.fastest_page import write_fastest
     from ctrlgen.trajectory.scenario import load_scenario
 
     if out_folder is not None:
@@ -59,6 +57,9 @@ def fastest(
         loaded = load_scenario(scenario, device)
         found = fastest_path(loaded, sample_rate=sample_rate, frequency=frequency, progress=advance)
         if out_folder is not None:
+            from ctrlgen.firmware.player_only import generate_player
+            from ctrlgen.reporting.fastest_page import write_fastest
+
             advance("player and report")
             with whole_folder(out_folder) as draft:
                 write_fastest(draft, found)

@@ -50,9 +50,7 @@ def learn(
     Example:  ctrlgen learn scenarios/circle20 run1 run2 --out out/learn
     """
     from ctrlgen.core.files import check_folder, whole_folder
-    from ctrlgen.firmware.player_only import generate_player
     from ctrlgen.learning.learn import learn as learn_next
-    from ctrlgen.reporting.learning_page import write_learning
     from ctrlgen.trajectory.scenario import load_scenario
 
     if out_folder is not None:
@@ -60,6 +58,9 @@ def learn(
     with progress() as advance:
         found = learn_next(load_scenario(scenario, device), recordings, progress=advance)
         if out_folder is not None:
+            from ctrlgen.firmware.player_only import generate_player
+            from ctrlgen.reporting.learning_page import write_learning
+
             advance("report and player")
             with whole_folder(out_folder) as draft:
                 write_learning(draft, found)

@@ -143,7 +143,6 @@ def calibrate(
     from ctrlgen.calibration.calibrate import calibrate as calibrated
     from ctrlgen.calibration.device_file import NAME, write_calibrated_device
     from ctrlgen.core.files import check_folder, whole_folder
-    from ctrlgen.reporting.calibration_page import write_calibration
 
     if out_folder is not None:
         check_folder(out_folder)
@@ -151,6 +150,8 @@ def calibrate(
         found = calibrated(device, recording, advance)
         both = None if scenario is None else budgets(found, scenario, device, advance)
         if out_folder is not None:
+            from ctrlgen.reporting.calibration_page import write_calibration
+
             advance("report")
             with whole_folder(out_folder) as draft:
                 write_calibration(draft, found, both)
