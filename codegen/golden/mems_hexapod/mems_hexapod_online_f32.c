@@ -389,6 +389,7 @@ static int is_usable(const float target[6])
     }
     return usable;
 }
+
 /* Scales a displacement that breaks wire flexure stress toward home: 0 untouched, 1 scaled, 2 scaled by more than the slack. */
 static int limit_composite(const mems_hexapod_online_f32_state *state, float wanted[6])
 {
@@ -417,6 +418,7 @@ static int limit_composite(const mems_hexapod_online_f32_state *state, float wan
     (void)state;
     return hit;
 }
+
 /* The displacement in range whose platform pose is nearest to that of the displacement beyond, to first order, from beyond clipped to
  * the range: 3 sweeps of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) on |W (value - beyond)|^2,
  * W the slope of the platform pose at home. */
@@ -462,6 +464,7 @@ static void nearest_displacement(const float beyond[6], float value[6])
         }
     }
 }
+
 /* Actuator state (limited) and drives (not limited) that out->displacement needs. */
 static void wanted_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
@@ -513,7 +516,7 @@ static int line_search(const mems_hexapod_online_f32_state *state, const float o
                 for (i = 0; i < 6; i++) {
                     at_start[i] = out->drive[i];
                     state_at_start[i] = out->state[i];
-            }
+                }
             } else {
                 rejected = fraction;
                 for (i = 0; i < 6; i++) {
@@ -525,7 +528,7 @@ static int line_search(const mems_hexapod_online_f32_state *state, const float o
             out->displacement[i] = origin[i] + (accepted * direction[i]);
             out->drive[i] = at_start[i];
             out->state[i] = state_at_start[i];
-                }
+        }
     }
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
 }
@@ -545,8 +548,8 @@ void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 }
 
 /* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
- * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged by the sum of their squares, at most their count
- * times (4 times the largest magnitude of the range) squared. */
+ * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
+ * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
 static int is_lost(const mems_hexapod_online_f32_state *state)
 {
     const float squares0 = (((((state->x[0] * state->x[0]) + (state->x[1] * state->x[1])) + (state->x[2] * state->x[2])) + (state->x[3] * state->x[3])) + (state->x[4] * state->x[4])) + (state->x[5] * state->x[5]);
@@ -566,6 +569,7 @@ static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_onli
     }
     return MEMS_HEXAPOD_ONLINE_F32_LOST;
 }
+
 /* Without a usable target: the safe drive, and the state it leads to. */
 static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
@@ -654,6 +658,7 @@ uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, co
     }
     return status;
 }
+
 /* Without a usable target: the safe drive, and the state it leads to. */
 static void step_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
