@@ -153,6 +153,7 @@ def test_an_interval_is_that_of_the_blocks(monkeypatch):
     )
 
 
+@pytest.mark.long
 def test_two_causes_have_the_shares_that_were_planted():
     """A hum of 30 times the noise beside a play of 60 nm: what each adds to the held-out records is known."""
     hum = 30 * NOISE * np.sin(2 * np.pi * 50.0 * H * np.arange(1500) + 0.4)

@@ -47,6 +47,7 @@ def answers(out: Path) -> dict[str, bytes]:
     return {str(p.relative_to(out)): p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
 
 
+@pytest.mark.long
 def test_each_recording_gets_its_folder_and_its_line(jobs, tmp_path):
     out = tmp_path / "out"
     rows = run_batch(load_batch(jobs), out, jobs=2)
@@ -61,6 +62,7 @@ def test_each_recording_gets_its_folder_and_its_line(jobs, tmp_path):
     assert not list(out.glob(".*"))
 
 
+@pytest.mark.long
 def test_what_is_there_is_kept_and_what_changed_is_made_again(jobs, tmp_path, monkeypatch):
     jobs.write_text('laws = ["sensor_gain", "bow"]\n' + jobs.read_text())
     out = tmp_path / "out"

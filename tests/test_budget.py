@@ -135,6 +135,7 @@ def test_gains_are_those_of_scaled_drives(circle, linear, rng):
     np.testing.assert_allclose(common, linear.sensitivity["pose"][:, :, places].sum(axis=2), rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.long
 def test_jitter_is_that_of_drives_that_change_late(circle, tmp_path, rng):
     sd, parts = 50e-6, 100  # s, steps of the simulation in a sample of 1 ms
     given = stated(circle, f'[drive]\njitter = {{ sd = "{sd} s", source = "chosen" }}', tmp_path)
@@ -274,6 +275,7 @@ def test_a_limit_that_is_not_kept_says_by_how_much(circle, tmp_path):
     assert 0 < hot.margin < 3 * hot.sd and hot.kept < 0 and 0.5 < hot.probability < 0.999 and hot.drawn is None
 
 
+@pytest.mark.long
 def test_where_first_order_and_draws_differ_it_is_said_why(circle, tmp_path):
     text = '[numbers]\n"actuator.beam_width" = { sd = "20 %", source = "not measured" }\n'
     found = budget_of(circle, stated(circle, text, tmp_path), draws=2000)
@@ -421,6 +423,7 @@ def test_the_sds_of_a_device_file_count_and_the_file_replaces_them(tmp_path):
     assert replaced == own | {"mechanics.mass": pytest.approx(0.001)}
 
 
+@pytest.mark.long
 def test_the_command_leaves_page_record_and_figures(tmp_path):
     done = ctrlgen(
         "budget",
@@ -496,6 +499,7 @@ def test_the_help_shows_the_sections_of_the_file():
     assert all(f"[{name}]" in text for name in ("numbers", "surroundings", "drive"))
 
 
+@pytest.mark.long
 def test_the_report_of_a_solution_holds_the_budget_to_first_order(circle, tmp_path):
     """The numbers are those of the budget by itself, whose own are proved above."""
     section = budget_section(circle)
@@ -530,6 +534,7 @@ def test_a_report_of_what_is_known_exactly_has_no_budget(circle, tmp_path):
     assert "Error budget" not in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name, path, share",
     [("circle20", "actuator.thermal_resistance", 0.01), ("circle20", "actuator.time_constant", 0.01),

@@ -37,6 +37,7 @@ def sought(monkeypatch) -> list[int]:
     return calls
 
 
+@pytest.mark.long
 def test_what_is_stopped_goes_on_and_ends_alike(asked, sought, tmp_path):
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
     diagnose_into(*asked, whole)

@@ -64,7 +64,9 @@ def test_help_names_every_command_and_a_first_step():
 )
 def test_a_command_starts_without_what_it_does_not_use(words, left_out):
     """Importing all of it takes seconds."""
-    program = "import sys; from ctrlgen.app.cli import execute; status = execute(); print(*sys.modules); sys.exit(status)"
+    program = (
+        "import sys; from ctrlgen.app.cli import execute; status = execute(); print(*sys.modules); sys.exit(status)"
+    )
     done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     loaded = set(done.stdout.splitlines()[-1].split())
@@ -181,6 +183,7 @@ main()
 """
 
 
+@pytest.mark.long
 def test_an_interruption_that_a_callback_swallows_ends_the_work_too():
     """Python ignores what is raised there, and prints it."""
     done = subprocess.run([sys.executable, "-c", SWALLOWED], capture_output=True, text=True)
@@ -218,6 +221,7 @@ def test_a_device_in_place_of_a_scenario_and_the_reverse_is_named(tmp_path):
         )
 
 
+@pytest.mark.long
 def test_titles_with_brackets_are_printed_as_they_are(scenario, tmp_path):
     text = (scenario / "scenario.toml").read_text().replace('title = "t"', 'title = "scan [/raster] 20 [um] */ x"')
     (scenario / "scenario.toml").write_text(text)
@@ -252,6 +256,7 @@ def test_a_device_without_dynamics_has_no_frequency_response(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "across", "says"),
     [("mems_hexapod", "delta_z [um]", "delta_z 20 um"), ("meso_hexapod", "delta_z [um]", "delta_z 20 um"),
@@ -314,12 +319,14 @@ def test_check_explains_a_path_that_cannot_be_followed_and_a_duration_that_is_no
     assert ended.returncode == 1 and 'write duration = "1 s" or "1.001 s"' in ended.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", ["svg", "png"])
 def test_bode_draws_a_picture(tmp_path, suffix):
     done = ctrlgen("bode", DEVICE, "--out", tmp_path / f"b.{suffix}", "--at", "delta_x=2um,delta_z=20um")
     assert done.returncode == 0 and (tmp_path / f"b.{suffix}").stat().st_size > 10_000
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "says"),
     [(("--out", "b.pdf"), ".svg or .png"), (("--out", "b.svg", "--at", "delta_z"), "channel=value"),

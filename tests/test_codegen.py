@@ -42,6 +42,7 @@ def build(compiler: str, sources: list[Path], out: Path, *more: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_bytes(folder, circle, tmp_path):
     again = generate(circle.scenario, build_model(circle.scenario.device), tmp_path, circle)
     for path in (p for p in sorted(folder.path.rglob("*")) if p.is_file()):
@@ -120,6 +121,7 @@ def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compi
     assert subprocess.run([tmp_path / "bad"], capture_output=True).returncode == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "option",
     [*(pytest.param(word, marks=pytest.mark.long) for word in ("-ffast-math", "-Ofast")), "-ffinite-math-only"],
@@ -338,6 +340,7 @@ def test_two_controllers_link_into_one_program(folder, compiler, tmp_path):
     build(compiler, [tmp_path / "main.c", *sources], tmp_path / "main")
 
 
+@pytest.mark.long
 def test_two_trajectories_of_one_device_and_rate_have_the_same_online_controller(folder, circle, tmp_path):
     spiral, raster = (load_scenario(SCENARIOS / name) for name in ("spiral", "raster"))
     same, slower = (generate(s, build_model(s.device), tmp_path / s.name) for s in (spiral, raster))
@@ -352,6 +355,7 @@ def test_two_trajectories_of_one_device_and_rate_have_the_same_online_controller
         assert name not in (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
 
 
+@pytest.mark.long
 def test_controllers_of_one_device_at_two_rates_with_two_names_link_into_one_program(
     folder, circle, compiler, tmp_path
 ):

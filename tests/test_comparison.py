@@ -12,6 +12,8 @@ from ctrlgen.firmware.folder import generate
 from ctrlgen.firmware.real import Real
 from ctrlgen.verification.comparison import compare
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def folder(tmp_path, circle, compiler):

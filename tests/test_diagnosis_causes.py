@@ -318,6 +318,7 @@ def test_play_is_seen_by_what_it_does_at_finite_gaps():
     assert found.z**2 > 0.5 * (fit.objective - fit.n)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rise", [3e-3, 2e-4])
 @pytest.mark.parametrize("moment", [0.18, 0.87, 1.33])
 def test_the_moment_of_an_event_is_the_middle_of_its_rise(moment, rise):

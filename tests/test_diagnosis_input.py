@@ -39,6 +39,7 @@ def altered(folder: Path, role: str, change) -> None:
     np.savetxt(folder / f"{role}.csv", rows, delimiter=",", header="t,u,y", comments="")
 
 
+@pytest.mark.long
 def test_a_cause_without_a_number_is_reported_like_any(tmp_path):
     (tmp_path / "table.toml").write_text(SERVO)
     found = diagnose_into(
@@ -50,6 +51,7 @@ def test_a_cause_without_a_number_is_reported_like_any(tmp_path):
     assert again.verdict == CONSISTENT
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("unit", ["um", "pm"])
 def test_a_column_of_another_unit_is_no_agreement(clean, unit):
     path = clean / "recording.toml"

@@ -172,6 +172,7 @@ def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(foun
     assert device.effect[2].values["quantum"].si == pytest.approx(1e-8)
 
 
+@pytest.mark.long
 def test_an_effect_that_is_there_already_stays_and_the_new_one_follows(creeping, tmp_path):
     known = AXIS_FILE.read_text() + "\n# glue\n" + CREEP.replace("0.03", "0.01").replace("0.2 s", "0.05 s")
     (tmp_path / "known.toml").write_text(known)
@@ -181,6 +182,7 @@ def test_an_effect_that_is_there_already_stays_and_the_new_one_follows(creeping,
     same_prediction(again, text, tmp_path)
 
 
+@pytest.mark.long
 def test_effects_written_in_one_line_are_continued_in_that_line(creeping, tmp_path):
     first = 'effect = [{ kind = "home_offset", at = "axis", offset = "0 um" }] # level\n'
     known = first + AXIS_FILE.read_text()
@@ -192,6 +194,7 @@ def test_effects_written_in_one_line_are_continued_in_that_line(creeping, tmp_pa
     assert [e.kind for e in ctrlgen.load_device(tmp_path / "next.toml").effect] == ["home_offset", "creep"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layout", ["table", "text"])
 def test_a_number_in_a_list_changes_in_place_and_says_what_it_was(tmp_path, layout):
     row = '  { value = "51 deg", source = "S0 Table 1, phi_4" },'
@@ -324,6 +327,7 @@ def command(*words: object) -> int:
         return execute()
 
 
+@pytest.mark.long
 def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path, capsys):
     out = tmp_path / "out"
     assert command("diagnose", AXIS_FILE, creeping, "--out", out, "--seed", 3, "--laws", ",".join(LAWS)) == 0
@@ -376,6 +380,7 @@ def test_a_foreign_folder_is_refused(creeping, tmp_path, capsys):
     assert "did not make" in capsys.readouterr().err and [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "at", [pytest.param("noise", marks=pytest.mark.long), pytest.param("screening", marks=pytest.mark.long), "report"]
 )

@@ -68,6 +68,7 @@ def follow(pages: list[str], folder: Path) -> int:
     return run
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", IN_ORDER)
 def test_what_a_page_tells_the_reader_to_do_works(name, tmp_path):
     assert follow(IN_ORDER[name], tmp_path) > 0

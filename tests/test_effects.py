@@ -413,6 +413,7 @@ def worst_difference(function: ca.Function, kernel, c, arguments: dict[str, np.n
     return float(np.max(off, initial=0) / np.max(np.abs(expected), initial=1e-30))
 
 
+@pytest.mark.long
 @every_effect
 def test_c_equals_python(effect, compiled, rng):
     """Twenty random calls of the law, and of the controller's kernels where it has some, to double precision."""

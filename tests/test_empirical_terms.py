@@ -97,6 +97,7 @@ def rms_of(device: Device, channel: str, given: Recording) -> float:
     return float(np.sqrt(np.mean((held.observed - read) ** 2)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("law", "effect", "least"), [(loops, "empirical_history", 0.7), (bumps, "empirical_position", 0.8)]
 )
@@ -136,6 +137,7 @@ def test_a_wrong_unit_is_not_corrected_by_a_smoother():
     assert found.verdict == "unexplained" and found.empirical_terms == ()
 
 
+@pytest.mark.long
 def test_a_channel_that_a_term_does_not_move_has_no_say_in_it_and_a_second_diagnosis_adds_nothing(tmp_path):
     """Bumps of a scale on the first of two axes, of which the second is exact; then the device that the first answer wrote."""
     device = device_of(tmp_path, PAIR)
@@ -170,6 +172,7 @@ def test_a_named_cause_keeps_its_numbers_and_its_findings():
     assert term.kind == "empirical_position" and len(fit.structure.causes) == 1
 
 
+@pytest.mark.long
 def test_a_force_that_falls_with_speed_in_its_own_way_is_a_function_of_speed(tmp_path):
     """A torque of 3 N that changes its sign and sags in the middle of the speeds; the law of the library for it is not tried."""
     device = device_of(tmp_path, TESTED)

@@ -313,6 +313,7 @@ def test_the_set_points_are_a_scenario_that_says_the_same(circle20, tmp_path):
     )
 
 
+@pytest.mark.long
 def test_corners_are_set_points():
     found = ctrlgen.fastest(SCENARIOS / "raster", sample_rate="4 kHz")
     corners = found.curve.samples(np.unique(np.concatenate(found.curve.pieces)))

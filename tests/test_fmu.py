@@ -134,6 +134,7 @@ def test_the_units_are_valid_fmi(units):
     assert (display.name, display.factor, display.offset) == ("degC", 1.0, -273.15)
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_bytes(units, tmp_path):
     fmi = 3 if fmpy.read_model_description(str(units[0])).fmiVersion == "3.0" else 2
     again = write_fmus(load_scenario(SCENARIOS / "circle20"), tmp_path / "out", fmi)
@@ -330,6 +331,7 @@ def test_outputs_and_foreign_tokens_are_not_taken(units, circle, tmp_path):
         unit.fmu.instantiate()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["meso_circle", "rrr_circle"])
 def test_plants_without_memory_or_with_coupled_stages_move_as_the_model(name, compiler, tmp_path, rng):
     scenario = load_scenario(SCENARIOS / name)
@@ -438,6 +440,7 @@ integral_gain = "1e4 V/(m*s)"
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "more", ["", HYSTERETIC, STICKING, CONTROLLED], ids=["bare", "hysteresis", "dry friction", "in closed loop"]
 )
@@ -486,6 +489,7 @@ def test_without_a_compiler_there_are_sources_only_and_it_is_said(tmp_path, monk
         assert fmpy.supported_platforms(str(path)) in ([], ["c-code"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fmi", [3, 2])
 def test_the_calls_are_declared_as_in_the_standards_own_headers(fmi, compiler, tmp_path):
     """Our types are cut out and the official header, which FMPy brings, is put in their place: no prototype conflicts."""
@@ -508,6 +512,7 @@ def test_the_calls_are_declared_as_in_the_standards_own_headers(fmi, compiler, t
     assert ours == official - exchange
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["circle", "rrr_circle", "axis"])
 def test_nothing_required_by_misra_is_reported_for_a_plant(kind, circle, tmp_path):
     if not shutil.which("cppcheck"):

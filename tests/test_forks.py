@@ -111,6 +111,7 @@ def bent_mirror():
     return device, Recording("t", "mirror", "series", ("reading.tilt",), ("mrad",), (noise,), tuple(records), ())
 
 
+@pytest.mark.long
 @forked
 @pytest.mark.parametrize("recorded", [cubic_axis, bent_mirror])
 def test_a_diagnosis_is_the_same_in_any_number_of_processes_and_can_be_continued(tmp_path, recorded):

@@ -84,6 +84,7 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
     assert np.all(np.abs(found - wanted).max(axis=(0, 1)) < 1e-10 * size)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("worth", [SIMULATION.parametric_operations, -1], ids=["parameters", "constants"])
 @pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.long)], ids=["held", "linear"])
 @pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.long), 3])

@@ -181,6 +181,7 @@ def test_a_result_folder_that_is_a_link_to_itself(tmp_path, command):
     assert [path.name for path in tmp_path.iterdir()] == ["loop"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "words",
     [
@@ -199,6 +200,7 @@ def test_a_file_where_a_folder_should_be_is_named(tmp_path, words):
     assert (tmp_path / "file").read_text() == "mine"
 
 
+@pytest.mark.long
 def test_a_full_disk_is_named_with_the_folder_and_leaves_nothing(tmp_path):
     """A limit on the size of files is the full disk that a test can have: the system refuses the write."""
     done = subprocess.run(
@@ -227,6 +229,7 @@ def test_a_full_disk_at_a_single_file(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
 def test_standard_output_on_a_full_disk():
     with open("/dev/full", "w") as full:

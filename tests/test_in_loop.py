@@ -21,6 +21,8 @@ from ctrlgen.verification.in_loop import InLoop, run_in_loop
 from ctrlgen.verification.qemu import check_on_boards
 from ctrlgen.verification.reference import ReferenceAnswers
 
+pytestmark = pytest.mark.long
+
 M4F, M7 = CORES
 
 # each r0 <- (r0 + 1) + 2 + ... + n style loop is written out, so that what it executes is known

@@ -280,6 +280,7 @@ EFFECTS = {  # laws with no inverse in closed form, with memories, with dry fric
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", EFFECTS)
 def test_laws_of_the_device_file_are_in_the_drive(tmp_path, kind):
     name = with_effect(tmp_path, kind, EFFECTS[kind])
@@ -327,6 +328,7 @@ def test_a_stage_with_a_flexible_mode_follows_and_comes_to_rest(tmp_path, name):
     assert np.abs(reached - path).max() < missed * TRAVEL
 
 
+@pytest.mark.long
 def test_dry_friction_is_overcome_by_the_drive(tmp_path):
     plain = solved(tmp_path, str(AXIS_FILE), LINE)
     rubbing = solved(tmp_path, with_effect(tmp_path, "coulomb", EFFECTS["coulomb"]), LINE)
@@ -372,6 +374,7 @@ def test_a_scenario_without_time_is_refused(tmp_path):
         solve(it, build_model(it.device))
 
 
+@pytest.mark.long
 def test_check_says_whether_the_path_can_be_followed(tmp_path):
     scenario(tmp_path, str(AXIS_FILE), LINE)
     done = run("check", tmp_path)
@@ -426,6 +429,7 @@ def test_the_online_drive_is_that_of_the_equations_and_limits_are_kept():
     assert controller.step(rest, np.array([d, np.nan, 0, 0])).status == ControllerStatus.INPUT
 
 
+@pytest.mark.long
 def test_the_c_computes_what_the_model_does(tmp_path, compiler):
     device = coil(state={"current": ("-1.5 V", "1.5 V")}, limits={"flexure_force": (lambda d, p: p.k * d.axis, "15 N")})
     outcome = ctrlgen.run(scenario(tmp_path, device, LINE), tmp_path / "out")
@@ -438,6 +442,7 @@ def test_a_device_with_memories_gets_no_c_and_the_law_is_named(tmp_path):
         ctrlgen.generate(it, build_model(it.device), tmp_path / "c")
 
 
+@pytest.mark.long
 def test_a_pendulum_is_led_to_45_degrees_and_its_c_agrees(tmp_path, compiler):
     pendulum = ctrlgen.user_device(
         "pendulum",

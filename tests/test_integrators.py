@@ -64,6 +64,7 @@ def stepped(law, drive: np.ndarray, fine: int) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "reach, share", [(3e-6, 0.005), pytest.param(0.3e-6, 0.01, marks=pytest.mark.long), (0.1e-6, 0.02)]
 )
@@ -80,6 +81,7 @@ def test_dry_friction_is_right_to_hundredths_of_itself_sliding_and_sticking(tmp_
     assert np.sqrt(np.mean((found - wanted) ** 2)) < share * rms
 
 
+@pytest.mark.long
 def test_what_bends_gently_is_of_second_order(tmp_path, monkeypatch):
     """Reversals that take longer than a step."""
     drive, off = DRIVES["several frequencies"], []
@@ -119,6 +121,7 @@ def test_bristles_bend_by_dahls_law(tmp_path):
     assert held == pytest.approx(force * (1 - np.exp(-found[101:] / reach)), rel=0.02)  # but for its inertia
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stiffness, share", [(5e5, 0.01), (5e6, 0.01), (2e7, 0.02)])
 def test_an_impact_is_stable_and_right_to_a_hundredth_of_itself(tmp_path, stiffness, share):
     """Hertz's contact 20 um out, up to a hundred times as stiff as the flexures: its period is half a sample."""

@@ -442,6 +442,7 @@ def test_the_command_writes_a_page_drives_and_the_player_and_its_json_keeps_to_t
     assert table == pytest.approx(np.array([record["drives"][name] for name in names]).T, rel=1e-11)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "says"),
     [

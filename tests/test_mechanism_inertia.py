@@ -68,6 +68,7 @@ def test_a_line_with_inertia_is_solved_on_its_samples(tmp_path):
     assert np.abs(solution.drive[:199, 0] - wanted).max() < 1e-3 * wanted.max()
 
 
+@pytest.mark.long
 def test_c_of_a_mechanism_with_inertia_computes_what_the_model_does(tmp_path):
     device = (DEVICE.parent / "parallelogram.toml").read_text() + "\n" + DYNAMICS
     (tmp_path / "device.toml").write_text(device)

@@ -96,6 +96,7 @@ def test_check_prints_and_draws_the_readings(tmp_path):
     assert "edge" in (tmp_path / "m.svg").read_text()
 
 
+@pytest.mark.long
 def test_a_sensor_may_stand_on_a_reading_and_c_is_generated_beside_it(tmp_path):
     sensor = '[[sensor]]\nkind = "displacement"\nat = "edge"\nmodel = "3316"\n'
     (tmp_path / "device.toml").write_text(PARALLELOGRAM + EDGE + sensor)

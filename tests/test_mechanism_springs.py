@@ -62,6 +62,7 @@ def test_a_cubic_spring_where_the_actuator_pushes_is_its_own_law(tmp_path):
     assert set(model.force_parts) == {"linear", "cubic"}
 
 
+@pytest.mark.long
 def test_c_of_a_cubic_spring_beside_the_push_computes_what_the_model_does(tmp_path):
     """3 mm below the stage, and not at the coil: the stage turns a little under its force."""
     device = with_spring('F_x_per_delta_x = "1 N/mm"\nF_x_per_delta_x3 = "2e-5 N/um^3"', at="-3")

@@ -104,6 +104,7 @@ def test_a_heater_cannot_pull(tmp_path):
     assert "heater" in str(caught.value) and "temperature" in str(caught.value)
 
 
+@pytest.mark.long
 def test_c_of_heaters_computes_what_the_model_does_by_power_and_by_voltage(tmp_path):
     for name, more in (("power", ""), ("voltage", 'heater_resistance = "150 ohm"\n')):
         (tmp_path / name).mkdir()

@@ -123,6 +123,7 @@ def scatter(make, count: int = 150) -> tuple[float, float]:
     return float(np.sqrt(np.mean(off**2))), float(np.mean([1 / np.sqrt(2 * f.count[0]) for f in found]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("source", ["rest", "periods", "dwells", "fastest"])
 def test_an_estimate_knows_how_well_it_is_known(source):
     """150 recordings scatter as `count` says, to the scatter of that (6 %) and the roundness of its definition."""

@@ -46,6 +46,7 @@ def recorded(noise, stated: float = NOISE, seed: int = 4, change=move) -> Record
     return Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (stated,), parts, ())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "noise, stated",
     [(white, 1.0), (spiked, 1.0), (coloured, 1.0), (white, 0.7), (white, 1.5), (spiked, 0.7)],
@@ -62,6 +63,7 @@ def ramped(u: np.ndarray) -> np.ndarray:
     return lsim(system, u, H * np.arange(len(u)))[1]
 
 
+@pytest.mark.long
 def test_a_drive_that_is_linear_between_samples_is_no_mismatch():
     given = recorded(white, change=ramped)
     linear = tuple(replace(r, linear=True) for r in given.records)

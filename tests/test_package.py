@@ -17,6 +17,8 @@ from ctrlgen.firmware.package import verify_package
 from ctrlgen.firmware.real import Real
 from ctrlgen.reporting.plots import draw_all
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def unsolved(tmp_path_factory) -> CFolder:

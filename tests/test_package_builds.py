@@ -11,6 +11,8 @@ from package_programs import STRICT, everything, run
 from ctrlgen import __version__
 from ctrlgen.firmware.real import Real
 
+pytestmark = pytest.mark.long
+
 SEMANTIC = re.compile(r"(0|[1-9]\d*)\.(0|[1-9]\d*)\.(0|[1-9]\d*)(-[0-9A-Za-z.-]+)?(\+[0-9A-Za-z.-]+)?")
 
 

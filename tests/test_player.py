@@ -24,6 +24,8 @@ from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 
+pytestmark = pytest.mark.long
+
 KINDS = ["closed", "raster", "limited", "short", "single", "three drives"]
 
 

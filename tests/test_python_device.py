@@ -166,6 +166,7 @@ def test_every_path_is_also_one_of_angles(tmp_path, path):
     assert "is not of the dimension of tip" in str(caught.value)
 
 
+@pytest.mark.long
 def test_a_diagnosis_of_a_python_file_writes_the_next_device_as_toml(folder):
     model = build_model(load_device(folder / "stage.py"))
     rng = np.random.default_rng(2)

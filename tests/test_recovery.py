@@ -336,6 +336,7 @@ def test_of_an_axis(law):
     recover(fitter, AXIS, law.__name__, ON_AXIS[law])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [drive_hysteresis, bouc_wen, asymmetric_hysteresis], ids=lambda law: law.__name__)
 def test_of_an_axis_by_a_law_whose_shape_starts_from_the_defaults(law, monkeypatch):
     """As a law without start values in the table does; that the simulator's form is another one stays known."""
@@ -462,6 +463,7 @@ def test_of_what_two_axes_share(effect):
     recover(fitter, device, effect, Planted("stage:a", truth, "b"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("samples", [2, 7])
 def test_of_two_clocks(samples):
     """Readings that come early, which no stage can; the screen cannot see it."""

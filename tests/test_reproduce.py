@@ -15,19 +15,23 @@ def rows(request):
     return everything.reproduce([request.param])
 
 
+@pytest.mark.long
 def test_every_row_that_is_not_reproduced_says_why(rows):
     assert rows
     assert not [row.where for row in rows if row.status is not ReproductionStatus.REPRODUCED and not row.reason]
 
 
+@pytest.mark.long
 def test_every_row_belongs_to_the_source_that_was_asked_for(rows, request):
     assert {row.source for row in rows} == {request.node.callspec.params["rows"]}
 
 
+@pytest.mark.long
 def test_no_number_is_left_out_by_being_no_number(rows):
     assert not [row.where for row in rows if row.ours is not None and not math.isfinite(row.ours)]
 
 
+@pytest.mark.long
 def test_places_are_named_once(rows):
     places = [row.where for row in rows]
     assert len(set(places)) == len(places)

@@ -316,6 +316,7 @@ def test_every_printed_text_stands_in_the_source(rows) -> None:
     assert lost == []
 
 
+@pytest.mark.long
 def test_figures_6_to_10_show_the_errors(data) -> None:
     drawings = s0_figures.figures(data)
     assert [name.partition(",")[0] for name in drawings] == [f"Fig. {k}" for k in range(6, 11)]

@@ -185,6 +185,7 @@ def broken(solution, draws, seed=3):
     return budget.broken, budget
 
 
+@pytest.mark.long
 def test_draws_break_limits_of_the_plain_path_and_not_of_the_robust_one(plain, robust):
     share, _ = broken(plain, 2_000)
     assert 0.01 < share < 0.1
@@ -242,6 +243,7 @@ def farthest(solution, distance):
     return float(trace.signals["displacement"][len(solution.drive) :].max())
 
 
+@pytest.mark.long
 def test_a_simulated_device_at_the_quantile_keeps_the_stroke_on_the_robust_path_alone(plain, robust):
     z = norm.isf(RISK)
     end = plain.model.z_bounds[1].max()
@@ -254,6 +256,7 @@ def test_a_simulated_device_at_the_quantile_keeps_the_stroke_on_the_robust_path_
     assert farthest(plain, stroke.margin / stroke.sd) == pytest.approx(end, abs=0.03 * stroke.sd)  # its second order
 
 
+@pytest.mark.long
 def test_the_generated_controller_keeps_the_tightened_limits(robust, plain, tmp_path):
     controller = Controller(robust.model, "pose", robust.scenario.sample_time)
     target = robust.command[0].copy()
@@ -396,6 +399,7 @@ def test_a_scenario_of_which_nothing_is_uncertain_is_refused(tmp_path):
     assert done.returncode == 1 and "is not stated of anything" in " ".join(done.stderr.split())
 
 
+@pytest.mark.long
 def test_the_command_line_says_what_is_reserved(tmp_path):
     text = (EXAMPLE / "scenario.toml").read_text().replace("../devices", str(SCENARIOS / "devices"))
     (tmp_path / "scenario.toml").write_text(text.replace('"1 kHz"', '"100 Hz"'))

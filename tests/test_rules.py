@@ -27,6 +27,8 @@ from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile
 from ctrlgen.verification.rules import ANALYZERS, check_rules, run_analyzer
 
+pytestmark = pytest.mark.long
+
 STATIC = ("cppcheck --addon=misra", "clang-tidy", "gcc -fanalyzer", "clang --analyze")
 HOSTILE = ("sanitizers, random calls", "libFuzzer")
 

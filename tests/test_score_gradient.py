@@ -128,6 +128,7 @@ POSED = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", POSED, ids=lambda h: f"{h.effect}-{h.at}")
 def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulations(hexapod, law):
     count, dwell = 30, 0.02  # four time constants of the heaters

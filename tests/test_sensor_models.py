@@ -138,6 +138,7 @@ def test_without_noise_the_sensitivity_is_exact():
     assert calibrate_sensor(recording, LASER.wavelength).sensitivity == pytest.approx(10.264e-6, rel=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["3316", "3317", "3338"])
 def test_the_planted_sensitivity_is_recovered_within_the_stated_uncertainty(name):
     sensor = SENSORS[name]

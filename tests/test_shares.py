@@ -68,6 +68,7 @@ FUNCTIONS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", FUNCTIONS, ids=lambda k: k.name.lower())
 def test_a_function_of_one_kind_gets_its_share_and_is_selected_first(kind, signals, rng):
     y = planted(FUNCTIONS[kind](signals), rng)
@@ -79,6 +80,7 @@ def test_a_function_of_one_kind_gets_its_share_and_is_selected_first(kind, signa
     assert found.total.share == pytest.approx(PART, abs=CLOSE + 0.02)  # the ceiling costs the columns of all kinds
 
 
+@pytest.mark.long
 def test_two_causes_add_up_to_the_ceiling(signals, rng):
     friction, cubic = (FUNCTIONS[kind](signals) for kind in (Kind.DIRECTION, Kind.POSITION))
     y = planted(friction / friction.std() + 0.5 * cubic / cubic.std(), rng)
@@ -95,6 +97,7 @@ def test_what_no_kind_explains_is_left_and_has_memory(signals, rng):
     assert found.rest > 0.9 and found.rest_own_past > 0.4
 
 
+@pytest.mark.long
 def test_numbers_that_the_fit_has_moved_do_not_hide_friction(signals, rng):
     """Viscous damping fitted to dry friction leaves F sign(v) - c v, of which the direction alone predicts little."""
     v = np.gradient(signals.position["x"], H)
@@ -130,6 +133,7 @@ def test_noise_is_a_function_of_nothing_but_its_past_and_time(name):
     assert name == "white" or shown.count(Kind.PAST) >= 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", [24, 54])
 def test_noise_of_few_poses_is_a_function_of_nothing(n):
     shown = []
@@ -225,6 +229,7 @@ def test_the_family_of_what_was_planted_comes_first(kind, family, signals, rng):
     assert found[0][0] is family and found[0][1] == pytest.approx(PART, abs=CLOSE)
 
 
+@pytest.mark.long
 def test_the_record_is_plain_and_the_text_names_what_was_selected(signals, rng):
     table = model_free_shares([planted(FUNCTIONS[Kind.POSITION](signals), rng)[:, None]], [signals], ["x"])
     record = json.loads(json.dumps(as_json(table), allow_nan=False))

@@ -54,6 +54,7 @@ def without(recording):
     return ctrlgen.diagnose(AXIS, recording, laws=["drift"])
 
 
+@pytest.mark.long
 def test_friction_is_a_function_of_the_direction_and_its_law_reaches_the_ceiling(found):
     channel = found.shares.before.of("reading.axis")
     assert channel.selected[0].kind in (Kind.DIRECTION, Kind.TRAVEL_HISTORY)
@@ -66,6 +67,7 @@ def test_friction_is_a_function_of_the_direction_and_its_law_reaches_the_ceiling
     )
 
 
+@pytest.mark.long
 def test_what_is_reached_is_the_decrease_of_the_residuals_energy(found):
     fitter, search = found.fitter, found.search
     energies = []
@@ -76,6 +78,7 @@ def test_what_is_reached_is_the_decrease_of_the_residuals_energy(found):
     assert 1 - found.shares.reached("reading.axis").share == pytest.approx(energies[1] / energies[0], rel=0.1)
 
 
+@pytest.mark.long
 def test_without_the_law_the_ceiling_is_told_and_that_no_law_reaches_it(without):
     assert not without.search.chosen.causes and without.shares.after is without.shares.before
     first, beside = shares_sentences(without)
@@ -84,6 +87,7 @@ def test_without_the_law_the_ceiling_is_told_and_that_no_law_reaches_it(without)
     assert term.effect.kind in beside and "names no cause" in beside
 
 
+@pytest.mark.long
 def test_the_record_and_the_page_hold_the_shares(found):
     result = diagnosis_record(found, MADE_FROM)
     assert faults(result, "diagnosis") == []
@@ -97,6 +101,7 @@ def test_the_record_and_the_page_hold_the_shares(found):
     assert "What the residual is a function of" in html and "dry friction" in html
 
 
+@pytest.mark.long
 def test_a_consistent_verdict_says_nothing_and_short_records_have_no_shares(found):
     assert shares_sentences(replace(found, verdict=CONSISTENT)) == []
     assert shares_sentences(replace(found, shares=None)) == []
@@ -106,6 +111,7 @@ def test_a_consistent_verdict_says_nothing_and_short_records_have_no_shares(foun
     assert diagnosis_record(replace(found, shares=None), MADE_FROM)["shares"] is None
 
 
+@pytest.mark.long
 def test_a_record_along_which_a_model_diverges_has_no_part_in_the_shares(found, monkeypatch):
     fitter, search = found.fitter, found.search
     held = fitter.held_out_records[0]

@@ -37,6 +37,7 @@ def described(recording: Recording):
     return fitter, fit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [6.5, 40.0])
 def test_spikes_have_their_rate_and_size_however_large_and_the_verdict_stays(size):
     found = ctrlgen.diagnose(AXIS, spiked(size), laws=["stiffening", "creep"])
@@ -50,6 +51,7 @@ def test_spikes_have_their_rate_and_size_however_large_and_the_verdict_stays(siz
     assert sum(spikes.sentence == note for note in found.notes) == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(5))
 def test_normal_noise_has_no_spikes(seed):
     fitter, fit = described(spiked(0.0, seed))

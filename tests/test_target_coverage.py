@@ -77,7 +77,9 @@ def branches(folder: CFolder, real: Real) -> tuple[list[str], dict[str, list[tup
     return never, found
 
 
-@pytest.mark.parametrize("name", LEAST)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.long) if n == "mirror_spiral" else n for n in LEAST]
+)
 def test_the_shipped_test_enters_every_function_and_the_branches_that_can_be(name, tmp_path):
     for program in ("gcc", "gcov"):
         if not shutil.which(program):

@@ -30,6 +30,8 @@ from ctrlgen.verification.check import Check, CheckFinding, not_run
 from ctrlgen.verification.comparison import Comparison, ComparisonRow
 from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun
 
+pytestmark = pytest.mark.long
+
 KEYS = {
     "scenario", "inputs", "passed", "failures", "not_run", "interface", "budgets", "errors_along_the_trajectory", "targets",
     "stopped", "checks", "comparison", "compilers", "margins", "expected", "c", "program",

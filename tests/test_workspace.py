@@ -47,6 +47,7 @@ def test_the_outline_is_convex(workspace):
     assert turn.min() > -1e-16  # m^2: rounding of sides of micrometres
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("channels", [(3, 4, 5), (0, 1, 2, 3, 4, 5)])
 def test_the_largest_ball_is_inside_and_touches_on_all_sides(workspace, model, channels, rng):
     ball = workspace.ball(at(20), channels)
