@@ -161,18 +161,23 @@ def seen(root: Path, tests: Iterable[Path], cache: Path, jobs: int, done: Callab
 
 
 def _measured(root: Path, path: Path, folder: Path) -> dict:
-    """One file of tests under coverage; tests that fail, are skipped or take too long say nothing."""
+    """One file of tests under coverage; tests that fail or are skipped say nothing, nor the long ones where together they take too long."""
     data, times = folder / f"{path.stem}.coverage", folder / f"{path.stem}.times"
-    command = [
-        sys.executable, "-m", "pytest", "-q", "-m", "not long", "-p", "mutants.timing", "-p", "no:cacheprovider", "-p", "no:xdist",
-        "--cov=ctrlgen", "--cov-context=test", "--cov-report=", str(path),
-    ]  # fmt: skip
     environment = os.environ | {"COVERAGE_FILE": str(data), "MUTANTS_TIMES": str(times), "PYTHONPATH": str(root)}
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=LONGEST)
-    if not (data.exists() and times.exists()):
+    rows: dict[str, dict] = {}
+    data.unlink(missing_ok=True)  # of a run that was stopped
+    for marked in ("not long", "long"):
+        command = [
+            sys.executable, "-m", "pytest", "-q", "-m", marked, "-p", "mutants.timing", "-p", "no:cacheprovider", "-p", "no:xdist",
+            "--cov=ctrlgen", "--cov-append", "--cov-context=test", "--cov-report=", str(path),
+        ]  # fmt: skip
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=LONGEST)
+        if times.exists():
+            rows |= json.loads(times.read_text())
+            times.unlink()
+    if not (data.exists() and rows):
         return {"seconds": {}, "tests": [], "lines": {}}
-    rows = json.loads(times.read_text())
     covered = CoverageData(str(data))
     covered.read()
     tests: dict[str, int] = {}
@@ -183,5 +188,4 @@ def _measured(root: Path, path: Path, folder: Path) -> dict:
             names = {c.rpartition("|")[0] for c in contexts if c}
             own[line] = sorted(tests.setdefault(name, len(tests)) for name in names)
     data.unlink()
-    times.unlink()
     return {"seconds": {k: v["seconds"] for k, v in rows.items() if v["passed"]}, "tests": list(tests), "lines": lines}
