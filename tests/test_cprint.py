@@ -10,7 +10,7 @@ import pytest
 
 from ctrlgen.firmware.cprint import Law, Printer, print_function
 from ctrlgen.firmware.elementary import elementary_text
-from ctrlgen.firmware.expression_graph import Graph, reached
+from ctrlgen.firmware.expression_graph import GIVEN, Graph, Node, reached
 from ctrlgen.firmware.real import Real
 from ctrlgen.firmware.toolchains import FLAGS
 
@@ -186,3 +186,73 @@ def test_no_decision_is_taken_on_the_value_of_a_number_that_is_given_at_the_star
     graph = Graph({"a.b": (-5.0, 5.0)})
     rows = graph.rows(ca.Function("f", [x, p], [law(x, p)], ["x", "p"], ["y"]), {}, {"p": [(value, "a.b")]})
     assert any(node.source is not None for node in reached(rows))
+
+
+@pytest.mark.parametrize(
+    ("factor", "highest"),
+    [(3e-20, 3e7), (1e7, 1e-20), (4e19, 1e-7), (1e-7, 1e20)],
+    ids=("small numbers", "small operands", "large numbers", "large operands"),
+)
+def test_numbers_are_gathered_only_where_a_float_can_hold_every_product(factor, highest):
+    """(c x)(c y) is of a size that a float holds, and c c or x y is not."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    product = ca.Function("f", [x, y], [(factor * x) * (factor * y)], ["x", "y"], ["r"])
+    ranges = {name: (np.zeros(1), np.full(1, highest)) for name in ("x", "y")}
+    for node in reached(Graph().rows(product, ranges)):
+        assert 1e-38 < max(abs(v) for v in node.within) < 3e38
+
+
+def value_of(node: Node, given: float) -> float:
+    """The value of an expression in the first number that the program is given when it starts."""
+    if node.constant:
+        return node.value
+    if node.leaf:
+        assert node.array == GIVEN and node.index == 0
+        return given
+    symbols = [ca.SX.sym("s") for _ in node.operands]
+    apply = {
+        ca.OP_ADD: lambda a, b: a + b, ca.OP_SUB: lambda a, b: a - b, ca.OP_MUL: lambda a, b: a * b, ca.OP_DIV: lambda a, b: a / b,
+        ca.OP_EXP: ca.exp, ca.OP_TANH: ca.tanh, ca.OP_TWICE: lambda a: 2 * a, ca.OP_NEG: lambda a: -a, ca.OP_INV: lambda a: 1 / a,
+        ca.OP_SQ: lambda a: a * a,
+    }  # fmt: skip
+    f = ca.Function("f", symbols, [apply[node.operation](*symbols)])
+    return float(f(*(value_of(part, given) for part in node.operands)))
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda p: ca.exp(p) - 1, lambda p: ca.exp(p) + 1, lambda p: ca.exp(p) + (-1.0), lambda p: ca.exp(p) - (-1.0),
+        lambda p: 1 - ca.exp(p), lambda p: ca.exp(p) - 2, lambda p: ca.exp(-2 * p) - 1, lambda p: ca.sin(p) * 0 + p - 1,
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("given", [0.3, 1.7])
+def test_what_follows_from_a_number_given_at_the_start_has_its_value(law, given):
+    """exp(y) - 1 is printed in another form, for its digits where y is small."""
+    x, p = ca.SX.sym("x"), ca.SX.sym("p")
+    graph = Graph({"a.b": (0.1, 2.0)})
+    (row,) = graph.rows(ca.Function("f", [x, p], [x * law(p)], ["x", "p"], ["y"]), {}, {"p": [(0.5, "a.b")]})
+    (number,) = (node for node in reached([row]) if node.source is not None and node in row.operands)
+    wanted = float(ca.Function("law", [p], [law(p)])(given))
+    assert value_of(number.source, given) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_the_difference_of_a_small_exponential_from_one_keeps_its_digits():
+    """A time constant that is long beside the sample time: 1 - exp(-1e-9) of a float is 0, or 6e-8."""
+    x, p = ca.SX.sym("x"), ca.SX.sym("p")
+    graph = Graph({"a.b": (1e-10, 1.0)})
+    (row,) = graph.rows(ca.Function("f", [x, p], [x * (ca.exp(-p) - 1)], ["x", "p"], ["y"]), {}, {"p": [(1e-9, "a.b")]})
+    (number,) = (node for node in reached([row]) if node.source is not None and node in row.operands)
+    assert any(node.operation == ca.OP_TANH for node in reached([number.source]))
+    assert not any(node.operation == ca.OP_EXP for node in reached([number.source]))
+    assert value_of(number.source, 1e-9) == pytest.approx(np.expm1(-1e-9), rel=1e-14)
+
+
+@pytest.mark.parametrize("law", [lambda x, y, p, q: ca.fmin(p * x, q * y), lambda x, y, p, q: ca.fmax(p * x, 2.0 * y)])
+def test_numbers_given_at_the_start_are_not_gathered_because_they_are_equal_in_the_file(law):
+    """min(p x, q y) is p min(x, y) for p = q alone."""
+    x, y, p, q = (ca.SX.sym(name) for name in "xypq")
+    graph = Graph({"a.p": (1.0, 5.0), "a.q": (1.0, 5.0)})
+    f = ca.Function("f", [x, y, p, q], [law(x, y, p, q)], list("xypq"), ["r"])
+    (row,) = graph.rows(f, {}, {"p": [(2.0, "a.p")], "q": [(2.0, "a.q")]})
+    assert row.operation in (ca.OP_FMIN, ca.OP_FMAX)

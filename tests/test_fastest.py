@@ -16,10 +16,11 @@ from scipy.optimize import brentq
 import ctrlgen
 from ctrlgen import InputError, SolverError, build_model, load_scenario, solve, user_device
 from ctrlgen.path_timing.between import error_between
+from ctrlgen.path_timing.binding import AT_BOUND, EXACTLY, bindings
 from ctrlgen.path_timing.confirmed import Followed
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
-from ctrlgen.path_timing.optimum import Optimiser
+from ctrlgen.path_timing.optimum import Optimiser, Optimum, Piece
 from ctrlgen.path_timing.repetition import crossing, largest
 from ctrlgen.reporting.fastest_page import write_fastest
 from ctrlgen.trajectory.frame import Frame
@@ -438,3 +439,20 @@ def test_what_is_solved_is_what_the_ordinary_solver_finds(circle20):
     assert solve(circle20.solution.scenario, circle20.solution.model).drive == pytest.approx(
         circle20.solution.drive, abs=1e-9
     )
+
+
+def test_a_limit_binds_between_nodes_that_are_both_at_it():
+    """From the first to the last node of a run; a single node is a touch and takes no time; the nearness is that of how it was found."""
+    times, share = np.array([0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 21.0, 28.0]), np.linspace(0, 0.7, 8)
+    far, law = 1.0, object()
+    touched = np.array([far, 0.0, EXACTLY / 2, 0.0, far, far, 0.0, far])
+    first, second = np.stack([touched, np.full(8, AT_BOUND / 2)], axis=1), np.full((8, 2), AT_BOUND / 2)
+    second[:, 0] = far
+    pieces = tuple(
+        Piece(times, share, np.zeros(8), distances, None, own, None)
+        for distances, own in ((first, None), (second, law))
+    )
+    longest, shortest = bindings(Optimum(pieces, ("touched", "held")))
+    assert longest.side == "held" and longest.time == 28.0 and longest.runs == ((0.0, pytest.approx(0.7)),)
+    assert shortest.side == "touched" and shortest.time == 5.0 and shortest.share_of_time == 5 / 56
+    assert shortest.runs == ((pytest.approx(0.1), pytest.approx(0.3)),)
