@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 
-from ctrlgen.core.units import from_si, parse, same_dimension, show, to_si
+from ctrlgen.core.units import from_si, parse, read_quantity, same_dimension, show, to_si
 
 
 @pytest.mark.parametrize(
@@ -64,3 +66,35 @@ def test_numbers_are_shown_in_the_readers_unit():
     assert show(31.53e-6, "um") == "31.53 um"
     assert show(823.15, "degC") == "550 degC"
     assert show(0.5, "1") == "0.5"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "sd", "si"),
+    [
+        ("200 GPa", "Pa", "3 %", 6e9),
+        ("-4 mm", "m", "0.5%", 2e-5),
+        ("0.3", "1", "10 %", 0.03),
+        ("2 %", "1", "0.5 %", 0.005),  # of a number in per cent a difference, as it is read by people
+        ("2 %", "1", "0.001", 0.001),
+        ("22 degC", "degC", "0.5 K", 0.5),
+        ("40 um", "m", "0.5 um", 5e-7),
+    ],
+)
+def test_a_standard_deviation_is_a_difference_or_a_share(value, unit, sd, si):
+    assert read_quantity(unit, {"value": value, "sd": sd}).sd == pytest.approx(si, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "sd", "says"),
+    [
+        ("22 degC", "degC", "5 %", 'write a difference, such as "1 K"'),
+        ("0 mm", "m", "5 %", 'write a difference, such as "1 mm"'),
+        ("40 um", "m", "-5 %", "is negative"),
+        ("40 um", "m", "5", "has no unit"),
+        ("40 um", "m", "5 GPa", "wrong unit"),
+        ("40 um", "m", "about 5 %", "does not start with a number"),
+    ],
+)
+def test_a_standard_deviation_that_is_neither_is_refused(value, unit, sd, says):
+    with pytest.raises(ValueError, match=re.escape(says)):
+        read_quantity(unit, {"value": value, "sd": sd})

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import Quantity, parse, same_dimension, to_si, written_unit
+from ctrlgen.core.units import Quantity, is_share, parse, same_dimension, share_of, to_si, written_unit
 from ctrlgen.devices.base import Section
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE, playback_tolerance
@@ -223,14 +223,16 @@ class _Reader:
                 self.faults.append(Fault(where, "is a count, which has no standard deviation; leave it out"))
                 return
             unit = written_unit(number.text)
-            if stated.sd.strip().endswith("%"):
-                if number.si == 0 or to_si(0.0, unit):
-                    what = (
-                        f'sd = "{stated.sd}" is a share of {number.text}, which does not count from a zero of its own'
-                    )
-                    self.faults.append(Fault(where, f'{what}; write a difference, such as "1 {_step(unit)}"'))
+            if is_share(stated.sd, number.text):
+                try:
+                    sds.append(share_of(stated.sd.strip(), number.si, number.text))
+                except ValueError as error:
+                    self.faults.append(Fault(where, str(error)))
                     return
-                sds.append(self._share(f"{where}.sd", stated.sd) * abs(number.si))
+                if not sds[-1] > 0:
+                    self.faults.append(
+                        Fault(f"{where}.sd", f"{stated.sd!r} must be above zero; leave out what is known exactly")
+                    )
             else:
                 sds.append(self._absolute(f"{where}.sd", stated.sd, unit, f"1 {_step(unit)}".replace(" 1", "")))
         self._add(name, "number", paths, tuple(sds), stated.sd, stated.source, self.numbers[paths[0]])

@@ -151,6 +151,30 @@ def _own_unit(text: object) -> str:
     return unit
 
 
+def is_share(sd: object, value: str) -> bool:
+    """Whether a standard deviation is a share of the `value`, such as '5 %'; of a value that is itself in per cent it is a difference."""
+    return isinstance(sd, str) and written_unit(sd) == "%" and written_unit(value) != "%"
+
+
+def share_of(sd: str, si: float, value: str) -> float:
+    """The standard deviation [SI] of the `value`, `si` in SI, of which `sd` is a share. Raises ValueError."""
+    unit = written_unit(value)
+    if si == 0 or to_si(0.0, unit):
+        step = "K" if to_si(0.0, unit) else unit
+        what = f'sd = "{sd}" is a share of {value}, which does not count from a zero of its own'
+        raise ValueError(f'{what}; write a difference, such as "1 {step}"')
+    return parse(sd.removesuffix("%").strip(), "1") / 100 * abs(si)
+
+
+def _deviation(sd: object, si: float, value: str, unit: str) -> float:
+    """A standard deviation [SI] as the file states it, a difference in `unit` or a share of the value. Raises ValueError."""
+    step = unit if unit != "degC" else "delta_degC"
+    found = share_of(str(sd).strip(), si, value) if is_share(sd, value) else parse(sd, step)
+    if found < 0:
+        raise ValueError(f"sd = {sd!r} is negative")
+    return found
+
+
 def _reader(
     wanted: str | None, low: float | None, high: float | None, low_open: bool, whole: bool = False
 ) -> Callable[[Any], Quantity]:
@@ -173,9 +197,7 @@ def _reader(
             raise ValueError(f"{table['value']!r} is not a whole number, and this is a count")
         sd = None
         if "sd" in table:
-            sd = parse(table["sd"], unit if unit != "degC" else "delta_degC")
-            if sd < 0:
-                raise ValueError(f"sd = {table['sd']!r} is negative")
+            sd = _deviation(table["sd"], si, str(table["value"]), unit)
         source = table.get("source")
         if source is not None and not isinstance(source, str):
             raise ValueError(f"source = {source!r} must be text")

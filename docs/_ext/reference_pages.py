@@ -231,7 +231,8 @@ def device_page() -> str:
         "A device file describes one stage: `kind` chooses the equations, `name` is a C identifier, `title` and `source` are "
         "for readers. Every number is text with its unit, or a table "
         '`{ value = "40 um", sd = "0.5 um", source = "data sheet" }`: `sd` is the standard deviation of what is not known '
-        "exactly, `source` where the number comes from. Unknown keys are errors; all faults of a file are reported at once.",
+        'exactly, a difference or a share of the value (`"3 %"`), '
+        "`source` where the number comes from. Unknown keys are errors; all faults of a file are reported at once.",
         "", "Any device file may hold `[[sensor]]` tables, and `[[effect]]` tables for the [physical effects](effects.md) that "
         "its kind leaves out.", "",
     ]  # fmt: skip
