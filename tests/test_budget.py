@@ -11,10 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import ctrlgen
-from conftest import SCENARIOS
+from conftest import DEVICES, SCENARIOS
 from result_files import faults
 
-from ctrlgen import InputError, SolverError, build_model, error_budget, load_scenario, simulate, solve
+from ctrlgen import (
+    InputError,
+    SolverError,
+    build_model,
+    error_budget,
+    load_device,
+    load_scenario,
+    simulate,
+    solve,
+    user_device,
+)
 from ctrlgen.budget.error_budget import agreement, budget_of
 from ctrlgen.budget.finer_model import load_finer
 from ctrlgen.budget.limits import margins, slopes_of_limits
@@ -214,6 +224,33 @@ def test_the_ranking_is_by_what_is_left_without(circle, budget, tmp_path):
     assert first.name == "actuator.thermal_resistance"
     for group in budget.groups:
         assert half.peak(group) == pytest.approx(first.halved[group.name], rel=1e-6)
+
+
+def test_of_two_equal_axes_both_must_be_better_known(tmp_path):
+    """Each makes the largest uncertainty somewhere: half the sd of one leaves the peak, half of both halves it; the variance is shared."""
+    stage = user_device(
+        "stage", parameters={"g_x": "0.2 N/V", "g_y": "0.2 N/V", "k": "1 N/um"}, drive={"x": "1000 V", "y": "1000 V"},
+        axes={"x": "50 um", "y": "50 um"}, force=lambda u, p: [p.g_x * u.x, p.g_y * u.y], restoring_force=lambda d, p: p.k * d.vector,
+    )  # fmt: skip
+    (tmp_path / "scenario.toml").write_text(
+        'title = "round"\ndevice = "stage"\n[path]\nkind = "poses"\n'
+        'points = [{ x = "10 um" }, { y = "10 um" }, { x = "-10 um" }, { y = "-10 um" }]\n'
+    )
+    (tmp_path / "uncertainty.toml").write_text(
+        'title = "t"\n[numbers]\n' + "".join(f'"mechanism.g_{a}" = {{ sd = "4 %", source = "s" }}\n' for a in "xy")
+    )
+    found = error_budget(load_scenario(tmp_path, stage), draws=0)
+    (group,) = found.groups
+    assert found.peak(group) == pytest.approx(0.04 * 10e-6, rel=1e-9)  # 4 % of the radius
+    assert [line.share for line in found.lines] == pytest.approx([0.5, 0.5], abs=1e-9)
+    one, both = (line.halved[group.name] for line in found.lines)
+    assert one == pytest.approx(found.peak(group), rel=1e-9) and both == pytest.approx(found.peak(group) / 2, rel=1e-9)
+
+
+def test_a_number_in_a_list_is_called_by_the_name_of_its_table():
+    device = load_device(DEVICES / "parallelogram.toml")
+    assert device.called("element[1].thickness") == "element[1].thickness (right)"
+    assert device.called("output.at[0]") == "output.at[0]" and device.called("drive.gain") == "drive.gain"
 
 
 def test_correlated_deviations_add_or_cancel(circle, tmp_path):

@@ -23,7 +23,7 @@ def print_budget(budget: ErrorBudget) -> None:
         cells = []
         for g in budget.groups:
             cells += [f"{g.shown(v[g.name]):.3g}" for v in (line.sensitivity, line.peak, line.rms)]
-        table.add_row(escape(line.name), line.sd, line.per, *cells, f"{100 * line.share:.1f} %")
+        table.add_row(escape(line.called), line.sd, line.per, *cells, f"{100 * line.share:.1f} %")
     cells = []
     for g in budget.groups:
         cells += ["", f"{g.shown(budget.peak(g)):.4g}", f"{g.shown(budget.rms(g)):.4g}"]
@@ -39,13 +39,14 @@ def print_budget(budget: ErrorBudget) -> None:
     if budget.model_difference is not None:
         what = f"model difference: {budget.model_difference.finer.model.name} under the same drives; it is not combined with the band"
         out.print(what, markup=False, soft_wrap=True)
+    before = {g.name: budget.peak(g) for g in budget.groups}
     for k, line in enumerate([line for line in budget.lines if any(line.peak.values())][:3]):
         halves = ", ".join(
-            f"{g.shown(budget.peak(g)):.4g} -> {g.shown(line.halved[g.name]):.4g} {g.unit}" for g in budget.groups
+            f"{g.shown(before[g.name]):.4g} -> {g.shown(line.halved[g.name]):.4g} {g.unit}" for g in budget.groups
         )
-        out.print(
-            f"{'next' if k == 0 else 'then'}: halve the sd of {line.name}: {halves}", markup=False, soft_wrap=True
-        )
+        what = "next: halve the sd of" if k == 0 else "then also that of"
+        out.print(f"{what} {line.called}: {halves}", markup=False, soft_wrap=True)
+        before = line.halved
     for safety in budget.safeties:
         style = None if safety.kept >= 0 else "red"
         out.print(safety_sentence(safety, budget.probability), markup=False, soft_wrap=True, style=style)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from ctrlgen.budget.contributors import BudgetLine, Group, budget_lines, groups_of, largest, rms
 from ctrlgen.budget.finer_model import FinerModel, ModelDifference, difference_to, load_finer
 from ctrlgen.budget.limits import DrawnLimits, Safety, critical_samples, margins, safeties, slopes_of_limits
 from ctrlgen.budget.linear import Propagated, propagate
@@ -22,9 +23,7 @@ from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.units import difference, same_dimension
 from ctrlgen.devices import Device
-from ctrlgen.model.model import Signal
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 
@@ -38,41 +37,6 @@ KEPT = 60  # samples along the path at which draws are kept
 TOLERANCE = 0.10  # of the first-order result, within which the draws confirm it
 COMPARED = 0.5  # of the largest uncertainty along the path: smaller ones are not compared
 OUTLYING = 10.0  # standard uncertainties: no draw of a million of a path that is nearly linear lies so far off
-JITTER_STEP = 1e-6  # s
-
-
-@dataclass(frozen=True)
-class Group:
-    """Channels of the followed signal with one kind of unit: translations in nm, rotations in urad."""
-
-    name: str
-    unit: str
-    channels: tuple[int, ...]
-
-    def shown(self, si: float) -> float:
-        """An SI difference in the unit of the group."""
-        return float(difference(si, self.unit))
-
-
-@dataclass(frozen=True)
-class BudgetLine:
-    """One contributor. By group, SI: `sensitivity`, the largest deviation along the path for the step `per`; `peak` and `rms`, its
-    standard uncertainty there; `alone`, what its second order adds at one sd.
-
-    `share` of the variance at the largest combined uncertainty, of the group in which it counts most, and `halved`, the combined
-    peak [SI, by group] if its sd were half.
-    """
-
-    name: str
-    sd: str
-    per: str
-    source: str
-    sensitivity: dict[str, float]
-    peak: dict[str, float]
-    rms: dict[str, float]
-    share: float
-    halved: dict[str, float]
-    alone: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -127,15 +91,15 @@ class ErrorBudget:
 
     def rms(self, group: Group) -> float:
         """Root mean square along the path of the combined standard uncertainty of the channel where it is largest [SI]."""
-        return _rms(self.combined[:, group.channels])
+        return rms(self.combined[:, group.channels])
 
     def difference_peak(self, group: Group) -> float:
         """The largest deviation of the finer model in a channel of a group [SI]; 0 without one."""
-        return 0.0 if self.model_difference is None else _largest(self.model_difference.deviation, group)
+        return 0.0 if self.model_difference is None else largest(self.model_difference.deviation, group)
 
     def difference_rms(self, group: Group) -> float:
         """Root mean square along the path of that deviation, of the channel where it is largest [SI]; 0 without a finer model."""
-        return 0.0 if self.model_difference is None else _rms(self.model_difference.deviation[:, group.channels])
+        return 0.0 if self.model_difference is None else rms(self.model_difference.deviation[:, group.channels])
 
     @property
     def broken(self) -> float | None:
@@ -251,7 +215,7 @@ def budget_of(
                 f"{drawn.lost} of {draws} draws ended in no number: some sds are so large that a draw is no device any more; lower them"
             )
     rows = safeties(path, found, slopes, drawn, critical, probability)
-    lines = _lines(path, linear, combined, groups, drawn)
+    lines = budget_lines(path, linear, groups, drawn)
     agreements = () if drawn is None else tuple(agreement(g, combined, drawn, path) for g in groups)
     return ErrorBudget(
         solution, stated, groups, lines, combined, linear, drawn, agreements, rows, probability, draws, seed, other
@@ -265,114 +229,11 @@ def _propagated(path: UncertainPath) -> Propagated:
         raise SolverError(f"{error}; a law of the device has no slope along it") from None
 
 
-def groups_of(signal: Signal) -> tuple[Group, ...]:
-    """Channels of a signal by kind: translations in nm, rotations in urad, and what has another unit in that."""
-    units: dict[tuple[str, str], list[int]] = {}
-    for i, unit in enumerate(signal.units):
-        kinds = (("translation", "nm", "m"), ("rotation", "urad", "rad"))
-        name, shown = next(((n, s) for n, s, base in kinds if same_dimension(unit, base)), (f"in {unit}", unit))
-        units.setdefault((name, shown), []).append(i)
-    order = sorted(units, key=lambda key: key[0] != "translation")
-    return tuple(Group(*key, tuple(units[key])) for key in order)
-
-
 def _kept(combined: np.ndarray, groups: tuple[Group, ...]) -> np.ndarray:
     """The samples at which draws are kept: some along the path, and the largest uncertainty of each group."""
     n = len(combined)
     peaks = [int(combined[:, g.channels].max(axis=1).argmax()) for g in groups]
     return np.unique([*np.linspace(0, n - 1, min(n, KEPT)).astype(int), *peaks])
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2, axis=0)).max())
-
-
-def _largest(values: np.ndarray, group: Group) -> float:
-    return float(np.abs(values[:, group.channels]).max())
-
-
-def _lines(
-    path: UncertainPath, linear: Propagated, combined: np.ndarray, groups: tuple[Group, ...], drawn: Drawn | None
-) -> tuple[BudgetLine, ...]:
-    """Every contributor, the largest share first."""
-    stated, Y = path.uncertainties, linear.sensitivity["pose"]
-    covariance, lines, first = stated.covariance, list[BudgetLine](), 0
-
-    def line(name: str, texts: tuple[str, str, str], seen: _Seen) -> BudgetLine:
-        return BudgetLine(
-            name, *texts, {g.name: _largest(seen.by_step, g) for g in groups}, {g.name: _largest(seen.own, g) for g in groups},
-            {g.name: _rms(seen.own[:, g.channels]) for g in groups}, _share(combined, seen.without, groups),
-            {g.name: _largest(seen.half, g) for g in groups}, {g.name: _largest(seen.bend, g) for g in groups},
-        )  # fmt: skip
-
-    for uncertain in stated.lines:
-        columns = slice(first, first + len(uncertain.sds))
-        first = columns.stop
-        own = np.sqrt(np.sum((Y[:, :, columns] * uncertain.sds) ** 2, axis=2))
-        by_step = np.abs(Y[:, :, columns] * uncertain.per[1]).max(axis=2)
-        bend = np.zeros((1, Y.shape[1]))
-        if drawn is not None:  # of several columns the one that bends most
-            bend = np.abs(drawn.alone[:, columns].sum(axis=0) / 2).max(axis=0)
-        without, half = (_combined(linear, _scaled(covariance, columns, factor)) for factor in (0.0, 0.5))
-        texts = uncertain.text, uncertain.per[0], uncertain.source
-        lines.append(line(uncertain.name, texts, _Seen(by_step, own, without, half, bend)))
-    for name, own in linear.scatter["pose"].items():
-        others = {of: sd for of, sd in linear.scatter["pose"].items() if of != name}
-        without = _combined(linear, covariance, others)
-        per, by_step = _by_step(path, linear, name, own)
-        texts = stated.texts[name], per, stated.sources[name]
-        lines.append(
-            line(f"drive.{name}", texts, _Seen(by_step, own, without, np.hypot(without, own / 2), np.zeros_like(own)))
-        )
-    return tuple(sorted(lines, key=lambda found: -found.share))
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """What one contributor does, each (n, channels) [SI]: for one step, its standard uncertainty, what is combined without it and with
-    half of it, its second order."""
-
-    by_step: np.ndarray
-    own: np.ndarray
-    without: np.ndarray
-    half: np.ndarray
-    bend: np.ndarray
-
-
-def _share(combined: np.ndarray, without: np.ndarray, groups: tuple[Group, ...]) -> float:
-    """By how much the variance falls without it where the combined one is largest, of the group in which that is most."""
-    shares = []
-    for g in groups:
-        k, i = np.unravel_index(int(combined[:, g.channels].argmax()), (len(combined), len(g.channels)))
-        total = combined[k, g.channels[i]]
-        shares.append(1 - float(without[k, g.channels[i]] / total) ** 2 if total else 0.0)
-    return max(shares)
-
-
-def _scaled(covariance: np.ndarray, columns: slice, factor: float) -> np.ndarray:
-    """The covariance with the sds of some columns times a factor."""
-    scale = np.ones(len(covariance))
-    scale[columns] = factor
-    return covariance * np.outer(scale, scale)
-
-
-def _combined(linear: Propagated, covariance: np.ndarray, scatter: dict[str, np.ndarray] | None = None) -> np.ndarray:
-    """(n, channels) combined with another covariance, or other things that scatter."""
-    Y, present = linear.sensitivity["pose"], linear.scatter["pose"] if scatter is None else scatter
-    variance = np.sum((Y @ covariance) * Y, axis=2)
-    return np.sqrt(np.maximum(variance, 0.0) + sum((sd**2 for sd in present.values()), np.zeros(variance.shape)))
-
-
-def _by_step(path: UncertainPath, linear: Propagated, name: str, own: np.ndarray) -> tuple[str, np.ndarray]:
-    """Text and deviation (n, channels) of one step: of a converter and of arithmetic the path under the rounded drives."""
-    if name == "jitter":
-        return "1 us", own / path.uncertainties.jitter * JITTER_STEP
-    if name == "player":
-        return "tolerance", own * np.sqrt(3)
-    single = path.drive.astype(np.float32).astype(float)
-    rounded = path.nominal(path.rounded() if name == "converter" else single)
-    pose = path.evaluate("pose", rounded[path.before :], path.drive[path.before :])
-    return "1 LSB" if name == "converter" else "rounding", pose - linear.nominal["pose"]
 
 
 def agreement(group: Group, combined: np.ndarray, drawn: Drawn, path: UncertainPath) -> Agreement:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
@@ -265,6 +266,19 @@ class Device(Section):
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Every number of the device with its dotted path, such as 'struts.wire_length'."""
         yield from _leaves(self, "")
+
+    def called(self, path: str) -> str:
+        """The path of a number, with the name, or the kind, of its table where that stands in a list: 'actuator[0].gain (px)'."""
+        node: Any = self
+        name = ""
+        for key, index in re.findall(r"(\w+)|\[(\d+)\]", path):
+            node = getattr(node, key, None) if key else node[int(index)] if isinstance(node, tuple) else None
+            if index:
+                name = next(
+                    (own for own in (getattr(node, key, None) for key in ("name", "kind")) if isinstance(own, str)),
+                    name,
+                )
+        return f"{path} ({name})" if name else path
 
     def values(self, free: dict[str, ca.SX] | None = None) -> SimpleNamespace:
         """SI numbers as nested namespaces; `free` gives symbols for some paths in place of their numbers."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ctrlgen.budget.error_budget import Group, groups_of
+from ctrlgen.budget.contributors import Group, groups_of
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import Wanted, next_drives

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.budget.error_budget import COVERAGE, TOLERANCE, BudgetLine, ErrorBudget
+from ctrlgen.budget.contributors import BudgetLine
+from ctrlgen.budget.error_budget import COVERAGE, TOLERANCE, ErrorBudget
 from ctrlgen.budget.limits import Safety
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import difference, from_si
@@ -86,7 +87,7 @@ def _contributor(budget: ErrorBudget, line: BudgetLine, rank: int) -> dict[str, 
         for g in budget.groups
     ]  # fmt: skip
     return {
-        "rank": rank, "name": line.name, "sd": line.sd, "source": line.source, "per": line.per, "share": line.share,
+        "rank": rank, "name": line.name, "called": line.called, "sd": line.sd, "source": line.source, "per": line.per, "share": line.share,
         "effects": effects,
     }  # fmt: skip
 
@@ -242,7 +243,7 @@ def _draw_contributors(budget: ErrorBudget) -> Figure:
     figure, axes = plt.subplots(
         1, len(budget.groups), figsize=(8.2, 0.6 + 0.24 * (len(lines) + 1)), sharey=True, squeeze=False
     )
-    names = [line.name for line in lines] + ["combined"]
+    names = [line.called for line in lines] + ["combined"]
     for axis, group in zip(axes[0], budget.groups, strict=True):
         values = [group.shown(line.peak[group.name]) for line in lines] + [group.shown(budget.peak(group))]
         axis.barh(range(len(names)), values, color=[COLOURS[0]] * len(lines) + [COLOURS[2]])

@@ -28,7 +28,9 @@ class ByGroup(Keys):
     )
     peak: float = Field(description="Largest standard uncertainty that it causes in a channel along the path.")
     rms: float = Field(description="Root mean square along the path, of the channel with the largest.")
-    combined_if_halved: float = Field(description="Largest combined standard uncertainty if its sd were half.")
+    combined_if_halved: float = Field(
+        description="Largest combined standard uncertainty if its sd and those of all ranks before were half."
+    )
     second_order: Number = Field(
         description="What the second order of its own adds at one standard deviation; null without draws."
     )
@@ -39,11 +41,13 @@ class ContributorEntry(Keys):
 
     rank: int = Field(description="1 for what to measure or tighten next.")
     name: str = Field(description="Path of the number, surroundings, or drive.gain, drive.converter and so on.")
+    called: str = Field(description="The same with the name, or kind, of its table where that stands in a list.")
     sd: str = Field(description="Stated standard deviation.")
     source: str = Field(description="Where it comes from.")
     per: str = Field(description="Step for which the sensitivity is given: 1 K, 1 %, 1 LSB.")
     share: float = Field(
-        description="Share of the variance at the largest combined uncertainty, of the group in which it counts most."
+        description="By how much the variance, its mean along the path over all channels of a group, falls without it; of the group "
+        "in which it counts most."
     )
     effects: list[ByGroup] = Field(description="One entry a group.")
 
