@@ -22,7 +22,8 @@ def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray,
             [
                 Fault(
                     "at",
-                    f"is not an equilibrium within the device's limits ({broken}); choose a reachable pose, such as delta_z=20um",
+                    f"is not an equilibrium within the device's limits ({broken}); choose a reachable pose, "
+                    "such as one that ctrlgen workspace finds",
                 )
             ],
         )
@@ -32,21 +33,39 @@ def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 def linearise(model: Model, pose: np.ndarray) -> control.StateSpace:
     """The state space dx' = A dx + B du, dpose = C dx + D du about the equilibrium at `pose` (n_components,), all SI.
 
-    The force balance g(x, z, u) = 0 is eliminated: dz = -g_z^-1 (g_x dx + g_u du). Inputs are the drives, states the
-    temperatures and the effects' states, outputs the pose components, each by its name. Raises InputError where `pose` is
-    no equilibrium within the device's limits.
+    Inputs are the drives, outputs the pose components, each by its name. Without inertia the states are the temperatures and the
+    effects' states, and the force balance g(x, z, u) = 0 is eliminated: dz = -g_z^-1 (g_x dx + g_u du). With inertia velocities and
+    displacements are states too, x' = f(x, z, u), z' = v; a feedback loop acts without the delay of its samples. Raises InputError
+    where `pose` is no equilibrium within the device's limits.
     """
     x, z, u = equilibrium(model, pose)
-    outputs = model.signals["pose"]
-    blocks = [
-        ca.jacobian(e, s) for e in (model.rates, model.balance, outputs.expr) for s in (model.x, model.z, model.u)
-    ]
-    function = ca.Function("jacobians", [model.x, model.z, model.u, model.p], blocks)
-    f_x, f_z, f_u, g_x, g_z, g_u, y_x, y_z, y_u = (b.full() for b in function(x, z, u, model.p_nominal))
-    z_x, z_u = -np.linalg.solve(g_z, g_x), -np.linalg.solve(g_z, g_u)
-    drive = model.signals["drive"]
-    return control.ss(
-        f_x + f_z @ z_x, f_u + f_z @ z_u, y_x + y_z @ z_x, y_u + y_z @ z_u,
-        states=list(model.x_names), inputs=[f"{drive.column}{c}" for c in drive.channels], outputs=list(outputs.channels),
-        name=model.name,
-    )  # fmt: skip
+    outputs, drive = model.signals["pose"], model.signals["drive"]
+    names = list(model.x_names)
+    if model.inertial:
+        state = ca.vertcat(model.x, model.z)
+        A, B, C, D = _slopes(
+            model, (model.closed(ca.vertcat(model.rates, model.v)), outputs.expr), (state, model.u), x, z, u
+        )
+        names += [f"displacement_{axis}" for axis in model.axes]
+    else:
+        f_x, f_z, f_u, g_x, g_z, g_u, y_x, y_z, y_u = _slopes(
+            model, (model.rates, model.balance, outputs.expr), (model.x, model.z, model.u), x, z, u
+        )
+        z_x, z_u = -np.linalg.solve(g_z, g_x), -np.linalg.solve(g_z, g_u)
+        A, B, C, D = f_x + f_z @ z_x, f_u + f_z @ z_u, y_x + y_z @ z_x, y_u + y_z @ z_u
+    inputs = [f"{drive.column}{c}" for c in drive.channels]
+    return control.ss(A, B, C, D, states=names, inputs=inputs, outputs=list(outputs.channels), name=model.name)
+
+
+def _slopes(
+    model: Model,
+    expressions: tuple[ca.SX, ...],
+    arguments: tuple[ca.SX, ...],
+    x: np.ndarray,
+    z: np.ndarray,
+    u: np.ndarray,
+) -> list[np.ndarray]:
+    """The derivatives of each expression by each argument at x, z, u, in the order of both."""
+    blocks = [ca.jacobian(model.closed(e), s) for e in expressions for s in arguments]
+    function = ca.Function("jacobians", [model.x, model.z, model.u, model.p, model.ambient_symbol], blocks)
+    return [block.full() for block in function(x, z, u, model.p_nominal, 0)]

@@ -38,6 +38,32 @@ class Ball:
     channels: tuple[int, ...]
 
 
+def translations(model: Model) -> tuple[int, ...]:
+    """The channels of the pose that are lengths."""
+    return tuple(i for i, unit in enumerate(model.signals["pose"].units) if same_dimension(unit, "m"))
+
+
+def middle_pose(model: Model) -> np.ndarray:
+    """(channels,) [SI] the middle one of the heights of a platform with three translations; else the pose at the middle of all drives.
+
+    Raises InputError where the drives have no bounds.
+    """
+    if len(translations(model)) >= 3:
+        return _raised(model, HEIGHTS[len(HEIGHTS) // 2])
+    low, high = model.u_bounds
+    if not np.isfinite(low + high).all():
+        what = "is needed, for some drive has no bounds and so no middle; give a pose"
+        raise InputError(model.name, [Fault("--at", what)])
+    return np.asarray(simulate(model, (low + high)[None] / 2, SETTLED).signals["pose"][-1])
+
+
+def _raised(model: Model, height: float) -> np.ndarray:
+    """The pose at a height [m] of the third translation."""
+    pose = np.zeros(len(model.signals["pose"].channels))
+    pose[translations(model)[2]] = height
+    return pose
+
+
 @dataclass(frozen=True)
 class Workspace:
     """The poses in which one model can be held in equilibrium; poses are rows (n, channels) in SI. Raises InputError for more drives
@@ -60,7 +86,7 @@ class Workspace:
     @property
     def translations(self) -> tuple[int, ...]:
         """The channels that are lengths."""
-        return tuple(i for i, unit in enumerate(self.model.signals["pose"].units) if same_dimension(unit, "m"))
+        return translations(self.model)
 
     def bases(self) -> list[np.ndarray]:
         """Poses through which slices are drawn by default: some heights, or the pose at the middle of all drives.
@@ -69,16 +95,8 @@ class Workspace:
         those halfway from it to both ends of the third channel. Raises InputError where the drives have no bounds.
         """
         if len(self.translations) >= 3:
-            poses = np.zeros((len(HEIGHTS), len(self.model.signals["pose"].channels)))
-            poses[:, self.translations[2]] = HEIGHTS
-            return list(poses)
-        low, high = self.model.u_bounds
-        if not np.isfinite(low + high).all():
-            raise InputError(
-                self.model.name,
-                [Fault("--at", "is needed, for some drive has no bounds and so no middle; give a pose")],
-            )
-        middle = simulate(self.model, (low + high)[None] / 2, SETTLED).signals["pose"][-1]
+            return [_raised(self.model, height) for height in HEIGHTS]
+        middle = middle_pose(self.model)
         if len(self.drawn) < 3:
             return [middle]
         up = self.drawn[2]

@@ -53,7 +53,13 @@ def _picture(option: str, path: Path) -> Path:
 def bode(
     device: DevicePath,
     picture: Annotated[Path, typer.Option("--out", help="The picture to write, .svg or .png.", show_default=False)],
-    at: Annotated[str, typer.Option(help="Pose to linearise at: channel=value, separated by commas.")] = "delta_z=20um",
+    at: Annotated[
+        str | None,
+        typer.Option(
+            help="Pose to linearise at: channel=value, separated by commas.",
+            show_default="20 um of the third translation; without one the middle of the drives",
+        ),
+    ] = None,
 ) -> None:
     """Draw the frequency response from every drive to the pose, linearised at a pose.
 
@@ -63,10 +69,11 @@ def bode(
     from ctrlgen.model.assembly import build_model
     from ctrlgen.reporting.bode import draw_bode
     from ctrlgen.trajectory.frame import Frame
+    from ctrlgen.trajectory.workspace import middle_pose
 
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
-    pose = Frame(signal_.channels, signal_.units).pose(at, "--at")
+    pose = middle_pose(model) if at is None else Frame(signal_.channels, signal_.units).pose(at, "--at")
     draw_bode(model, pose, _picture("--out", picture))
     out.print(str(picture), soft_wrap=True, markup=False)
 
