@@ -14,7 +14,7 @@ import pytest
 from command_line import ctrlgen
 from conftest import SCENARIOS
 
-from ctrlgen import Controller, InputError, build_model, calibrate, load_device
+from ctrlgen import Controller, InputError, build_model, calibrate, error_budget, load_device, load_scenario
 from ctrlgen.calibration.budgets import budgets
 from ctrlgen.calibration.calibrate import sd_of_bounds, with_held
 from ctrlgen.calibration.device_file import NAME, write_calibrated_device
@@ -122,9 +122,29 @@ def test_the_budget_of_a_path_falls_to_what_the_recording_leaves(specimen):
     before, after = budgets(specimen, SCENARIOS / "circle20", DEVICE)
     translation = before.groups[0]
     assert translation.unit == "nm"
-    assert after.peak(translation) < 0.3 * before.peak(translation)
+    taken = sum(
+        line.peak["translation"] ** 2
+        for line in before.lines
+        if line.name in {c.path for c in specimen.device.given_at_start}
+    )
+    left = np.sqrt(before.peak(translation) ** 2 - taken)  # of what others do; 5 %: the specimen's path is another one
+    assert after.peak(translation) == pytest.approx(left, rel=0.05) and left < before.peak(translation) / 2
+    own = next(line for line in before.lines if line.name == "actuator.thermal_resistance")
+    assert own.sd == "5 %"  # as uncertainty.toml beside the circle states
+    alone = error_budget(load_scenario(SCENARIOS / "circle20", DEVICE), draws=0)
+    assert before.peak(translation) == pytest.approx(alone.peak(translation), rel=1e-6)
+
+
+@pytest.mark.long
+def test_a_constant_of_which_nothing_is_stated_is_anything_within_its_bounds(specimen, tmp_path):
+    """And so is all else known exactly."""
+    text = (SCENARIOS / "circle20" / "scenario.toml").read_text().replace("../devices/mems_hexapod.toml", str(DEVICE))
+    (tmp_path / "scenario.toml").write_text(text)
+    before, after = budgets(specimen, tmp_path, DEVICE)
     own = next(line for line in before.lines if line.name == "actuator.thermal_resistance")
     assert own.sd == f"{200 / np.sqrt(12):.3g} K/W"  # uniform between 450 and 650 K/W, GUM 4.3.7
+    assert {line.name for line in before.lines} == {c.path for c in specimen.device.given_at_start}
+    assert after.peak(before.groups[0]) < 0.01 * before.peak(before.groups[0])
 
 
 @pytest.mark.long

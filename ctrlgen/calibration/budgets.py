@@ -1,4 +1,5 @@
-"""What a calibration does to the error budget of a path: the constants known by their bounds alone, and then by the recording."""
+"""What a calibration does to the error budget of a path: the constants as uncertain as is stated, or within their bounds, and then known
+by the recording."""
 
 from __future__ import annotations
 
@@ -17,21 +18,26 @@ from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import solve
 
+BOUNDS = "bounds of [run_time], uniform between them"
+
 
 def budgets(
     calibration: Calibration, scenario: Path | str, device: Path | str, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[ErrorBudget, ErrorBudget]:
-    """The first-order error budgets of a path before and after. What uncertainty.toml beside the scenario states of other numbers
-    counts in both. Raises InputError, Unreachable, SolverError."""
+    """The first-order error budgets of a path before and after. Before, a constant is as uncertain as uncertainty.toml beside the scenario
+    or the device file states, else uniform between its bounds. What they state of other numbers counts in both. Raises InputError,
+    Unreachable, SolverError."""
     read = load_scenario(scenario, device)
     model = model_of(read)
-    others = load_uncertainties(read, model) if (read.path.parent / FILE).is_file() else None
+    states = (read.path.parent / FILE).is_file() or any(number.sd for _, number in model.device.quantities())
+    stated = load_uncertainties(read, model) if states else None
     constants = calibration.device.given_at_start
-    wide = np.diag([sd_of_bounds(c) ** 2 for c in constants])
-    told = "bounds of [run_time], uniform between them"
-    before = _budget(read, calibration.device, _stated(others, constants, wide, [told] * len(constants)), progress)
-    sources = ["calibration" if row.determined else told for row in calibration.constants]
-    after = _budget(read, calibration.calibrated, _stated(others, constants, calibration.covariance, sources), progress)
+    known = {path for line in (stated.lines if stated else ()) for path in line.paths}
+    unknown = tuple(c for c in constants if c.path not in known)
+    wide = np.diag([sd_of_bounds(c) ** 2 for c in unknown])
+    before = _budget(read, calibration.device, _joined(stated, unknown, wide, [BOUNDS] * len(unknown)), progress)
+    sources = ["calibration" if row.determined else BOUNDS for row in calibration.constants]
+    after = _budget(read, calibration.calibrated, _joined(stated, constants, calibration.covariance, sources), progress)
     return before, after
 
 
@@ -41,10 +47,12 @@ def _budget(scenario: Scenario, device: Device, stated: Uncertainties, progress:
     return budget_of(solve(own, model, progress), stated, draws=0, progress=progress)
 
 
-def _stated(
+def _joined(
     others: Uncertainties | None, constants: tuple[RunTimeConstant, ...], covariance: np.ndarray, sources: list[str]
 ) -> Uncertainties:
-    """The constants with this covariance, and what is stated of other numbers."""
+    """These constants with their covariance, and what is stated of other numbers."""
+    if not constants and others is not None:
+        return others
     paths, sds = {c.path for c in constants}, np.sqrt(np.diag(covariance))
     lines = [
         Uncertain(c.path, "number", (c.path,), (float(sd),), _shown(c, float(sd)), source, _step(c))
