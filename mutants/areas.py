@@ -15,6 +15,14 @@ AREAS: dict[str, tuple[str, ...]] = {  # globs below the root of the tree
         "ctrlgen/diagnosis/settings/selection.py",
     ),
     "firmware": ("ctrlgen/firmware/*.py",),
+    "accuracy": (
+        "ctrlgen/budget/*.py",
+        "ctrlgen/calibration/*.py",
+        "ctrlgen/learning/*.py",
+        "ctrlgen/path_timing/*.py",
+    ),
+    "trajectory": ("ctrlgen/trajectory/*.py",),
+    "devices": ("ctrlgen/devices/*.py",),
 }
 
 

@@ -16,10 +16,12 @@ from conftest import SCENARIOS
 
 from ctrlgen import Controller, InputError, build_model, calibrate, error_budget, load_device, load_scenario
 from ctrlgen.calibration.budgets import budgets
-from ctrlgen.calibration.calibrate import sd_of_bounds, with_held
+from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, sd_of_bounds, with_held
 from ctrlgen.calibration.device_file import NAME, write_calibrated_device
 from ctrlgen.core.units import to_si
+from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.model.simulation import trace
+from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.reporting.calibration_page import write_calibration
 
 DEVICE = SCENARIOS / "devices" / "mems_hexapod_run_time.toml"
@@ -115,6 +117,68 @@ def test_constants_fitted_beside_a_held_one_deviate_with_it_as_stated(rng, sprea
     sds = np.sqrt(np.diag(stated))
     assert (deviation / sds).std(axis=0) == pytest.approx([1, 1, 1], abs=0.03)
     assert np.corrcoef(deviation.T) == pytest.approx(stated / np.outer(sds, sds), abs=0.03)
+
+
+def test_of_a_constant_the_bounds_tell_what_any_number_between_them_tells(rng):
+    """450 to 650 K/W and nothing else known: the scatter of 100,000 numbers that are as likely everywhere between, known to 0.2 %."""
+    between = rng.uniform(450, 650, 100_000)
+    assert sd_of_bounds(constant()) == pytest.approx(between.std(), rel=0.01)
+
+
+def constant(path="actuator.thermal_resistance", low=450.0, high=650.0, unit="K/W") -> RunTimeConstant:
+    return RunTimeConstant(path, "R", (low + high) / 2, low, high, unit)
+
+
+def test_an_interval_holds_nineteen_of_twenty_normal_numbers_and_ends_at_the_bounds(rng):
+    """100,000 numbers tell 95 % to 0.07 %; beyond 650 K/W no specimen is accepted, and where nothing is told the bounds are all."""
+    low, high = CalibratedConstant(constant(), 560.0, 10.0, True).interval
+    assert np.mean((rng.normal(560, 10, 100_000) > low) & (rng.normal(560, 10, 100_000) < high)) == pytest.approx(
+        0.95, abs=0.004
+    )
+    assert CalibratedConstant(constant(), 640.0, 10.0, True).interval == pytest.approx((620.4, 650.0), abs=0.01)
+    assert CalibratedConstant(constant(), 460.0, 10.0, True).interval == pytest.approx((450.0, 479.6), abs=0.01)
+    assert CalibratedConstant(constant(), 550.0, 10.0, False).interval == (450.0, 650.0)
+
+
+def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the_path_states(tmp_path):
+    """A fit that knows R_th and tau to 2 K/W and 50 us with the coefficient -0.8. Of uncertainty.toml the constants' own lines count no
+    more, and a pair that is correlated there stays so; what is seen of each pair is the sum of squares with a mixed term."""
+    lines = {"actuator.thermal_resistance": "5 %", "actuator.beam_width": "0.2 um", "stage.lever_long": "0.2 um"}
+    (tmp_path / "scenario.toml").write_text(
+        (SCENARIOS / "circle20" / "scenario.toml").read_text().partition("[[expect]]")[0].replace('"1 kHz"', '"100 Hz"')
+    )
+    (tmp_path / "uncertainty.toml").write_text(
+        'title = "u"\n[numbers]\n' + "".join(f'"{name}" = {{ sd = "{sd}", source = "s" }}\n' for name, sd in lines.items())
+        + '[[correlation]]\nbetween = ["actuator.beam_width", "stage.lever_long"]\ncoefficient = 0.5\nsource = "s"\n'
+    )  # fmt: skip
+    text = DEVICE.read_text().replace('input = "actuator.ambient"', "")
+    ambient = '    { number = "actuator.ambient", low = "10 degC", high = "40 degC" },\n'
+    (tmp_path / "device.toml").write_text(text.replace(ambient, ""))
+    device = load_device(tmp_path / "device.toml")
+    sds = {"actuator.thermal_resistance": 2.0, "actuator.time_constant": 50e-6}
+    rows = tuple(CalibratedConstant(c, c.default, sds[c.path], True) for c in device.given_at_start)
+    each = np.array([row.sd for row in rows])
+    covariance = np.outer(each, each) * np.array([[1, -0.8], [-0.8, 1]])
+    recording = load_recordings([RECORDING], build_model(device))
+    made = Calibration(device, {}, recording, rows, covariance, (), ())
+    before, after = budgets(made, tmp_path, tmp_path / "device.toml")
+    found = after.uncertainties
+    names = [line.name for line in found.lines]
+    assert sorted(names) == sorted([*sds, "actuator.beam_width", "stage.lever_long"])
+    at = {name: names.index(name) for name in names}
+    R, tau = at["actuator.thermal_resistance"], at["actuator.time_constant"]
+    edge, lever = at["actuator.beam_width"], at["stage.lever_long"]
+    expected = np.eye(4)
+    expected[R, tau] = expected[tau, R] = -0.8
+    expected[edge, lever] = expected[lever, edge] = 0.5
+    assert found.correlation == pytest.approx(expected)
+    seen = [after.linear.sensitivity["pose"][:, :, i] * found.sds[i] for i in range(4)]
+    variance = (
+        seen[R] ** 2 + seen[tau] ** 2 - 1.6 * seen[R] * seen[tau] + seen[edge] ** 2 + seen[lever] ** 2 + seen[edge] * seen[lever]
+    )  # fmt: skip
+    assert after.combined**2 == pytest.approx(variance, rel=1e-6, abs=1e-9 * variance.max())
+    wide = dict(zip([line.name for line in before.uncertainties.lines], before.uncertainties.sds, strict=True))
+    assert wide["actuator.thermal_resistance"] == pytest.approx(57.735, rel=1e-4)  # 200 K/W over the root of 12
 
 
 @pytest.mark.long

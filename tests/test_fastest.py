@@ -428,6 +428,23 @@ def test_a_path_that_cannot_even_be_held_is_explained(tmp_path):
         ctrlgen.fastest(scenario)
 
 
+def test_a_circle_of_two_axes_of_unlike_size_is_divided_evenly(tmp_path):
+    """Sizes of 30 and 300 um: equal steps along the circle are equal angles, as lengths of one kind count alike. 1e-6: its length is summed
+    over 4000 chords."""
+    device = stage(both(RATE), axes={"x": ("-1 um", "30 um"), "y": ("-10 um", "300 um")})
+    share = Curve(written(tmp_path, device, ROUND), build_model(device)).evenly(36)
+    assert share == pytest.approx(np.linspace(0, 1, 37), abs=1e-6)
+
+
+def test_an_open_motion_lasts_from_its_first_sample_to_its_last_and_a_closed_one_a_period(tmp_path):
+    """1000 samples of 50 us: 999 steps of a line, which stands at its first sample at the time zero; of a circle the last leads back."""
+    for path, steps in ((STRAIGHT, 999), (ROUND, 1000)):
+        scenario = written(tmp_path, stage(both(RATE)), path)
+        assert len(scenario.command(build_model(scenario.device))) == 1000
+        found = ctrlgen.fastest(scenario)
+        assert found.given == pytest.approx(steps * 50e-6)
+
+
 def test_a_scaled_curve_keeps_its_middle():
     scenario = load_scenario(SCENARIOS / "circle20")
     half = Curve(scenario, build_model(scenario.device)).scaled(0.5)

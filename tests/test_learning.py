@@ -20,8 +20,8 @@ from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import STEP_WEIGHT, Wanted, drive_scale, linear_programme, next_drives
 from ctrlgen.learning.repeatability import Spectrum
-from ctrlgen.learning.response import regressed
-from ctrlgen.learning.runs import first_differs
+from ctrlgen.learning.response import Change, regressed, response
+from ctrlgen.learning.runs import Run, errors, first_differs
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.violations import violations
 
@@ -226,6 +226,16 @@ def test_noise_of_one_repetition_is_read_off_its_highest_frequencies(rng):
     assert found.se == pytest.approx(3, rel=0.15)  # the median of 500
 
 
+def test_readings_at_a_quarter_of_the_samples_leave_twice_the_stated_noise_in_what_they_can_show(rng):
+    """Noise of 3 at every fourth sample and straight lines between: the slowest twenty coefficients of 400 runs, which these lines keep."""
+    spectrum, k, share = Spectrum(1000, True), np.arange(1000), np.full(1, 0.25)
+    runs = [np.interp(k, k[::4], 3 * rng.standard_normal(250), period=1000)[:, None] for _ in range(400)]
+    scatter = np.std([spectrum.coefficients(run)[:20] for run in runs])
+    found = spectrum.repeated(runs[0][None], np.array([3.0]), share)
+    assert found.se[:20] == pytest.approx(scatter, rel=0.03)  # 8000 numbers: 0.8 %
+    assert not found.se[300:].any() and not found.mean[300:].any()  # above a quarter the lines make images
+
+
 @pytest.mark.parametrize(("repetitions", "motion"), [(2, 0.0), (5, 0.2), (5, 2.0)])
 def test_what_repeats_scatters_about_the_truth_as_stated(repetitions, motion, rng):
     """The sum of squares of a motion in noise, 400 times: no bias beyond what 400 tell, and the stated standard deviation, which 400 tell
@@ -252,6 +262,39 @@ def test_noise_passes_the_shrinkage_as_rarely_however_few_repetitions_there_are(
     mean = found.mean.copy()
     mean[1] = 30 * found.se[1, 0]
     assert spectrum.shrinkage(mean, found.se, np.inf)[1] > 0.95
+
+
+def plate(folder: Path) -> Lifted:
+    """Two drives on two axes in balance, x = a + 0.5 b and y = b in um for V, at 600 separate positions."""
+    device = user_device(
+        "plate", parameters={"k": "1 N/um", "g": "1 N/V"}, drive={"a": "100 V", "b": "100 V"}, axes={"x": "100 um", "y": "100 um"},
+        force=lambda u, p: [p.g * (u.a + 0.5 * u.b), p.g * u.b], restoring_force=lambda d, p: p.k * d.vector,
+    )  # fmt: skip
+    points = ", ".join(f'{{ x = "{k % 7} um", y = "{k % 5} um" }}' for k in range(600))
+    (folder / "scenario.toml").write_text(
+        f'title = "t"\ndevice = "plate"\n[path]\nkind = "poses"\npoints = [{points}]\n'
+    )
+    return Lifted(solve(load_scenario(folder, device), build_model(device)))
+
+
+def test_what_a_device_leaves_unexplained_is_its_share_without_the_noise(tmp_path, rng):
+    """A device that answers with 0.7 of what is described leaves 0.3^2/0.7^2 of the squares of what was seen, with next to no noise and
+    with two thirds as much of it, from which 1200 numbers tell it to 0.03."""
+    lifted = plate(tmp_path)
+    u = lifted.solution.drive
+    then = u + rng.standard_normal(u.shape)
+    moved = lifted.run(then) - lifted.run(u)
+    for noise, known in ((1e-9, 1e-3), (0.6e-6, 0.1)):
+        y = 0.7 * moved + noise * rng.standard_normal(moved.shape)
+        found = response(lifted, [Change(u, then, y, np.full(2, noise), np.ones(2, bool))])
+        assert found.unexplained == pytest.approx(0.09 / 0.49, abs=known)
+
+
+def test_a_drive_counts_by_what_it_moves_at_rest(tmp_path):
+    """x = a + 0.5 b, y = b [um/V] in sizes of 10 and 20 um: a volt of a is 1/10, of b hypot(0.5/10, 1/20)."""
+    lifted = plate(tmp_path)
+    found = drive_scale(lifted.linearise(lifted.solution.drive), np.array([1 / 10e-6, 1 / 20e-6]))
+    assert found == pytest.approx([10.0, 1 / np.hypot(0.05, 0.05)], rel=1e-6)
 
 
 def test_gains_scatter_as_stated_where_residuals_are_correlated(rng):
@@ -366,6 +409,7 @@ def test_an_actuator_that_answers_otherwise_is_named_once_a_second_run_shows_it(
     ("changes", "says"),
     [
         ({"rate": 150.0}, "the path runs at 200 Hz"),
+        ({"rate": 200.2}, "the path runs at 200 Hz"),  # a fifth of a sample off at the end
         ({"length_unit": "um"}, "moves by 1e-06 of what is commanded"),
         ({"length_unit": "km"}, "check the column, its unit"),
         ({"drive_unit": "mW"}, "have other units"),
@@ -379,6 +423,27 @@ def test_a_recording_that_is_not_of_the_path_is_refused(hundred, tmp_path, chang
     bench = Bench(hundred, tmp_path)
     bench.run(hundred.drive, **changes)
     assert any(says in fault for fault in refused(lambda: learn(hundred.scenario, bench.runs)))
+
+
+def test_a_gap_that_goes_on_at_the_beginning_of_the_period_is_one_gap(hundred, tmp_path):
+    """15 samples at the end and 15 at the beginning of each period are 30 in a row, of 200: a tenth can be bridged."""
+    n = len(hundred.drive)
+    y = np.tile(hundred.command, (3, 1))
+    y[(np.arange(3 * n) + 15) % n < 30] = np.nan
+    write(tmp_path / "run", hundred, np.tile(hundred.drive, (3, 1)), y)
+    assert any(
+        "was not read for 31 samples in a row" in fault
+        for fault in refused(lambda: learn(hundred.scenario, tmp_path / "run"))
+    )
+
+
+def test_between_the_last_reading_and_the_first_of_the_next_period_an_error_is_a_straight_line(small):
+    """1 nm at sample 37 and 6 nm at sample 42 = 2 of the next period: 2, 3, 4, 5 nm at 38, 39, 0, 1."""
+    y = small.command.copy()
+    y[[38, 39, 0, 1]] = np.nan
+    y[37], y[2] = small.command[37] + 1e-9, small.command[2] + 6e-9
+    e, share = errors(Run(("one",), small.drive, y[None]), Lifted(small))
+    assert e[0, [37, 38, 39, 0, 1, 2], 3] == pytest.approx(1e-9 * np.arange(1, 7)) and share[3] == pytest.approx(0.9)
 
 
 def test_drives_that_do_not_repeat_are_refused(hundred, tmp_path):

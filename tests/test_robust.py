@@ -134,6 +134,23 @@ def test_a_path_that_may_be_moved_is_where_the_error_is_least(tmp_path):
     assert found.command[:, 0] == pytest.approx(np.array([30e-6, 31e-6]) + found.scenario.home["x"])
 
 
+def test_no_bound_is_moved_past_what_the_path_itself_needs(tmp_path):
+    """x = 40 um + g u/k with g known to 37 %: at 0 um, far from where the drive is zero, 45.7 of the 50 um to the end are taken, at 41 um
+    1.1 um of 9. The controller's bound comes down to 41 um, where the path goes, not to 4.3 um."""
+    device = ctrlgen.user_device(
+        "axis", parameters={"g": "0.2 N/V", "k": "1 N/um", "rest": "40 um"}, drive={"a": "1000 V"}, axes={"x": "50 um"},
+        force=lambda u, p: [p.g * u.a], restoring_force=lambda d, p: [p.k * (d.x - p.rest)],
+    )  # fmt: skip
+    scenario = along(tmp_path, [0.0, 41.0], device)
+    (tmp_path / "uncertainty.toml").write_text(
+        'title = "u"\n[numbers]\n"mechanism.g" = { sd = "37 %", source = "chosen" }\n'
+    )
+    found = solve(scenario, build_model(device))
+    (stroke,) = (limit for limit in found.model.limits if limit.name == "travel_x")
+    assert stroke.upper == pytest.approx(41e-6, abs=1e-9) and stroke.reserve[1] == pytest.approx(9e-6, abs=1e-9)
+    assert min(margin.distance for margin in found.margins) > -1e-12
+
+
 def test_all_limits_together_have_the_probability(tmp_path):
     """Four axes of one risk each share it: 1 - p = 4 (1 - Phi(beta))."""
     device = ctrlgen.user_device(

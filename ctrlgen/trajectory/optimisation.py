@@ -120,7 +120,7 @@ class TrajectoryProgramme:
             settled = ca.Function("settled", [m.x, m.z, m.u, m.p], [m.starting])(
                 X[:, 0] * m.x_scale + m.rest, Z[:, 0] * m.z_scale, u_start * m.u_scale, ca.DM(m.p_nominal)
             )
-            extra_rows = [settled / m.x_scale, x_end[: m.n_states] - X[: m.n_states, -1]]
+            extra_rows = [settled / m.x_scale, x_end[: m.n_states, 0] - X[: m.n_states, -1]]
             (xl, xh), (ul, uh) = self._bounds("x"), self._bounds("u")
             extra_low, extra_high = [ul, xl], [uh, xh]
         command = self.command / self.signal.scale
