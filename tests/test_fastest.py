@@ -22,6 +22,7 @@ from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
 from ctrlgen.path_timing.optimum import Optimiser, Optimum, Piece
 from ctrlgen.path_timing.repetition import crossing, largest
+from ctrlgen.path_timing.speed_bound import steps_in_time
 from ctrlgen.reporting.fastest_page import write_fastest
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.paths import Poses
@@ -290,6 +291,20 @@ def test_a_lag_under_a_rate_of_its_drive_takes_two_ramps(tmp_path):
     assert found.optimum.duration == pytest.approx(2 * t1 - swing / RATE, rel=1e-2)
 
 
+def test_a_lag_alone_takes_a_logarithm(tmp_path):
+    """From 25 to 75 V behind an amplifier of 1 ms at its 150 V: tau ln((150 - 25)/(150 - 75)). 1e-4: trapezia over some hundred places."""
+    found = ctrlgen.fastest(written(tmp_path, lagging(None), STRAIGHT, rate="200 kHz"))
+    assert found.optimum.duration == pytest.approx(1e-3 * np.log(125 / 75), rel=1e-4)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_at_even_speed_every_sample_leads_as_far_also_beyond_the_end(closed):
+    """Half a second for the path, 0.1 s a sample: a fifth of it, from its last place too."""
+    share = np.linspace(0, 1, 11)
+    steps = steps_in_time(share, share / 2, np.full(11, 2.0), 0.1, closed)
+    assert steps == pytest.approx(np.full(11, 0.2))
+
+
 def test_a_rate_that_never_binds_leaves_what_each_place_allows(tmp_path):
     """IPOPT over the whole path against the bound of each place: 0.5 %, of 216 intervals."""
     free = ctrlgen.fastest(written(tmp_path, lagging(None), ROUND))
@@ -429,9 +444,9 @@ def test_a_path_that_cannot_even_be_held_is_explained(tmp_path):
 
 
 def test_a_circle_of_two_axes_of_unlike_size_is_divided_evenly(tmp_path):
-    """Sizes of 30 and 300 um: equal steps along the circle are equal angles, as lengths of one kind count alike. 1e-6: its length is summed
-    over 4000 chords."""
-    device = stage(both(RATE), axes={"x": ("-1 um", "30 um"), "y": ("-10 um", "300 um")})
+    """Sizes of 30 um and 0.3 mm: equal steps along the circle are equal angles, as lengths of one kind count alike. 1e-6: its length is
+    summed over 4000 chords."""
+    device = stage(both(RATE), axes={"x": ("-1 um", "30 um"), "y": ("-0.01 mm", "0.3 mm")})
     share = Curve(written(tmp_path, device, ROUND), build_model(device)).evenly(36)
     assert share == pytest.approx(np.linspace(0, 1, 37), abs=1e-6)
 

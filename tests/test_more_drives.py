@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from scipy.optimize import linprog, nnls
+from scipy.optimize import linprog, minimize, nnls
 from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forces, heavy, loaded, reference, stage
 
-from ctrlgen import InputError, Unreachable, build_model, solve
+from ctrlgen import InputError, Unreachable, build_model, solve, user_device
 from ctrlgen.model.feedforward import Controller, ControllerStatus
 from ctrlgen.trajectory.drive_programmes import diagonal, least_worst, limited_rows
 from ctrlgen.trajectory.least_effort import motion_inverse, path_inverse
@@ -60,6 +60,22 @@ def test_what_can_be_followed_is_what_a_linear_programme_says(tmp_path):
     assert set(said) == {True, False}
 
 
+def test_with_a_margin_the_drives_stay_as_far_inside_of_their_ranges(tmp_path):
+    """A linear programme with each range narrowed by a tenth of itself at either end, for circles that it takes or not."""
+    said, wanted = [], []
+    for size, x, y in [(d, x, y) for d in (10, 20, 30, 46) for x in (0, 10) for y in (-10, 0, 10)]:
+        scenario, model = loaded(tmp_path, stage(), circle(size, x, y))
+        samples = scenario.command(model)
+        inverse = path_inverse(model, "pose", scenario.sample_time)
+        said.append([inverse.keeps_limits(samples, True, margin=margin) for margin in (0.0, 0.1)])
+        box = [list(zip(LOW + m * RANGE, HIGH - m * RANGE, strict=True)) for m in (0.0, 0.1)]
+        wanted.append(
+            [all(linprog(np.zeros(3), A_eq=B, b_eq=f, bounds=b).status == 0 for f in forces(samples)) for b in box]
+        )
+    assert said == wanted
+    assert {tuple(both) for both in wanted} == {(True, True), (True, False), (False, False)}
+
+
 def test_what_cannot_be_followed_is_explained_and_the_alternatives_can(tmp_path):
     scenario, model = loaded(tmp_path, stage(), circle(60))
     with pytest.raises(Unreachable, match=r"drive of \w .*would have to be .* V") as caught:
@@ -77,6 +93,27 @@ def test_equilibria_too_have_the_least_effort(tmp_path):
     solution = solve(*loaded(tmp_path, stage(), poses, ""))
     for u, f in zip(solution.drive, forces(solution.command), strict=True):
         assert np.allclose(u, reference(f, np.ones(3)), rtol=0, atol=1e-3)
+
+
+def test_where_a_rate_is_limited_the_drives_are_still_the_least_by_their_weights(tmp_path):
+    """Two stacks push one axis, a + b = f in N; b costs four times as much,
+    a changes by 3.5 N a sample at most: scipy's SLSQP over all samples."""
+    device = user_device(
+        "two", parameters={"k": "1 N/um"}, drive={"a": "100 N", "b": "100 N"}, axes={"x": "50 um"}, drive_rate={"a": "350 N/s"},
+        drive_weight={"b": 4.0}, force=lambda u: [u.a + u.b], restoring_force=lambda d, p: p.k * d.vector,
+    )  # fmt: skip
+    f = 10 * np.sin(2 * np.pi * np.arange(12) / 12)
+    points = ", ".join(f'{{ x = "{float(v)!r} um" }}' for v in f)
+    found = solve(
+        *loaded(tmp_path, device, f'kind = "poses"\nperiodic = true\npoints = [{points}]\n', 'sample_rate = "100 Hz"\n')
+    )
+    held = np.roll(f, -1)
+    best = minimize(
+        lambda a: np.sum(a**2 + 4 * (held - a) ** 2), 0.0 * f, method="SLSQP", options={"ftol": 1e-14},
+        constraints=[{"type": "ineq", "fun": lambda a, s=s: 3.5 - s * (a - np.roll(a, 1))} for s in (1, -1)],
+    ).x  # fmt: skip
+    assert found.drive[:, 0] == pytest.approx(best, abs=1e-3)  # N, of 8: where SLSQP ends
+    assert 0.1 < np.abs(0.8 * held - best).max() < 1  # else nothing is tested
 
 
 def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 import ctrlgen
 from ctrlgen import Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
-from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
+from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, primary
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 from ctrlgen.trajectory.path_inverse import PathInverse
 from ctrlgen.trajectory.violations import violations
@@ -247,3 +247,80 @@ def test_memories_are_carried_until_a_closed_path_repeats_or_is_seen_not_to(tmp_
     assert needed.solved and needed.exact is settles
     solution = solve(scenario, model)
     assert np.abs(needed.z - solution.trace.z).max() < (1e-12 if settles else 3 * needed.unsettled * 1e-5)
+
+
+def pair(folder, points, timing="", more="", **words):
+    """Two axes in balance with a stiffness of 1 N/um, along listed points."""
+    given = dict(
+        parameters={"k": "1 N/um"}, drive={"a": "200 N", "b": "200 N"}, axes={"x": ("-10 um", "50 um"), "y": ("-50 um", "50 um")},
+        force=lambda u: u.vector, restoring_force=lambda d, p: p.k * d.vector,
+    )  # fmt: skip
+    device = ctrlgen.user_device("pair", **(given | words))
+    listed = ", ".join(f'{{ x = "{float(x)!r} um", y = "{float(y)!r} um" }}' for x, y in points)
+    (folder / "scenario.toml").write_text(
+        f'title = "t"\ndevice = "pair"\n{timing}[path]\nkind = "poses"\n{more}points = [{listed}]\n'
+    )
+    return load_scenario(folder, device), build_model(device)
+
+
+def test_a_smaller_path_keeps_the_middle_between_its_ends_wherever_most_of_its_samples_are(tmp_path):
+    """0 um for five samples and 60 um for one, of 50 um at most: about 30 um two thirds fit, from 10 to 50 um. The search ends within a
+    five-hundredth of the way to a thousandth on a logarithmic scale, 1.4 %."""
+    scenario, model = pair(tmp_path, [(0, 0)] * 5 + [(60, 0)])
+    with pytest.raises(Unreachable) as caught:
+        solve(scenario, model)
+    ((what, smaller),) = ((w, c) for w, c in caught.value.infeasibility.alternatives.items() if "scaled" in w)
+    assert "about its middle" in what and (smaller[0, 0] + smaller[-1, 0]) / 2 == pytest.approx(30e-6)
+    assert 0.986 * 2 / 3 < np.ptp(smaller[:, 0]) / 60e-6 <= 2 / 3
+
+
+def test_of_the_ways_into_range_the_shortest_is_offered(tmp_path):
+    """The first actuator stands at x + y/2: from 60 um it is brought to 50 um by 10 um of x or 20 um of y. A ten-thousandth of its range
+    inside are 10.006 um, of which three digits, rounded so that they suffice, are 10.1."""
+    scenario, model = pair(
+        tmp_path, [(55, 0), (60, 0)], reading={"x": "50 um", "y": "50 um"}, pose=lambda d: [d.x - 0.5 * d.y, d.y]
+    )
+    with pytest.raises(Unreachable) as caught:
+        solve(scenario, model)
+    (shifted,) = (c for w, c in caught.value.infeasibility.alternatives.items() if "shifted" in w)
+    assert shifted - scenario.command(model) == pytest.approx(np.tile([-10.1e-6, 0], (2, 1)))
+
+
+def test_what_memories_may_still_change_is_the_sum_of_what_all_further_periods_bring(tmp_path):
+    """A state that forgets with 0.4 s along a path of 0.8 s: what the third period begins with is off where it ends by some length,
+    of which e^-2 is left when that period is over. 3 %: a faster state, of which e^-10 is left after a period, shrinks otherwise."""
+    creep = {"kind": "creep", "at": "x", "gain": "20 %", "tau": "0.1 s", "slow": "0 %"}
+    points = [(10 + 10 * np.cos(t), 0) for t in 2 * np.pi * np.arange(20) / 20]
+    scenario, model = pair(tmp_path, points, 'sample_rate = "25 Hz"\n', "periodic = true\n", effect=[creep])
+    inverse, command = PathInverse(model, "pose", scenario.sample_time), scenario.command(model)
+    begun, last = (inverse.trajectory(command, True, periods) for periods in (3, 400))
+    off = np.abs(begun.x[0] - last.x[0]) / model.x_scale
+    assert last.exact and not begun.exact
+    assert begun.unsettled == pytest.approx(off.max() * np.exp(-2), rel=0.03)
+
+
+def test_a_margin_is_a_share_of_the_range_of_a_limit(tmp_path):
+    """-10 to 50 um: 3 um, a twentieth, are to be left at either end."""
+    _, model = pair(tmp_path, [(0, 0)])
+    for x, missing in ((46.9e-6, 0.0), (48e-6, 1e-6), (-6.9e-6, 0.0), (-8e-6, 1e-6)):
+        z = np.array([[x, 0.0]])
+        broken = violations(model, np.zeros((1, 0)), z, 1e6 * z, 0.05)
+        assert [v.limit.channels[v.channel] for v in broken] == ["x"] * (missing > 0)
+        if broken:
+            assert broken[0].beyond == pytest.approx([missing]) and broken[0].share == pytest.approx(missing / 60e-6)
+            assert broken[0].bound == pytest.approx(47e-6 if x > 0 else -7e-6)
+
+
+def test_of_a_jump_beyond_the_stroke_the_stroke_alone_is_the_cause(tmp_path):
+    """10, 10, 60, 60, 10 um of 50, with 55 N at most for 1 N/um: the drive that leads out of range is broken one sample earlier, and is no
+    cause of its own; that of y, which is in range where its own drive does not reach, is one."""
+    timing = 'sample_rate = "100 Hz"\n'
+    for y, causes in ((0, {"x"}), (48, {"x", "b"})):
+        scenario, model = pair(
+            tmp_path, [(10, 0), (10, 0), (60, 0), (60, 0), (10, 0), (10, 0), (10, 0), (10, y), (10, y)], timing,
+            drive={"a": "55 N", "b": "45 N"},
+        )  # fmt: skip
+        needed = PathInverse(model, "pose", scenario.sample_time).trajectory(scenario.command(model), False)
+        broken = needed.violations(model, scenario.sample_time, False)
+        assert "a" in {v.limit.channels[v.channel] for v in broken}
+        assert {v.limit.channels[v.channel] for v in primary(model, broken)} == causes

@@ -3,8 +3,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from conftest import DEVICES
 
-from ctrlgen import InputError
+from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.model.feedforward import Controller
 from ctrlgen.trajectory.workspace import Workspace
 
@@ -121,3 +122,17 @@ def test_table_3_lies_inside_and_the_unreachable_pose_outside(workspace):
             pose[(None, 3, 4, 0, 1, 2)[k]] = (None, -10 * UM, -10 * UM, -4e-3, -4e-3, -4e-3)[k]
         assert workspace.holds(pose)
     assert not workspace.holds(np.array([0, 0, 0, 10 * UM, 0, 0]))
+
+
+def test_without_a_third_translation_slices_are_at_the_middle_of_the_drives_and_halfway_up_and_down():
+    """A planar stage: from where all drives are at half their range, half of what it can turn either way."""
+    model = build_model(load_device(DEVICES / "rrr_case2.toml"))
+    workspace = Workspace(model)
+    below, middle, above = workspace.bases()
+    turned = model.signals["pose"].channels.index("theta_z")
+    z = np.array(simulate(model, np.array([np.mean(model.u_bounds, axis=0)]), 1e6).signals["pose"][-1])
+    assert middle == pytest.approx(z, abs=1e-12)
+    way = np.eye(3)[turned]
+    down, up = workspace.reach(middle, np.vstack([-way, way]))
+    assert below - middle == pytest.approx(-0.5 * down * way, abs=1e-15)
+    assert above - middle == pytest.approx(0.5 * up * way, abs=1e-15)
