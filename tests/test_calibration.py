@@ -179,7 +179,9 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
     assert after.combined**2 == pytest.approx(variance, rel=1e-6, abs=1e-9 * variance.max())
     wide = dict(zip([line.name for line in before.uncertainties.lines], before.uncertainties.sds, strict=True))
     assert wide["actuator.thermal_resistance"] == pytest.approx(27.5, rel=1e-9)  # 5 % of 550 K/W, as stated
-    assert wide["actuator.time_constant"] == pytest.approx(1.01036e-3, rel=1e-4)  # not stated: 3.5 ms of bounds over the root of 12
+    assert wide["actuator.time_constant"] == pytest.approx(
+        1.01036e-3, rel=1e-4
+    )  # not stated: 3.5 ms of bounds over the root of 12
 
 
 @pytest.mark.long
