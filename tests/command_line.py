@@ -10,6 +10,12 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+WORK = (  # what the commands import when they do it
+    "ctrlgen.app.batch", "ctrlgen.app.check", "ctrlgen.app.pipeline", "ctrlgen.calibration.budgets", "ctrlgen.diagnosis.pipeline",
+    "ctrlgen.learning.learn", "ctrlgen.path_timing.fastest", "ctrlgen.reporting.budget_page", "ctrlgen.reporting.calibration_page",
+    "ctrlgen.reporting.fastest_page", "ctrlgen.reporting.learning_page",
+)  # fmt: skip
+
 
 def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[str]:
     """`python -m ctrlgen WORDS` with what it prints and its status; `environment` is added to that of the tests."""
@@ -26,7 +32,7 @@ def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[s
 def _server() -> multiprocessing.context.ForkServerContext:
     os.environ["COLUMNS"] = "200"  # read where the consoles are made, at import
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["ctrlgen.app.cli"])
+    context.set_forkserver_preload(["ctrlgen.app.cli", *WORK])
     return context
 
 

@@ -124,6 +124,7 @@ def test_a_missing_compiler_is_named_before_any_work(scenario, tmp_path):
     )
 
 
+@pytest.mark.long
 def test_generate_needs_no_compiler(scenario, tmp_path):
     done = ctrlgen("generate", scenario, "--out", tmp_path / "c", PATH=str(tmp_path))
     assert done.returncode == 0 and (tmp_path / "c" / "mems_hexapod_online_f32.c").exists()
@@ -238,6 +239,7 @@ def test_files_added_to_a_result_are_not_deleted(scenario, tmp_path):
     assert (out / "mynotes.txt").read_text() == "precious"
 
 
+@pytest.mark.long
 def test_a_compiler_that_says_nothing_is_reported_with_its_command(scenario, tmp_path):
     tools = tmp_path / "tools"
     tools.mkdir()

@@ -460,7 +460,9 @@ def check_status(met: tuple[str, ...], calls: list, status: ControllerStatus) ->
 
 
 @pytest.mark.parametrize(
-    "device", [pytest.param(d, marks=pytest.mark.long) if d.rated or d.rounds > 1 else d for d in DEVICES], ids=str
+    "device",
+    [pytest.param(d, marks=pytest.mark.long) if d.rated or d.rounds > 1 or d == Device() else d for d in DEVICES],
+    ids=str,
 )
 def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(device, tmp_path):
     for program in ("gcc", "gcov"):

@@ -170,6 +170,7 @@ device = ctrlgen.user_device(
 """
 
 
+@pytest.mark.long
 def test_where_two_drives_are_too_many_the_online_c_is_refused_and_the_player_plays_the_drives(tmp_path):
     (tmp_path / "stage.py").write_text(STAGE)
     circle = CIRCLE.replace("15 um", "0 um")

@@ -204,6 +204,7 @@ def test_an_overshoot_beyond_a_limit_is_named(tmp_path):
     ] == pytest.approx(90e-6)
 
 
+@pytest.mark.long
 def test_the_command_line_names_the_mode_and_refuses_the_online_controller(tmp_path):
     written(tmp_path, 'shaping = { kind = "ZV" }')
     assert "shaped by ZV for a mode of 100.7 Hz, damping ratio 0.0474" in run("check", tmp_path).stdout
