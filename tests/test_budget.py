@@ -25,6 +25,7 @@ from ctrlgen import (
     solve,
     user_device,
 )
+from ctrlgen.budget import monte_carlo
 from ctrlgen.budget.error_budget import agreement, budget_of
 from ctrlgen.budget.finer_model import load_finer
 from ctrlgen.budget.limits import DrawnLimits, Margins, Slopes, critical_samples, margins, slopes_of_limits
@@ -36,6 +37,7 @@ from ctrlgen.firmware.compression import compress
 from ctrlgen.firmware.real import Real
 from ctrlgen.reporting.budget_section import budget_section
 from ctrlgen.reporting.report import write_report
+from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.solution import Solution
 
 FILE = SCENARIOS / "circle20" / "uncertainty.toml"
@@ -313,20 +315,42 @@ def test_the_ranking_is_by_what_is_left_without(circle, budget, tmp_path):
         assert half.peak(group) == pytest.approx(first.halved[group.name], rel=1e-6)
 
 
-def test_of_two_equal_axes_both_must_be_better_known(tmp_path):
-    """Each makes the largest uncertainty somewhere: half the sd of one leaves the peak, half of both halves it; the variance is shared."""
+def two_axes(folder: Path) -> Scenario:
+    """Four poses round a circle of 10 um, of a stage of two equal axes whose gains are known to 4 %."""
     stage = user_device(
         "stage", parameters={"g_x": "0.2 N/V", "g_y": "0.2 N/V", "k": "1 N/um"}, drive={"x": "1000 V", "y": "1000 V"},
         axes={"x": "50 um", "y": "50 um"}, force=lambda u, p: [p.g_x * u.x, p.g_y * u.y], restoring_force=lambda d, p: p.k * d.vector,
     )  # fmt: skip
-    (tmp_path / "scenario.toml").write_text(
+    (folder / "scenario.toml").write_text(
         'title = "round"\ndevice = "stage"\n[path]\nkind = "poses"\n'
         'points = [{ x = "10 um" }, { y = "10 um" }, { x = "-10 um" }, { y = "-10 um" }]\n'
     )
-    (tmp_path / "uncertainty.toml").write_text(
+    (folder / "uncertainty.toml").write_text(
         'title = "t"\n[numbers]\n' + "".join(f'"mechanism.g_{a}" = {{ sd = "4 %", source = "s" }}\n' for a in "xy")
     )
-    found = error_budget(load_scenario(tmp_path, stage), draws=0)
+    return load_scenario(folder, stage)
+
+
+def test_draws_are_the_same_in_any_number_of_processes(tmp_path, monkeypatch):
+    """Several blocks of them, the last one not full; with other seeds they differ."""
+    monkeypatch.setattr(monte_carlo, "BLOCK", 100)
+    scenario, found = two_axes(tmp_path), {}
+    for jobs, seed in (("1", 0), ("2", 0), ("1", 1)):
+        monkeypatch.setenv("CTRLGEN_JOBS", jobs)
+        found[jobs, seed] = error_budget(scenario, draws=250, seed=seed).drawn
+    one, two, other = found.values()
+    assert one.pose.shape[0] == 250
+    assert (
+        np.array_equal(one.pose, two.pose)
+        and np.array_equal(one.limits, two.limits)
+        and np.array_equal(one.alone, two.alone)
+    )
+    assert not np.array_equal(one.pose, other.pose)
+
+
+def test_of_two_equal_axes_both_must_be_better_known(tmp_path):
+    """Each makes the largest uncertainty somewhere: half the sd of one leaves the peak, half of both halves it; the variance is shared."""
+    found = error_budget(two_axes(tmp_path), draws=0)
     (group,) = found.groups
     assert found.peak(group) == pytest.approx(0.04 * 10e-6, rel=1e-9)  # 4 % of the radius
     assert [line.share for line in found.lines] == pytest.approx([0.5, 0.5], abs=1e-9)
@@ -418,7 +442,7 @@ def test_a_draw_with_another_limit_is_held_against_that_one():
     limits = DrawnLimits(found, Slopes(np.array([[1.0, 0.0]]), np.array([[1.0, 0.0]]), np.array([[[0.0, 1.0]]])))
     values, broken = [99.0, 103.0, 103.0, 3.0, 3.0, 98.0, 2.0], [True, False, True, True, False, True, True]
     columns = [(-2, 0), (5, 0), (2, 0), (5, 0), (2, 0), (0, 3), (0, -3)]
-    assert limits.broken(0, np.array(values)[:, None], np.array(columns, float)).tolist() == broken
+    assert limits.of(np.array(columns, float)).broken(0, np.array(values)[:, None]).tolist() == broken
 
 
 def test_a_number_that_acts_on_a_limit_alone_makes_it_uncertain(tmp_path):

@@ -180,13 +180,28 @@ class DrawnLimits:
         """(2, channels) which bounds some draws may break at a sample."""
         return self._near[:, sample]
 
-    def broken(self, sample: int, values: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """(draws,) which draws, with the limited quantities (draws, channels) and deviations (draws, m), break one of those."""
-        y = values + columns @ self.slopes.direct[sample].T
-        (lower, upper), near = self.found.bounds, self.near(sample)
-        below = (y < lower + columns @ self.slopes.lower.T) & near[0]
-        above = (y > upper + columns @ self.slopes.upper.T) & near[1]
-        return np.asarray((below | above).any(axis=1))
+    def of(self, columns: np.ndarray) -> LimitsOfDraws:
+        """Those of draws with the deviations (draws, m)."""
+        lower, upper = self.found.bounds
+        return LimitsOfDraws(
+            self, columns, lower + columns @ self.slopes.lower.T, upper + columns @ self.slopes.upper.T
+        )
+
+
+@dataclass(frozen=True)
+class LimitsOfDraws:
+    """The limits of some draws, with the deviations `columns` (draws, m) and so with bounds `lower` and `upper` (draws, channels)."""
+
+    limits: DrawnLimits
+    columns: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def broken(self, sample: int, values: np.ndarray) -> np.ndarray:
+        """(draws,) which draws, with the limited quantities (draws, channels), break a bound that some may break at a sample."""
+        direct, near = self.limits.slopes.direct[sample], self.limits.near(sample)
+        y = values + self.columns @ direct.T if direct.any() else values
+        return np.asarray((((y < self.lower) & near[0]) | ((y > self.upper) & near[1])).any(axis=1))
 
 
 def safeties(

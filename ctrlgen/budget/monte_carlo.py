@@ -1,11 +1,12 @@
 """Propagation of distributions by Monte Carlo (GUM supplement 1, JCGM 101) along a path, on the nonlinear model.
 
-Each draw is a device with other numbers, surroundings and gains, and drives with an error of their own at every sample; all draws
-take each sample together.
+Each draw is a device with other numbers, surroundings and gains, and drives with an error of their own at every sample. The draws of a
+block take each sample together; blocks have seeds of their own, so that the answer is the same in any number of processes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,9 +15,18 @@ import numpy as np
 
 from ctrlgen.budget.linear import Propagated, drive_deviations, player_deviation
 from ctrlgen.budget.uncertain_path import UncertainPath
-from ctrlgen.numerics.columnwise import ColumnWise
+from ctrlgen.core.forks import in_forks, usable_cores
+from ctrlgen.numerics.columnwise import MOST, ColumnWise
 
+BLOCK = MOST  # draws
 STEP_ERROR = 1e-3  # of the combined uncertainty: what a step of a draw may leave
+
+
+class BlockLimits(Protocol):
+    """What is asked of the limits of a block of draws."""
+
+    def broken(self, sample: int, values: np.ndarray) -> np.ndarray:
+        """(draws,) which draws, with the limited quantities (draws, channels), break a bound that some may break there."""
 
 
 class Limited(Protocol):
@@ -25,8 +35,8 @@ class Limited(Protocol):
     def near(self, sample: int) -> np.ndarray:
         """(2, channels) which bounds some draws may break at a sample."""
 
-    def broken(self, sample: int, values: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """(draws,) which draws, with the limited quantities (draws, channels) and deviations (draws, m), break one of those."""
+    def of(self, columns: np.ndarray) -> BlockLimits:
+        """Those of draws with the deviations (draws, m)."""
 
 
 @dataclass(frozen=True)
@@ -61,37 +71,66 @@ def draw(
     `critical` (2, channels): the sample at which each limited quantity is kept, for its lower and its upper bound; `limited` says
     where the draws may break a limit.
     """
-    rng, stated, pose = np.random.default_rng(seed), path.uncertainties, linear.nominal["pose"]
+    stated = path.uncertainties
     m = len(stated.sds)
-    deviations = rng.standard_normal((draws, m)) @ _square_root(stated.covariance)
+    first, *seeds = np.random.SeedSequence(seed).spawn(2 + (draws - 1) // BLOCK)
+    deviations = np.random.default_rng(first).standard_normal((draws, m)) @ _square_root(stated.covariance)
     one_by_one = np.diag(stated.sds)
-    columns = np.vstack([deviations, one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
-    q, gain = _numbers(path, columns)
-    scatter = _Scatter(path, rng, draws, 2 * m + 1)
-    step = _Steps(path, linear, q)
-    outputs = {"pose": _OfDraws(path, "pose", q), "limits": _OfDraws(path, "limits", q)}
-    S = np.tile(path.start[:, None], len(q))
-    found = np.empty((len(q), len(kept), pose.shape[1]))
-    limits = np.empty((len(q), *critical.shape))
-    broken = np.zeros(draws, bool)
-    place = {int(k): i for i, k in enumerate(kept)}
-    for k, v in enumerate(path.drive):
-        drive = (v * gain + scatter.at(k)).T
-        sample = k - path.before
-        here = critical == sample
-        limiting = sample >= 0 and bool(np.any(here) or limited.near(sample).any())
-        S = step(k, S, drive, limiting or sample in place)
-        if sample in place:
-            found[:, place[sample]] = outputs["pose"](S, drive).T - pose[sample] + scatter.replayed()
-        if limiting:
-            values = outputs["limits"](S, drive).T
-            limits[:, here] = np.stack([values] * 2, axis=1)[:, here]
-            broken |= limited.broken(sample, values[:draws], deviations)
-    good = np.isfinite(found[:draws]).all(axis=(1, 2)) & np.isfinite(limits[:draws]).all(axis=(1, 2))
+    alone = np.vstack([one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
+    blocks = [(deviations[k : k + BLOCK], own) for k, own in zip(range(0, draws, BLOCK), seeds, strict=True)]
+    led, last = _Led(path, linear, limited, kept, critical), blocks[-1]
+    blocks[-1] = np.vstack([last[0], alone]), last[1]
+
+    def one(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return led.all(*blocks[k], still=len(alone) if k == len(blocks) - 1 else 0)
+
+    found = in_forks(one, range(len(blocks)), usable_cores())
+    pose, limits, broken = (np.concatenate(part) for part in zip(*found, strict=True))
+    still, pose, limits, broken = pose[draws:], pose[:draws], limits[:draws], broken[:draws]
+    good = np.isfinite(pose).all(axis=(1, 2)) & np.isfinite(limits).all(axis=(1, 2))
     return Drawn(
-        kept, found[:draws][good], limits[:draws][good], deviations[good],
-        (found[draws:-1] - found[-1]).reshape(2, m, *found.shape[1:]), int((~good).sum()), broken[good],
+        kept, pose[good], limits[good], deviations[good], (still[:-1] - still[-1]).reshape(2, m, *still.shape[1:]),
+        int((~good).sum()), broken[good],
     )  # fmt: skip
+
+
+class _Led:
+    """Devices that are led along the path, as many at a time as are given."""
+
+    def __init__(
+        self, path: UncertainPath, linear: Propagated, limited: Limited, kept: np.ndarray, critical: np.ndarray
+    ) -> None:
+        self.path, self.linear, self.limited, self.critical = path, linear, limited, critical
+        self.place = {int(k): i for i, k in enumerate(kept)}
+        self.step = _Step(path, linear)
+        self.pose, self.limits = _Part(path, "pose"), _Part(path, "limits")
+
+    def all(
+        self, columns: np.ndarray, seed: np.random.SeedSequence, still: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For deviations (n, m): those of the pose (n, kept, n_y), the limited quantities (n, 2, channels), which devices break a limit
+        (n,). Nothing scatters in the last `still` ones."""
+        path, pose, n = self.path, self.linear.nominal["pose"], len(columns)
+        q, gain = _numbers(path, columns)
+        scatter = _Scatter(path, seed, n - still, still)
+        step, of_pose, of_limits = self.step.of(q), self.pose.of(q), self.limits.of(q)
+        bounds = self.limited.of(columns)
+        S = np.tile(path.start[:, None], n)
+        found = np.empty((n, len(self.place), pose.shape[1]))
+        limits, broken = np.empty((n, *self.critical.shape)), np.zeros(n, bool)
+        for k, v in enumerate(path.drive):
+            drive = (v * gain + scatter.at(k)).T
+            sample = k - path.before
+            here = self.critical == sample
+            limiting = sample >= 0 and bool(np.any(here) or self.limited.near(sample).any())
+            S = step(k, S, drive, limiting or sample in self.place)
+            if sample in self.place:
+                found[:, self.place[sample]] = of_pose(S, drive).T - pose[sample] + scatter.replayed()
+            if limiting:
+                values = of_limits(S, drive).T
+                limits[:, here] = np.stack([values] * 2, axis=1)[:, here]
+                broken |= bounds.broken(sample, values)
+        return found, limits, broken
 
 
 def _square_root(covariance: np.ndarray) -> np.ndarray:
@@ -122,7 +161,7 @@ def _numbers(path: UncertainPath, columns: np.ndarray) -> tuple[np.ndarray, np.n
 class _Scatter:
     """Errors of the drives that are drawn anew at every sample; none for the last `still` rows."""
 
-    def __init__(self, path: UncertainPath, rng: np.random.Generator, draws: int, still: int) -> None:
+    def __init__(self, path: UncertainPath, seed: np.random.SeedSequence, draws: int, still: int) -> None:
         stated = path.uncertainties
         names = {"converter": stated.bits is not None, "arithmetic": stated.single, "jitter": stated.jitter > 0}
         given = [drive_deviations(path, name) for name, given in names.items() if given]
@@ -130,7 +169,7 @@ class _Scatter:
         self.rounding = np.sqrt(3 * sum((sd**2 for sd, together in given if not together), zero))
         self.late = sum((sd for sd, together in given if together), zero)
         self.tolerance = np.sqrt(3) * player_deviation(path) if stated.player else None
-        self.rng, self.shape, self.still = rng, (draws, path.drive.shape[1]), still
+        self.rng, self.shape, self.still = np.random.default_rng(seed), (draws, path.drive.shape[1]), still
 
     def at(self, k: int) -> np.ndarray:
         """(draws + still, n_u) errors of the drive number `k`: rounding is uniform, of converter and arithmetic together, jitter normal."""
@@ -150,37 +189,48 @@ class _Scatter:
         return error
 
 
-class _OfDraws:
-    """A part of the path for all draws at once."""
+Evaluated = Callable[
+    [np.ndarray, np.ndarray], np.ndarray
+]  # (n, devices) from states (n_s, devices) and drives (n_u, devices)
 
-    def __init__(self, path: UncertainPath, name: str, q: np.ndarray) -> None:
+
+class _Part:
+    """A part of the path for many devices at once."""
+
+    def __init__(self, path: UncertainPath, name: str) -> None:
         constants = path.constants[name]
-        self.constants = ColumnWise(ca.Function("constants", [path.q], [ca.densify(constants(path.q))]))(q.T)
+        self.constants = ColumnWise(ca.Function("constants", [path.q], [ca.densify(constants(path.q))]))
         self.part = ColumnWise(path.of_sample[name])
 
-    def __call__(self, S: np.ndarray, drive: np.ndarray) -> np.ndarray:
-        """(n, draws) from states (n_s, draws) and drives (n_u, draws)."""
-        return self.part(S, drive, self.constants)
+    def of(self, q: np.ndarray) -> Evaluated:
+        """For devices with the numbers q (devices, n_q)."""
+        constants = self.constants(q.T)
+        return lambda S, drive: self.part(S, drive, constants)
 
 
-class _Steps:
-    """All draws from sample to sample; where states go on without the displacement, it is found at the samples alone at which it is
+class _Step:
+    """All devices from sample to sample; where states go on without the displacement, it is found at the samples alone at which it is
     wanted, from that of the described device."""
 
-    def __init__(self, path: UncertainPath, linear: Propagated, q: np.ndarray) -> None:
+    def __init__(self, path: UncertainPath, linear: Propagated) -> None:
         self.states, self.apart, self.n_x = linear.states, path.apart(), path.model.x.numel()
         if self.apart:
-            self.step, self.balanced = _OfDraws(path, "states", q), _OfDraws(path, "balanced", q)
+            self.step, self.balanced = _Part(path, "states"), _Part(path, "balanced")
         else:
             allowed = STEP_ERROR * linear.combined("pose", path.uncertainties).max(axis=0)
-            self.step = _OfDraws(path, path.quickest_step(linear.states, allowed), q)
+            self.step = _Part(path, path.quickest_step(linear.states, allowed))
 
-    def __call__(self, k: int, S: np.ndarray, drive: np.ndarray, wanted: bool) -> np.ndarray:
-        """(n_s, draws) S at sample k, from the one before; where it is not `wanted`, the displacement may be an old one."""
-        if not self.apart:
-            return self.step(S, drive)
-        S[: self.n_x] = self.step(S, drive)
-        if wanted:
-            S[self.n_x :] = self.states[k, self.n_x :, None]
-            S[self.n_x :] = self.balanced(S, drive)
-        return S
+    def of(self, q: np.ndarray) -> Callable[[int, np.ndarray, np.ndarray, bool], np.ndarray]:
+        """(n_s, devices) S at sample k, from the one before; where it is not `wanted`, the displacement may be an old one."""
+        step, balanced = self.step.of(q), self.balanced.of(q) if self.apart else None
+
+        def stepped(k: int, S: np.ndarray, drive: np.ndarray, wanted: bool) -> np.ndarray:
+            if balanced is None:
+                return step(S, drive)
+            S[: self.n_x] = step(S, drive)
+            if wanted:
+                S[self.n_x :] = self.states[k, self.n_x :, None]
+                S[self.n_x :] = balanced(S, drive)
+            return S
+
+        return stepped
