@@ -348,6 +348,14 @@ def test_draws_are_the_same_in_any_number_of_processes(tmp_path, monkeypatch):
     assert not np.array_equal(one.pose, other.pose)
 
 
+def test_what_scatters_has_its_share_and_is_halved_like_a_number(tmp_path):
+    """A converter is all there is: without it nothing is left, with half of it half."""
+    solution, given = pushed(tmp_path, '[drive]\nconverter = { bits = 8, source = "chosen" }')
+    found = budget_of(solution, given, draws=0)
+    (line,), (group,) = found.lines, found.groups
+    assert line.share == pytest.approx(1.0) and line.halved[group.name] == pytest.approx(found.peak(group) / 2)
+
+
 def test_of_two_equal_axes_both_must_be_better_known(tmp_path):
     """Each makes the largest uncertainty somewhere: half the sd of one leaves the peak, half of both halves it; the variance is shared."""
     found = error_budget(two_axes(tmp_path), draws=0)

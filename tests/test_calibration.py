@@ -184,6 +184,30 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
     )  # not stated: 3.5 ms of bounds over the root of 12
 
 
+def test_of_a_list_the_numbers_that_are_no_constants_stay_uncertain(tmp_path):
+    """One of six angles is a constant of the specimen: the other five count after the calibration as before it."""
+    (tmp_path / "scenario.toml").write_text(
+        (SCENARIOS / "circle20" / "scenario.toml").read_text().partition("[[expect]]")[0].replace('"1 kHz"', '"100 Hz"')
+    )
+    (tmp_path / "uncertainty.toml").write_text(
+        'title = "u"\n[numbers]\n"hexapod.base_angles[*]" = { sd = "0.1 deg", source = "s" }\n'
+    )
+    head = DEVICE.read_text().partition("\n[run_time]\n")[0] + "\n"
+    (tmp_path / "device.toml").write_text(head + '[run_time]\nconstants = ["hexapod.base_angles[0]"]\n')
+    device = load_device(tmp_path / "device.toml")
+    (constant,) = device.given_at_start
+    row, recording = (
+        CalibratedConstant(constant, constant.default, 1e-9, True),
+        load_recordings([RECORDING], build_model(device)),
+    )
+    made = Calibration(device, {}, recording, (row,), np.array([[1e-18]]), (), ())
+    before, after = (found.uncertainties for found in budgets(made, tmp_path, tmp_path / "device.toml"))
+    count = len(before.sds)
+    sd = np.radians(0.1)
+    assert before.sds == pytest.approx([sd] * count) and sorted(after.sds) == pytest.approx([1e-9, *[sd] * (count - 1)])
+    assert len(after.correlation) == count
+
+
 @pytest.mark.long
 def test_the_budget_of_a_path_falls_to_what_the_recording_leaves(specimen):
     before, after = budgets(specimen, SCENARIOS / "circle20", DEVICE)

@@ -189,9 +189,8 @@ class _Scatter:
         return error
 
 
-Evaluated = Callable[
-    [np.ndarray, np.ndarray], np.ndarray
-]  # (n, devices) from states (n_s, devices) and drives (n_u, devices)
+# (n, devices) from states (n_s, devices) and drives (n_u, devices)
+Evaluated = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class _Part:

@@ -63,9 +63,12 @@ def _joined(
         return Uncertainties(tuple(lines), correlation, None, 0.0, False, {}, {}, {})
     kept, columns, first = list[Uncertain](), list[int](), 0
     for line in others.lines:
-        if not paths & set(line.paths):
-            kept.append(line)
-            columns += range(first, first + len(line.sds))
+        left = [i for i, path in enumerate(line.paths) if path not in paths]
+        if left:  # of a list the numbers that are no constants stay
+            text, steps = line.per
+            own = tuple(line.paths[i] for i in left), tuple(line.sds[i] for i in left), tuple(steps[i] for i in left)
+            kept.append(replace(line, paths=own[0], sds=own[1], per=(text, own[2])))
+            columns += [first + i for i in left]
         first += len(line.sds)
     k, n = len(constants), len(constants) + len(columns)
     joint = np.eye(n)
