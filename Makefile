@@ -50,7 +50,7 @@ mutants: $(VENV)/installed-test
 
 # make schemas    writes the JSON Schemas of the result files (budget.json and so on) from their models
 schemas: $(VENV)/installed
-	$(BIN)/python -m ctrlgen.app.result_schemas
+	$(BIN)/python -m ctrlgen.app.write_schemas
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

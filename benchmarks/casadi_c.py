@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.samples import Samples
 from benchmarks.timed_c import Program, build
-from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.c.real import Real
 
 NEWTON, SQP = "CasADi Newton in C", "CasADi SQP (qrqp) in C"
 TOLERANCE = 1e-7  # of scaled residuals: 0.0001 nm of pose, about 0.002 nm of balance

@@ -14,12 +14,12 @@ from battery.plant_axis import Axis, Planted
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import SCENARIO, Disagreement
 from ctrlgen import build_model, diagnose, load_device
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, hypotheses, nominal_physics
 from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, hypotheses, nominal_physics
+from ctrlgen.estimation.noise import Noise
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import movable
 from ctrlgen.recordings.recording import Record, Recording
 

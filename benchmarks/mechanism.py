@@ -14,9 +14,9 @@ import numpy as np
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import Disagreement
 from ctrlgen.devices import load_device
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.numerics import compiled
-from ctrlgen.physics.mechanism import GROUND, point_force, point_motion
+from ctrlgen.physics.rigid_bodies import GROUND, point_force, point_motion
 from ctrlgen.physics.screw import inverse_adjoint
 
 BODIES = 30  # each on two wires

@@ -14,10 +14,10 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.firmware.real import Real
+from ctrlgen.controller.feedforward import Controller
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import held_step
-from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.scenario import Scenario, load_scenario
@@ -184,7 +184,7 @@ class Samples:
         _require(name, "its drives lead the model off the circle by", error.max(), near)
 
     def reference(self, targets: np.ndarray) -> Answers:
-        """The controller of `ctrlgen.model.feedforward` over `targets`, starting settled at the last one."""
+        """The controller of `ctrlgen.controller.feedforward` over `targets`, starting settled at the last one."""
         step = self.controller.step(self.controller.rest(), targets[-1], settle=True)
         steps = []
         for target in targets:

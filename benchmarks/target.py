@@ -12,10 +12,10 @@ import numpy as np
 from benchmarks import casadi_c
 from benchmarks.measure import Count, Note
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
+from ctrlgen.controller.feedforward import ControllerStatus
 from ctrlgen.core.errors import ToolError
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder, generate
-from ctrlgen.firmware.real import Real
-from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.verification.cores import BASE, CORES, INSTALL, Core, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import MISSING, Machine, available
 

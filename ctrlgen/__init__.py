@@ -11,29 +11,29 @@ from ctrlgen.version import __version__
 
 if TYPE_CHECKING:
     from ctrlgen.app.batch import load_batch, run_batch
-    from ctrlgen.app.pipeline import Outcome, run, verify
+    from ctrlgen.app.scenario_pipeline import Outcome, run, verify
     from ctrlgen.budget.error_budget import ErrorBudget, error_budget
     from ctrlgen.budget.robust import solve
     from ctrlgen.calibration.calibrate import Calibration, calibrate
+    from ctrlgen.controller.feedforward import Controller, ControllerStatus, ControllerStep
     from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import Device, load_device
-    from ctrlgen.devices.user import user_device
-    from ctrlgen.diagnosis.pipeline import diagnose
-    from ctrlgen.diagnosis.selection.result import Diagnosis, Estimate, Finding
+    from ctrlgen.devices.user.user_device import user_device
+    from ctrlgen.diagnosis.diagnosis_folder import diagnose
+    from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Estimate, Finding
     from ctrlgen.firmware.folder import CFolder, generate
     from ctrlgen.learning.learn import Learning, learn
     from ctrlgen.model.assembly import build_model
-    from ctrlgen.model.feedforward import Controller, ControllerStatus, ControllerStep
     from ctrlgen.model.model import Model
     from ctrlgen.model.simulation import Trace, simulate
     from ctrlgen.model.virtual_sensors import SensorReadings, simulate_sensors
     from ctrlgen.path_timing.fastest import FastestPath, fastest
     from ctrlgen.recordings.reader import load_recordings
     from ctrlgen.recordings.recording import Record, Recording
-    from ctrlgen.reporting.build_record import Build
     from ctrlgen.trajectory.scenario import Scenario, load_scenario
     from ctrlgen.trajectory.solution import Margin, Solution
     from ctrlgen.trajectory.workspace import Workspace
+    from ctrlgen.verification.build_record import Build
     from ctrlgen.verification.comparison import Comparison, compare
 
 _EXPORTS = {
@@ -41,7 +41,7 @@ _EXPORTS = {
         "load_batch",
         "run_batch",
     ),
-    "app.pipeline": (
+    "app.scenario_pipeline": (
         "Outcome",
         "run",
         "verify",
@@ -68,9 +68,9 @@ _EXPORTS = {
         "Device",
         "load_device",
     ),
-    "devices.user": ("user_device",),
-    "diagnosis.pipeline": ("diagnose",),
-    "diagnosis.selection.result": (
+    "devices.user.user_device": ("user_device",),
+    "diagnosis.diagnosis_folder": ("diagnose",),
+    "diagnosis.selection.diagnosis_result": (
         "Diagnosis",
         "Estimate",
         "Finding",
@@ -84,7 +84,7 @@ _EXPORTS = {
         "learn",
     ),
     "model.assembly": ("build_model",),
-    "model.feedforward": (
+    "controller.feedforward": (
         "Controller",
         "ControllerStatus",
         "ControllerStep",
@@ -107,7 +107,7 @@ _EXPORTS = {
         "Record",
         "Recording",
     ),
-    "reporting.build_record": ("Build",),
+    "verification.build_record": ("Build",),
     "trajectory.scenario": (
         "Scenario",
         "load_scenario",

@@ -1,4 +1,4 @@
-"""Entry point of the command line: signals first, so that an interruption never shows a traceback, then `ctrlgen.app.cli`."""
+"""Entry point of the command line: signals first, so that an interruption never shows a traceback, then `ctrlgen.app.commands.cli`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def main() -> None:
     # where a callback swallows the interruption, as one of the import system does, Python prints a traceback of it
     sys.unraisablehook = lambda ignored: None if interruption.seen else sys.__unraisablehook__(ignored)
     try:
-        from ctrlgen.app.cli import execute
+        from ctrlgen.app.commands.cli import execute
 
         status = execute(interruption.check)
     except KeyboardInterrupt:

@@ -8,10 +8,10 @@ AREAS: dict[str, tuple[str, ...]] = {  # globs below the root of the tree
     "model": ("ctrlgen/model/*.py", "ctrlgen/numerics/*.py", "ctrlgen/physics/*.py"),
     "effects": ("ctrlgen/effects/*.py",),
     "recordings": ("ctrlgen/recordings/*.py", "ctrlgen/core/units.py"),
-    "estimation": ("ctrlgen/diagnosis/estimation/*.py", "ctrlgen/diagnosis/settings/estimation.py"),
+    "estimation": ("ctrlgen/estimation/*.py", "ctrlgen/estimation/settings.py"),
     "selection": (
         "ctrlgen/diagnosis/selection/*.py",
-        "ctrlgen/diagnosis/hypotheses/*.py",
+        "ctrlgen/estimation/*.py",
         "ctrlgen/diagnosis/settings/selection.py",
     ),
     "firmware": ("ctrlgen/firmware/*.py",),

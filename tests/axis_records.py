@@ -7,9 +7,9 @@ from conftest import AXIS_FILE
 from scipy.signal import cont2discrete
 
 from ctrlgen import load_device
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import estimate_noise
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.recordings.recording import Record, Recording
 
 H, N, NOISE = 1e-3, 2500, 5e-9  # sample time [s], samples, noise of a reading [m]

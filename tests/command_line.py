@@ -11,10 +11,18 @@ from functools import cache
 from pathlib import Path
 
 WORK = (  # what the commands import when they do it
-    "ctrlgen.app.batch", "ctrlgen.app.check", "ctrlgen.app.pipeline", "ctrlgen.calibration.budgets", "ctrlgen.diagnosis.pipeline",
-    "ctrlgen.learning.learn", "ctrlgen.path_timing.fastest", "ctrlgen.reporting.budget_page", "ctrlgen.reporting.calibration_page",
-    "ctrlgen.reporting.fastest_page", "ctrlgen.reporting.learning_page",
-)  # fmt: skip
+    "ctrlgen.app.batch",
+    "ctrlgen.app.check_files",
+    "ctrlgen.app.scenario_pipeline",
+    "ctrlgen.calibration.budgets_compared",
+    "ctrlgen.diagnosis.diagnosis_folder",
+    "ctrlgen.learning.learn",
+    "ctrlgen.path_timing.fastest",
+    "ctrlgen.budget.budget_page",
+    "ctrlgen.calibration.calibration_page",
+    "ctrlgen.path_timing.fastest_page",
+    "ctrlgen.learning.learning_page",
+)
 
 
 def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -32,7 +40,7 @@ def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[s
 def _server() -> multiprocessing.context.ForkServerContext:
     os.environ["COLUMNS"] = "200"  # read where the consoles are made, at import
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["ctrlgen.app.cli", *WORK])
+    context.set_forkserver_preload(["ctrlgen.app.commands.cli", *WORK])
     return context
 
 

@@ -11,7 +11,7 @@ from package_programs import STRICT, run
 
 from ctrlgen import build_model, generate, load_device, load_scenario, solve
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.reporting.plots import draw_all
+from ctrlgen.trajectory.solution_plots import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from mechanism_files import HEAD, dm, place
 
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed
 
 
 def jointed() -> str:

@@ -1,5 +1,5 @@
 """A mechanism file as geometrically exact beams between rigid bodies at finite rotations, by Exudyn: what the expansions of
-`ctrlgen.devices.mechanism_second_order` are compared with. Lengths in um, forces in N."""
+`ctrlgen.devices.mechanism.second_order` are compared with. Lengths in um, forces in N."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from mechanism_files import dm
 from scipy.spatial.transform import Rotation
 
-from ctrlgen.devices.mechanism_model import Condensed
-from ctrlgen.physics.mechanism import GROUND
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.physics.rigid_bodies import GROUND
 from plants.frame import Equilibrium, Frame, Node, Pose
 
 UM = 1e6

@@ -7,18 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.error_model import ErrorModel
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.held_out import refit_to_held_out
-from ctrlgen.diagnosis.estimation.misfit import Misfit
-from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.held_out import refit_to_held_out
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.misfit import Misfit
+from ctrlgen.estimation.noise import Noise
+from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT
+from ctrlgen.estimation.structure import Structure
 
 BLOCKS = 20
 

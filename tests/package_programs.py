@@ -5,8 +5,8 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.real import Real
 
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 

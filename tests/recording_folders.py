@@ -8,7 +8,7 @@ import numpy as np
 
 import ctrlgen
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.estimation.simulator import Simulator
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.recording import Record
 
 STEP = 1e-3

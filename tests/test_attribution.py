@@ -11,14 +11,14 @@ from axis_records import AXIS, BACKLASH, NOISE, H, fitter_of, move, played
 from misfits import BLOCKS, left
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.diagnosis.estimation.misfit import misfit
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection import attribution
 from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.settings import ATTRIBUTION
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.misfit import misfit
+from ctrlgen.estimation.structure import Structure
 
 HUM = Hypothesis("vibration", "disturbance:axis", "axis")
 

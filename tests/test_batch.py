@@ -20,7 +20,7 @@ from recording_folders import SERVO, axis_recording, servo_poses
 
 import ctrlgen
 from ctrlgen.app.batch import load_batch, run_batch
-from ctrlgen.app.cli import execute
+from ctrlgen.app.commands.cli import execute
 from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.evidence.bootstrap import block_length, bootstrap, redrawn
 from ctrlgen.recordings.recording import Record

@@ -26,6 +26,7 @@ from ctrlgen import (
     user_device,
 )
 from ctrlgen.budget import monte_carlo
+from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.budget.error_budget import agreement, budget_of
 from ctrlgen.budget.finer_model import load_finer
 from ctrlgen.budget.limits import DrawnLimits, Margins, Slopes, critical_samples, margins, slopes_of_limits
@@ -33,12 +34,11 @@ from ctrlgen.budget.linear import drive_deviations, propagate
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
-from ctrlgen.firmware.compression import compress
-from ctrlgen.firmware.real import Real
-from ctrlgen.reporting.budget_section import budget_section
-from ctrlgen.reporting.report import write_report
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.player.compression import compress
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.solution import Solution
+from ctrlgen.verification.scenario_report import write_report
 
 FILE = SCENARIOS / "circle20" / "uncertainty.toml"
 TRANSLATIONS = slice(3, 6)

@@ -15,14 +15,14 @@ from command_line import ctrlgen
 from conftest import SCENARIOS
 
 from ctrlgen import Controller, InputError, build_model, calibrate, error_budget, load_device, load_scenario
-from ctrlgen.calibration.budgets import budgets
+from ctrlgen.calibration.budgets_compared import budgets
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, sd_of_bounds, with_held
+from ctrlgen.calibration.calibration_page import write_calibration
 from ctrlgen.calibration.device_file import NAME, write_calibrated_device
 from ctrlgen.core.units import to_si
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.model.simulation import trace
 from ctrlgen.recordings.reader import load_recordings
-from ctrlgen.reporting.calibration_page import write_calibration
 
 DEVICE = SCENARIOS / "devices" / "mems_hexapod_run_time.toml"
 RECORDING = SCENARIOS / "hexapod_specimen"

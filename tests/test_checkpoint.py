@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from recording_folders import SERVO, servo_poses
 
-from ctrlgen.diagnosis.estimation import fit
-from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint, key_of
-from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests, unfinished
+from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, digests, unfinished
+from ctrlgen.estimation import fit
+from ctrlgen.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.version import code_hash
 
 MADE_FROM = {"code": "1", "seed": 0, "files": {"a": "b"}}

@@ -64,13 +64,11 @@ def test_help_names_every_command_and_a_first_step():
 )
 def test_a_command_starts_without_what_it_does_not_use(words, left_out):
     """Importing all of it takes seconds."""
-    program = (
-        "import sys; from ctrlgen.app.cli import execute; status = execute(); print(*sys.modules); sys.exit(status)"
-    )
+    program = "import sys; from ctrlgen.app.commands.cli import execute; status = execute(); print(*sys.modules); sys.exit(status)"
     done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     loaded = set(done.stdout.splitlines()[-1].split())
-    assert "ctrlgen.app.cli" in loaded and not loaded & left_out
+    assert "ctrlgen.app.commands.cli" in loaded and not loaded & left_out
 
 
 def test_a_misspelt_command_or_option_is_answered_with_the_right_one():
@@ -167,7 +165,7 @@ def test_unreachable_says_which_actuator_by_how_much_and_what_is_nearest(tmp_pat
 
 SWALLOWED = """
 import os, signal, sys
-import ctrlgen.app.cli
+import ctrlgen.app.commands.cli
 from ctrlgen.__main__ import main
 
 class Dying:
@@ -179,7 +177,7 @@ def execute(check):
     Dying()
     check()
 
-ctrlgen.app.cli.execute = execute
+ctrlgen.app.commands.cli.execute = execute
 main()
 """
 

@@ -17,14 +17,14 @@ import pytest
 from conftest import ROOT, SCENARIOS
 
 from ctrlgen import Controller, CtrlgenError, __version__, build_model, load_scenario
-from ctrlgen.firmware.cprint import print_function
-from ctrlgen.firmware.elementary import elementary_text
-from ctrlgen.firmware.fmu import write_fmus
+from ctrlgen.firmware.c.cprint import print_function
+from ctrlgen.firmware.c.elementary import elementary_text
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import ABI, hertz
+from ctrlgen.firmware.c.toolchains import FLAGS
+from ctrlgen.firmware.fmi.fmu import write_fmus
+from ctrlgen.firmware.fmi.plant import plant_of, write_plant
 from ctrlgen.firmware.folder import generate, write_harness
-from ctrlgen.firmware.plant import plant_of, write_plant
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.templates import ABI, hertz
-from ctrlgen.firmware.toolchains import FLAGS
 from ctrlgen.version import program
 
 GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"

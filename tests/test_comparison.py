@@ -7,9 +7,9 @@ import re
 import pytest
 
 from ctrlgen import ToolError
-from ctrlgen.firmware import toolchains
+from ctrlgen.firmware.c import toolchains
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import generate
-from ctrlgen.firmware.real import Real
 from ctrlgen.verification.comparison import compare
 
 pytestmark = pytest.mark.long

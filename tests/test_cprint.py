@@ -8,11 +8,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ctrlgen.firmware.cprint import Law, Printer, print_function
-from ctrlgen.firmware.elementary import elementary_text
-from ctrlgen.firmware.expression_graph import GIVEN, Graph, Node, reached
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.firmware.c.cprint import Law, Printer, print_function
+from ctrlgen.firmware.c.elementary import elementary_text
+from ctrlgen.firmware.c.expression_graph import GIVEN, Graph, Node, reached
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import FLAGS
 
 N = 4  # elements of each argument
 STEPS = 3  # of the printed iterations

@@ -25,17 +25,6 @@ from axis_records import (
 from misfits import errors_of, held_out_deviance, left, weighed_by
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.held_out import refit_to_held_out
-from ctrlgen.diagnosis.estimation.isolated_outliers import isolated_outliers
-from ctrlgen.diagnosis.estimation.noise import estimate_noise, stationary_deviation
-from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
-from ctrlgen.diagnosis.estimation.prediction_uncertainty import prediction_uncertainty
-from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
-from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, SearchResult
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
@@ -44,8 +33,19 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.held_out import refit_to_held_out
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.isolated_outliers import isolated_outliers
+from ctrlgen.estimation.noise import estimate_noise, stationary_deviation
+from ctrlgen.estimation.noise_update import update_guessed_noise
+from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
+from ctrlgen.estimation.residual_noise import noise_from_residual
+from ctrlgen.estimation.residual_tests import run_residual_tests
+from ctrlgen.estimation.settings import CANDIDATE_TERMS
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Recording
 

@@ -15,12 +15,6 @@ from scipy.signal import lfilter
 from ctrlgen import build_model, load_device, load_scenario
 from ctrlgen.core.to_json import plain
 from ctrlgen.devices.changed_numbers import written
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import Noise, estimate_noise
-from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, profiles
-from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations, sandwich_over_model
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence import unmodelled_dynamics
 from ctrlgen.diagnosis.evidence.detectability import detectability
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, time_series
@@ -32,9 +26,15 @@ from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.evidence.unknown_input import estimate_unknown_input
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import Noise, estimate_noise
+from ctrlgen.estimation.profile_likelihood import BOUNDED, profiles
+from ctrlgen.estimation.robust_covariance import robust_deviations, sandwich_over_model
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 

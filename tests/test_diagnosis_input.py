@@ -11,7 +11,7 @@ from recording_folders import SERVO, axis_recording, poses_recording, servo_pose
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
-from ctrlgen.diagnosis.pipeline import diagnose_into
+from ctrlgen.diagnosis.diagnosis_folder import diagnose_into
 from ctrlgen.diagnosis.report.narrative import next_steps, sentence
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, UNEXPLAINED
 

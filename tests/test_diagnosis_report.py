@@ -17,20 +17,20 @@ from recording_folders import axis_recording, poses_recording
 from result_files import faults
 
 import ctrlgen
-from ctrlgen.app.cli import execute
+from ctrlgen.app.commands.cli import execute
 from ctrlgen.core.to_json import plain
-from ctrlgen.diagnosis.estimation.profile_likelihood import BOUNDED, Profile
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
-from ctrlgen.diagnosis.pipeline import diagnose_into, unfinished
+from ctrlgen.diagnosis.diagnosis_folder import diagnose_into, unfinished
 from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.figures import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
-from ctrlgen.diagnosis.report.plots import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.selection.result import Estimate, Finding
+from ctrlgen.diagnosis.selection.diagnosis_result import Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.profile_likelihood import BOUNDED, Profile
+from ctrlgen.estimation.simulator import Simulator
 
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
 LAWS = (

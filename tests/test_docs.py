@@ -16,7 +16,7 @@ from conftest import ROOT
 from markdown_it import MarkdownIt
 
 from ctrlgen.app.batch import BatchFile
-from ctrlgen.app.result_schemas import RESULTS
+from ctrlgen.app.write_schemas import RESULTS
 from ctrlgen.budget.uncertainty import UncertaintyFile
 from ctrlgen.devices import Device
 from ctrlgen.devices.sensor import DisplacementSensor, InterferometerSensor

@@ -22,12 +22,12 @@ from ctrlgen import Controller, build_model, simulate
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.hypotheses.priors import prior_of
 from ctrlgen.effects import Channel, Effect, Param, Place
-from ctrlgen.firmware.cprint import print_function
-from ctrlgen.firmware.elementary import elementary_text
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.estimation.priors import prior_of
+from ctrlgen.firmware.c.cprint import print_function
+from ctrlgen.firmware.c.elementary import elementary_text
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.model.effect_terms import available, channels, partner_channels
 
 TESTED = {

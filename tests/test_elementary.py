@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ctrlgen.firmware import elementary
-from ctrlgen.firmware.elementary import TURN_END, TURNS, elementary_text, polynomial
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import COMPILERS, FLAGS
+from ctrlgen.firmware.c import elementary
+from ctrlgen.firmware.c.elementary import TURN_END, TURNS, elementary_text, polynomial
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import COMPILERS, FLAGS
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import Machine, available
 

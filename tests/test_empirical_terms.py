@@ -12,10 +12,10 @@ from axis_records import record
 import ctrlgen
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.shares.empirical_terms import ridge_regression
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.recording import Recording
 
 SERVO = 'kind = "servo"\nname = "servo"\ntitle = "an axis"\nsource = "round numbers"\ntravel = "100 um"\n'

@@ -14,7 +14,7 @@ from command_line import ctrlgen
 from conftest import ROOT, SCENARIOS
 
 from ctrlgen import InputError, load_device, load_scenario
-from ctrlgen.app.examples import copy_examples, examples
+from ctrlgen.app.shipped_examples import copy_examples, examples
 from ctrlgen.version import program
 
 FOLDERS = {path.parent.name for kind in ("scenario", "recording", "run_a") for path in SCENARIOS.glob(f"*/{kind}.toml")}

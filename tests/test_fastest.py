@@ -15,15 +15,15 @@ from scipy.optimize import brentq
 
 import ctrlgen
 from ctrlgen import InputError, SolverError, build_model, load_scenario, solve, user_device
-from ctrlgen.path_timing.between import error_between
 from ctrlgen.path_timing.binding import AT_BOUND, EXACTLY, bindings
-from ctrlgen.path_timing.confirmed import Followed
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
+from ctrlgen.path_timing.fastest_page import write_fastest
+from ctrlgen.path_timing.feasibility import Followed
+from ctrlgen.path_timing.intersample_error import error_between
+from ctrlgen.path_timing.maximum_velocity import steps_in_time
 from ctrlgen.path_timing.optimum import Optimiser, Optimum, Piece
 from ctrlgen.path_timing.repetition import crossing, largest
-from ctrlgen.path_timing.speed_bound import steps_in_time
-from ctrlgen.reporting.fastest_page import write_fastest
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.paths import Poses
 

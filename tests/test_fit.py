@@ -12,15 +12,15 @@ from misfits import noise_of
 
 from ctrlgen import load_device
 from ctrlgen.devices.changed_numbers import changed
-from ctrlgen.diagnosis.estimation.error_model import ErrorModel
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.held_out import HeldOutRefit
-from ctrlgen.diagnosis.estimation.robust_covariance import sandwich_over_model
-from ctrlgen.diagnosis.estimation.simulator import RecentSimulators
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection import model_selection
-from ctrlgen.diagnosis.settings import SIMULATION
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.held_out import HeldOutRefit
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.robust_covariance import sandwich_over_model
+from ctrlgen.estimation.settings import SIMULATION
+from ctrlgen.estimation.simulator import RecentSimulators
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record
 
 N = 1000

@@ -14,11 +14,11 @@ import pytest
 from conftest import AXIS_FILE, SCENARIOS, effect_device
 
 from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
-from ctrlgen.firmware.deviations import permits
-from ctrlgen.firmware.fmu import write_fmus
-from ctrlgen.firmware.plant import plant_of, write_plant
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import FLAGS
+from ctrlgen.firmware.c.deviations import permits
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import FLAGS
+from ctrlgen.firmware.fmi.fmu import write_fmus
+from ctrlgen.firmware.fmi.plant import plant_of, write_plant
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is missing, the units were not run: pip install 'ctrlgen[fmi]'")
 from fmpy.fmi1 import FMICallException  # noqa: E402

@@ -14,7 +14,7 @@ from axis_records import AXIS, H, axis_fitter, record
 import ctrlgen
 from ctrlgen.core.forks import JOBS_VARIABLE, in_forks, usable_cores
 from ctrlgen.diagnosis.diagnose import diagnose_recording
-from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
+from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.recordings.recording import Recording
 
 forked = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are forked on Linux alone")

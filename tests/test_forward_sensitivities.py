@@ -10,11 +10,11 @@ import pytest
 from conftest import AXIS_FILE
 
 from ctrlgen import load_device
-from ctrlgen.diagnosis.estimation import sample_equations
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import hypotheses, nominal_physics
-from ctrlgen.diagnosis.settings import SIMULATION
+from ctrlgen.estimation import sample_equations
+from ctrlgen.estimation.hypothesis import hypotheses, nominal_physics
+from ctrlgen.estimation.settings import SIMULATION
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model import integrators
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record

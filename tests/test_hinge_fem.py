@@ -14,14 +14,14 @@ from ctrlgen.physics.circular_hinge_table import ALPHA, DELTA_Y
 
 pytest.importorskip("skfem", reason="the finite-element hinge needs scikit-fem")
 
-from ctrlgen.physics.reference_models import hinge_fem as fem
-from ctrlgen.reproduce.hinge_errors import draw_hinge_errors, hinge_errors
+from papers import hinge_fem as fem
+from papers.hinge_errors import draw_hinge_errors, hinge_errors
 
 NU = 0.33
 
 
 def test_the_finite_element_hinge_imports_nothing_of_ours():
-    tree = ast.parse((ROOT / "ctrlgen/physics/reference_models/hinge_fem.py").read_text())
+    tree = ast.parse((ROOT / "papers/hinge_fem.py").read_text())
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     assert not any(module.startswith("ctrlgen") for module in modules)

@@ -11,10 +11,10 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import ToolError, build_model, generate, load_scenario, solve
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.real import Real
-from ctrlgen.reporting.build_record import BUDGETS
 from ctrlgen.verification import cores, emulation, in_loop
+from ctrlgen.verification.build_record import BUDGETS
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import Machine, available
 from ctrlgen.verification.in_loop import InLoop, run_in_loop

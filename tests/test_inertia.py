@@ -16,11 +16,11 @@ from scipy.integrate import solve_ivp
 
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
+from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.errors import SolverError
 from ctrlgen.devices import load_device
-from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
-from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.scenario import model_of
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrlgen.diagnosis.hypotheses.priors import prior_of
 from ctrlgen.effects import Effect
+from ctrlgen.estimation.priors import prior_of
 
 PARAMETERS = [(kind, p, prior_of(law).of(p)) for kind, law in Effect.library.items() for p in law.params]
 every_parameter = pytest.mark.parametrize(

@@ -15,10 +15,10 @@ from scipy.interpolate import BSpline
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen import load_device
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.effects import Effect
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record
 
 ROUNDING = 1e-12

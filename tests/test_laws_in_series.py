@@ -10,7 +10,7 @@ from axis_records import record
 from ctrlgen import build_model
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.simulator import Simulator
+from ctrlgen.estimation.simulator import Simulator
 
 H = 0.01
 TESTED = {

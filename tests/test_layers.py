@@ -13,32 +13,48 @@ import ctrlgen
 
 PACKAGE = ROOT / "ctrlgen"
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
-FOUNDATION = "core numerics"
-PHYSICS = f"{FOUNDATION} physics effects devices model"
-DIAGNOSIS = f"{PHYSICS} recordings diagnosis.settings diagnosis.hypotheses diagnosis.estimation"
-STAGES = f"{PHYSICS} trajectory recordings firmware verification reporting"
-MAY_IMPORT = {  # package -> packages; every module may import its own package and the program's version
-    "core": "", "numerics": "",
-    "physics": FOUNDATION, "effects": "core", "devices": f"{FOUNDATION} physics effects",
-    "model": f"{FOUNDATION} devices effects",
-    "trajectory": PHYSICS, "recordings": PHYSICS,
-    "budget": f"{PHYSICS} trajectory", "path_timing": f"{PHYSICS} trajectory",
-    "learning": f"{PHYSICS} trajectory recordings budget",
-    "firmware": f"{PHYSICS} trajectory", "verification": f"{PHYSICS} trajectory firmware",
-    "calibration": f"{DIAGNOSIS} trajectory budget firmware",
-    "reporting": f"{PHYSICS} trajectory budget path_timing learning calibration firmware verification",
+FOUNDATION = "core numerics reporting"
+DEVICES = f"{FOUNDATION} physics effects devices"
+MODEL = f"{DEVICES} model"
+TRAJECTORY = f"{MODEL} controller trajectory.inverse trajectory"
+ESTIMATION = f"{MODEL} recordings estimation"
+DIAGNOSIS = f"{ESTIMATION} diagnosis.settings"
+C = f"{TRAJECTORY} firmware.c firmware.player firmware.online firmware"
+MAY_IMPORT = {  # folder -> folders below it; every module may import its own folder and the program's version
+    "core": "",
+    "numerics": "core",
+    "reporting": "core",
+    "physics": "core numerics",
+    "effects": "core",
+    "devices": f"{FOUNDATION} physics effects",
+    "devices.mechanism": DEVICES,
+    "devices.user": DEVICES,
+    "model": DEVICES,
+    "controller": MODEL,
+    "recordings": MODEL,
+    "estimation": f"{MODEL} recordings",
+    "trajectory.inverse": f"{MODEL} controller",
+    "trajectory": f"{MODEL} controller trajectory.inverse",
+    "budget": TRAJECTORY,
+    "path_timing": TRAJECTORY,
+    "learning": f"{TRAJECTORY} recordings budget",
+    "firmware.c": FOUNDATION,
+    "firmware.player": f"{TRAJECTORY} firmware.c",
+    "firmware.online": f"{TRAJECTORY} firmware.c firmware.player",
+    "firmware": f"{TRAJECTORY} firmware.c firmware.player firmware.online",
+    "firmware.fmi": C,
+    "calibration": f"{C} estimation recordings budget",
+    "verification": f"{C} budget",
     "diagnosis.settings": "",
-    "diagnosis.hypotheses": f"{PHYSICS} diagnosis.settings",
-    "diagnosis.estimation": f"{PHYSICS} recordings diagnosis.settings diagnosis.hypotheses",
     "diagnosis.shares": DIAGNOSIS,
     "diagnosis.selection": f"{DIAGNOSIS} diagnosis.shares",
-    "diagnosis.evidence": f"{DIAGNOSIS} diagnosis.selection",
-    "diagnosis.report": f"{DIAGNOSIS} reporting diagnosis.shares diagnosis.selection",
+    "diagnosis.evidence": f"{DIAGNOSIS} diagnosis.shares diagnosis.selection",
+    "diagnosis.report": f"{DIAGNOSIS} diagnosis.shares diagnosis.selection diagnosis.evidence",
     "diagnosis": f"{DIAGNOSIS} diagnosis.shares diagnosis.selection diagnosis.evidence diagnosis.report",
-    "reproduce": STAGES,
-    "app": f"{STAGES} budget path_timing learning calibration reproduce diagnosis diagnosis.hypotheses diagnosis.selection "
-    "diagnosis.evidence diagnosis.report",
-}  # fmt: skip
+    "app": f"{C} firmware.fmi devices.mechanism devices.user budget path_timing learning verification calibration recordings estimation "
+    "diagnosis diagnosis.shares diagnosis.selection diagnosis.evidence diagnosis.report",
+}
+MAY_IMPORT["app.commands"] = f"app {MAY_IMPORT['app']}"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -51,10 +67,9 @@ def name_of(path) -> str:
 NAMES = {name_of(path): path for path in MODULES}
 
 
-def package_of(name: str) -> str:
-    """'diagnosis.report' for 'diagnosis.report.plots', 'diagnosis' for 'diagnosis.pipeline', '' for '__main__'."""
-    folder = NAMES[name].parent.relative_to(PACKAGE).parts
-    return ".".join(folder[: 2 if folder[:1] == ("diagnosis",) else 1])
+def folder_of(name: str) -> str:
+    """'diagnosis.report' for 'diagnosis.report.figures', '' for '__main__'."""
+    return ".".join(NAMES[name].parent.relative_to(PACKAGE).parts)
 
 
 def our_imports(path) -> set[str]:
@@ -71,11 +86,11 @@ def our_imports(path) -> set[str]:
 
 
 @pytest.mark.parametrize("path", [p for p in MODULES if p.parent != PACKAGE], ids=name_of)
-def test_a_package_imports_only_what_it_may(path):
-    own = package_of(name_of(path))
+def test_a_folder_imports_only_what_it_may(path):
+    own = folder_of(name_of(path))
     allowed = {own, *MAY_IMPORT[own].split()}
-    for imported in our_imports(path) - {"version"}:
-        assert package_of(imported) in allowed, f"{name_of(path)} imports {imported}"
+    for imported in our_imports(path) - {"version", ""}:
+        assert folder_of(imported) in allowed, f"{name_of(path)} imports {imported}"
 
 
 def test_no_modules_import_each_other_in_a_circle():
@@ -86,8 +101,13 @@ def test_no_modules_import_each_other_in_a_circle():
     TopologicalSorter(graph).prepare()  # raises CycleError
 
 
-def test_packages_do_not_import_each_other_in_a_circle():
+def test_folders_do_not_import_each_other_in_a_circle():
     TopologicalSorter({name: allowed.split() for name, allowed in MAY_IMPORT.items()}).prepare()
+
+
+def test_no_two_files_share_a_name():
+    stems = [path.stem for path in MODULES if path.stem not in {"__init__", "__main__"}]
+    assert {name for name in stems if stems.count(name) > 1} == set()
 
 
 @pytest.mark.parametrize(
@@ -99,11 +119,7 @@ def test_a_law_needs_the_extension_point_and_shared_helpers_and_nothing_else(pat
     assert all(name == "effects" or name.startswith("effects._") for name in imported)
 
 
-SHOWN = {  # the papers' figures are drawn from these, and their numbers compared
-    "reproduce.all": {"circle20", "xy_stage_force"},
-    "reproduce.s0_data": {"nist_hexapod"},
-    "app.commands.app": {"circle20"},  # the example of --help
-}
+SHOWN = {"app.commands.app": {"circle20"}}  # the example of --help
 WORDS = {"raster", "spiral", "unreachable"}  # names of scenarios that are words: kinds of path, an exception
 
 
@@ -128,7 +144,7 @@ def test_no_module_reaches_what_makes_concealed_recordings(path):
     for node in ast.walk(ast.parse(path.read_text())):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-        assert not {name.split(".")[0] for name in names} & {"battery", "plants", "tests"}, path
+        assert not {name.split(".")[0] for name in names} & {"battery", "plants", "papers", "tests"}, path
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "battery").glob("*.py")), ids=lambda p: p.stem)

@@ -23,8 +23,8 @@ from ctrlgen.learning.norm_optimal import STEP_WEIGHT, Wanted, drive_scale, line
 from ctrlgen.learning.repeatability import Spectrum
 from ctrlgen.learning.response import Change, regressed, response
 from ctrlgen.learning.runs import Run, Runs, errors, first_differs
+from ctrlgen.trajectory.inverse.violations import violations
 from ctrlgen.trajectory.solution import Solution
-from ctrlgen.trajectory.violations import violations
 
 NOISE = np.repeat([1e-5, 2e-8], 3)  # rad, m: of a sample
 WRONG = {"actuator.expansion_slope": 3.6e-9}  # 20 % more: 3.6 % of the circle, as on the independent plant

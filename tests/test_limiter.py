@@ -22,14 +22,14 @@ import numpy as np
 import pytest
 
 from ctrlgen import Controller, ControllerStatus
+from ctrlgen.controller import feedforward
+from ctrlgen.controller.named_inverse import NamedInverses
 from ctrlgen.devices import Limit
-from ctrlgen.firmware.online import online_context
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.templates import write
-from ctrlgen.firmware.toolchains import FLAGS
-from ctrlgen.model import feedforward
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import write
+from ctrlgen.firmware.c.toolchains import FLAGS
+from ctrlgen.firmware.online.online import online_context
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
-from ctrlgen.model.named_inverse import NamedInverses
 
 N = 3  # axes; enough for "some of them, not the first"
 SLACK = 2.0**-6  # coarse, so that values within it are common; a power of two keeps the arithmetic exact

@@ -8,8 +8,8 @@ import pytest
 from conftest import DEVICES
 
 from ctrlgen import InputError, build_model, load_device, simulate
-from ctrlgen.model.linearisation import equilibrium, linearise
-from ctrlgen.reporting.bode import draw_bode
+from ctrlgen.controller.bode import draw_bode
+from ctrlgen.controller.linearisation import equilibrium, linearise
 from ctrlgen.trajectory.workspace import middle_pose
 
 SMALL = 1e-4  # of a drive's range: the second order of the force is then far below the tolerance

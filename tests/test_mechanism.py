@@ -28,13 +28,13 @@ from mechanism_files import (
 from scipy.integrate import quad
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
-from ctrlgen.devices.mechanism_dynamics import freedoms, natural_frequencies
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.modes import freedoms, natural_frequencies
 from ctrlgen.devices.mems_hexapod import matrices as hexapod_matrices
 from ctrlgen.devices.meso_hexapod import matrices as meso_matrices
 from ctrlgen.devices.rrr_stage import stage
 from ctrlgen.model.assembly import movable
-from ctrlgen.physics import meso_hexapod as meso
+from ctrlgen.physics import meso_hexapod_kinematics as meso
 from ctrlgen.physics import thermal_actuator, xy_stage
 from ctrlgen.physics.flexure import rectangular_section
 

@@ -11,8 +11,8 @@ from mechanism_files import HEAD, PARALLELOGRAM, TWO_BODIES, dm, loaded, with_va
 from numpy.polynomial import Polynomial
 
 from ctrlgen import InputError, build_model, load_scenario, run, solve
-from ctrlgen.devices.mechanism_dynamics import condensed_modes, natural_frequencies
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.modes import condensed_modes, natural_frequencies
 from ctrlgen.model.assembly import movable
 from ctrlgen.model.simulation import simulate
 from ctrlgen.physics.damping import modal_damping

@@ -10,7 +10,7 @@ from mechanism_files import PARALLELOGRAM, chain, dm, loaded, with_values
 
 import ctrlgen
 from ctrlgen import InputError, build_model, run
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.model.simulation import simulate
 
 TILT = '[[reading]]\nname = "tilt"\nbody = "stage"\nabout = [0, 0, 1]\n'

@@ -26,10 +26,10 @@ from mechanism_files import (
 )
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, run, solve
-from ctrlgen.devices.mechanism_model import Condensed
-from ctrlgen.devices.mechanism_second_order import SecondOrder
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.model.assembly import movable
-from ctrlgen.numerics.second_order import second_order
+from ctrlgen.numerics.constraint_second_order import second_order
 from ctrlgen.physics import hexapod
 from ctrlgen.physics.second_order_flexure import Segment, beam
 

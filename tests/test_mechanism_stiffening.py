@@ -10,8 +10,8 @@ from mechanism_files import HEAD, PARALLELOGRAM, REST, SILICON, blade, dm, loade
 from scipy.optimize import brentq
 
 from ctrlgen import InputError, build_model, load_scenario, run, solve
-from ctrlgen.devices.mechanism_model import Condensed
-from ctrlgen.devices.mechanism_second_order import SecondOrder
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.model.assembly import movable
 
 E, L, T, W = 130e9, 20e-3, 0.2e-3, 8e-3  # of the blades of PARALLELOGRAM

@@ -11,7 +11,7 @@ from mechanism_files import HEAD, dm, loaded, number, place, vector, with_values
 from scipy.optimize import brentq
 
 from ctrlgen import InputError, Unreachable, build_model, load_device, load_scenario, run, solve
-from ctrlgen.devices.mechanism_model import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.physics import thermal_actuator, xy_stage
 
 SPECIAL = load_device(DEVICE).values()

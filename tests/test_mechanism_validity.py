@@ -13,8 +13,8 @@ from mechanism_files import HEAD, PARALLELOGRAM, SILICON, dm, hinged, loaded, wi
 from scipy.integrate import solve_bvp
 
 from ctrlgen import build_model
-from ctrlgen.devices.mechanism_model import Condensed
-from ctrlgen.physics.mechanism import GROUND, point_force, point_motion
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.physics.rigid_bodies import GROUND, point_force, point_motion
 
 E, LENGTH, EI = 130e9, 20e-3, 130e9 * 8e-3 * 0.2e-3**3 / 12  # of a blade of PARALLELOGRAM
 
@@ -65,7 +65,7 @@ def test_a_notch_turns_stretches_and_bends_as_in_finite_elements(tmp_path, ratio
     """The equations that S2's table chooses at this t/R, against plane stress with R, b and E of one: within 3 % where it bends,
     which are S2's own errors, and 6 % where it stretches."""
     pytest.importorskip("skfem", reason="the finite-element hinge needs scikit-fem")
-    from ctrlgen.physics.reference_models import hinge_fem as fem
+    from papers import hinge_fem as fem
 
     text = hinged(1.0).replace(', equation = "paros_weisbord", outside = "accept"', "")
     text = text.replace('b = "8 mm"', 'b = "8 mm", outside = "accept"')

@@ -13,9 +13,10 @@ from scipy.spatial.transform import Rotation
 from ctrlgen import build_model, simulate
 from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import matrices
-from ctrlgen.numerics.second_order import second_order
-from ctrlgen.physics import meso_hexapod, screw
-from ctrlgen.reproduce import s0
+from ctrlgen.numerics.constraint_second_order import second_order
+from ctrlgen.physics import meso_hexapod_kinematics as meso_hexapod
+from ctrlgen.physics import screw
+from papers import s0
 
 DEG, UM = np.pi / 180, 1e-6
 

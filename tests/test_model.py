@@ -9,12 +9,12 @@ from conftest import AXIS_FILE, effect_device
 from scipy.linalg import expm
 
 from ctrlgen import InputError, build_model, load_device, simulate
+from ctrlgen.controller.linearisation import equilibrium, linearise
 from ctrlgen.devices.mems_hexapod import matrices
 from ctrlgen.effects import Effect
 from ctrlgen.model.assembly import symbolic_model
 from ctrlgen.model.discretisation import held_step, one_step_map
 from ctrlgen.model.effect_terms import REQUIREMENTS
-from ctrlgen.model.linearisation import equilibrium, linearise
 from ctrlgen.physics import thermal_actuator, xy_stage
 
 POSE = np.array([0, 0, 0, 5e-6, -3e-6, 20e-6])

@@ -10,9 +10,9 @@ from scipy.optimize import linprog, minimize, nnls
 from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forces, heavy, loaded, reference, stage
 
 from ctrlgen import InputError, Unreachable, build_model, solve, user_device
-from ctrlgen.model.feedforward import Controller, ControllerStatus
-from ctrlgen.trajectory.drive_programmes import diagonal, least_worst, limited_rows
-from ctrlgen.trajectory.least_effort import motion_inverse, path_inverse
+from ctrlgen.controller.feedforward import Controller, ControllerStatus
+from ctrlgen.trajectory.inverse.drive_programmes import diagonal, least_worst, limited_rows
+from ctrlgen.trajectory.inverse.redundant import motion_inverse, path_inverse
 
 NEAR = 1e-5  # ranges: where IPOPT leaves what is at a limit
 

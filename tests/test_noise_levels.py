@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.estimation.noise import estimate_noise, ljung_box, stationary_deviation, without_lines
-from ctrlgen.diagnosis.estimation.residual_noise import noise_from_residual
+from ctrlgen.estimation.noise import estimate_noise, ljung_box, stationary_deviation, without_lines
+from ctrlgen.estimation.residual_noise import noise_from_residual
 from ctrlgen.recordings.recording import Record, Recording
 
 SIGMAS = 4.0  # once in 16 000

@@ -10,9 +10,9 @@ from axis_records import AXIS, NOISE, SETTLING, H, drives, fitter_of, move, reco
 from scipy.signal import lfilter, lsim
 
 from ctrlgen.diagnosis.diagnose import diagnose_recording
-from ctrlgen.diagnosis.estimation.noise import estimate_noise
-from ctrlgen.diagnosis.estimation.noise_update import correct_stated_noise
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.noise_update import correct_stated_noise
 from ctrlgen.recordings.recording import Recording
 
 N = 1500

@@ -8,9 +8,9 @@ import pytest
 
 import ctrlgen
 from ctrlgen import Controller, ControllerStatus, build_model, generate, load_scenario, simulate, solve
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.vectors import vectors
-from ctrlgen.model.motion_feedforward import controller_of
+from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.online.vectors import vectors
 from ctrlgen.verification.comparison import compare
 
 GAIN, STIFFNESS, T = 0.2, 1e6, 1e-3  # N/V, N/m, s

@@ -9,13 +9,13 @@ from scipy.optimize import linprog
 from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forces, heavy, loaded, reference, stage
 
 from ctrlgen import InputError, build_model, generate, load_scenario, solve
+from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.controller.null_motion import null_motion
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.online.vectors import vectors
 from ctrlgen.firmware.player_only import check_online
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.vectors import vectors
-from ctrlgen.model.controller_step import ControllerStatus
-from ctrlgen.model.feedforward import Controller
-from ctrlgen.model.motion_feedforward import controller_of
-from ctrlgen.model.null_motion import null_motion
 from ctrlgen.verification.comparison import compare
 
 T = 1e-3

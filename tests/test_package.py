@@ -12,10 +12,10 @@ from conftest import SCENARIOS
 from package_programs import STRICT, everything, run
 
 from ctrlgen import InputError, build_model, generate, load_scenario
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.package import verify_package
-from ctrlgen.firmware.real import Real
-from ctrlgen.reporting.plots import draw_all
+from ctrlgen.trajectory.solution_plots import draw_all
 
 pytestmark = pytest.mark.long
 

@@ -9,7 +9,7 @@ import pytest
 from package_programs import STRICT, everything, run
 
 from ctrlgen import __version__
-from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.c.real import Real
 
 pytestmark = pytest.mark.long
 

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ctrlgen.numerics.second_order import second_order
+from ctrlgen.numerics.constraint_second_order import second_order
 from ctrlgen.physics import hexapod as linear_hexapod
 from ctrlgen.physics import xy_stage as linear_stage
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ctrlgen.diagnosis.hypotheses.priors import DEFAULT, PRIORS, LawPrior, default_starts, prior_of
 from ctrlgen.effects import Effect, Param
+from ctrlgen.estimation.priors import DEFAULT, PRIORS, LawPrior, default_starts, prior_of
 
 STARTS_FROM_DATA = {"", "moments", "spatial_periods", "jump_positions"}
 every_law = pytest.mark.parametrize("law", Effect.library.values(), ids=Effect.library)

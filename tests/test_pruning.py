@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from axis_records import AXIS, BACKLASH, LATE, fitter_of, played
 
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.pruning import all_pruned, pruned
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
 
 OFFSET = Hypothesis("drive_offset", "actuator:axis", "axis")
 

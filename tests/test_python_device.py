@@ -8,7 +8,7 @@ from command_line import ctrlgen as run_command
 
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_device, load_scenario, solve
-from ctrlgen.trajectory.path_inverse import PathInverse
+from ctrlgen.trajectory.inverse.balanced import PathInverse
 
 STAGE = '''"""A piezo X-Y stage with levers, 0 to 150 V."""
 import ctrlgen

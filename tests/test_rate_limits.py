@@ -12,11 +12,11 @@ from conftest import SCENARIOS
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
 from ctrlgen.devices import load_device
-from ctrlgen.firmware.compression import compress
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import find_compilers
-from ctrlgen.trajectory.inertial_inverse import InertialInverse
-from ctrlgen.trajectory.motion import Motion
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import find_compilers
+from ctrlgen.firmware.player.compression import compress
+from ctrlgen.trajectory.inverse.inertial import InertialInverse
+from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 
 STIFFNESS, GAIN, RADIUS, PERIOD, N = 1e6, 0.2, 10e-6, 0.05, 500

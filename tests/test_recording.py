@@ -15,7 +15,7 @@ from ctrlgen import build_model, load_device
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.reader import load_recordings
-from ctrlgen.reproduce.s0_data import load_s0
+from papers.s0_data import load_s0
 
 MEASURED = Path(os.environ.get("CTRLGEN_RECORDINGS", ROOT.parent / "shared" / "recordings"))
 

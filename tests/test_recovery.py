@@ -26,14 +26,14 @@ from battery.plant_hexapod import Faults, Hexapod
 from ctrlgen import load_device
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import estimate_noise
-from ctrlgen.diagnosis.hypotheses import priors
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
-from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect
+from ctrlgen.estimation import priors
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.recordings.recording import Recording
 
 N = 2500

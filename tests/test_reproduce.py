@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from ctrlgen.reproduce import all as everything
-from ctrlgen.reproduce.row import PrintedNumber, ReproductionStatus, half_unit
+from papers import all as everything
+from papers.row import PrintedNumber, ReproductionStatus, half_unit
 
 
 @pytest.fixture(scope="module", params=list(everything.SOURCES))

@@ -13,13 +13,13 @@ from scipy.stats import t as student
 from ctrlgen.core.errors import InputError
 from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import matrices
-from ctrlgen.physics import meso_hexapod
+from ctrlgen.physics import meso_hexapod_kinematics as meso_hexapod
 from ctrlgen.recordings.calibration import calibrate_jacobian
 from ctrlgen.recordings.pose_errors import opposites, parasitic, pose_drift, pose_errors, repeatability
-from ctrlgen.reproduce import s0, s0_figures
-from ctrlgen.reproduce.rounding import half_units, propagated_rounding
-from ctrlgen.reproduce.row import ReproductionStatus
-from ctrlgen.reproduce.s0_data import load_s0, read_jacobian
+from papers import s0, s0_figures
+from papers.rounding import half_units, propagated_rounding
+from papers.row import ReproductionStatus
+from papers.s0_data import load_s0, read_jacobian
 
 SHARED = ROOT.parent / "shared"
 RECORDINGS = SHARED / "recordings" / "nist_hexapod"

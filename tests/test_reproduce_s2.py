@@ -7,10 +7,10 @@ import pytest
 
 from ctrlgen.physics import circular_hinge_table as table
 from ctrlgen.physics.sensor_models import SENSORS
-from ctrlgen.reproduce import all as everything
-from ctrlgen.reproduce import s2, s3_hinges
-from ctrlgen.reproduce.row import PrintedNumber, ReproductionStatus
-from ctrlgen.reproduce.s3_hinges import PRINTED_ERRORS
+from papers import all as everything
+from papers import s2, s3_hinges
+from papers.row import PrintedNumber, ReproductionStatus
+from papers.s3_hinges import PRINTED_ERRORS
 
 
 @pytest.mark.long

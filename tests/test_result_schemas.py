@@ -12,8 +12,8 @@ import pytest
 from jsonschema import Draft202012Validator
 from result_files import faults, schema_of
 
-from ctrlgen.app.result_schemas import RESULTS, schemas, write_schemas
-from ctrlgen.reporting.result_schemas import SCHEMAS, origin
+from ctrlgen.app.write_schemas import RESULTS, schemas, write_schemas
+from ctrlgen.reporting.result_file import SCHEMAS, origin
 from ctrlgen.version import __version__
 
 EMPTY = {

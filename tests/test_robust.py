@@ -24,9 +24,9 @@ from ctrlgen.budget.linear import propagate
 from ctrlgen.budget.robust import ChanceConstraint
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import load_uncertainties
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.firmware.folder import generate
-from ctrlgen.model.feedforward import Controller
 from ctrlgen.trajectory import solution as described
 from ctrlgen.trajectory.scenario import model_of
 from ctrlgen.trajectory.scenario_file import Robust

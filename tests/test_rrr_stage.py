@@ -16,10 +16,11 @@ from matrices import array
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.devices import rrr_stage as device_module
-from ctrlgen.physics import circular_hinge_table, piezo_stack, rrr_stage
-from ctrlgen.reproduce import s3, s3_lengths, s3_tables
-from ctrlgen.reproduce.row import PrintedNumber, ReproductionStatus, half_unit
+from ctrlgen.physics import circular_hinge_table, piezo_stack
+from ctrlgen.physics import rrr_kinetostatics as rrr_stage
 from ctrlgen.trajectory.workspace import Workspace
+from papers import s3, s3_lengths, s3_tables
+from papers.row import PrintedNumber, ReproductionStatus, half_unit
 
 CASES = (1, 2)
 ROTATION_SCALE = np.array([1.0, 1.0, 30e-3])  # rotations as motion of a point 30 mm away

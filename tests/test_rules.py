@@ -15,13 +15,13 @@ import three_stacks
 from conftest import SCENARIOS, effect_device
 
 from ctrlgen import Controller, build_model, load_scenario
-from ctrlgen.firmware.cprint import print_function
-from ctrlgen.firmware.deviations import DEVIATIONS, permits
-from ctrlgen.firmware.elementary import elementary_text
+from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.firmware.c.cprint import print_function
+from ctrlgen.firmware.c.deviations import DEVIATIONS, permits
+from ctrlgen.firmware.c.elementary import elementary_text
+from ctrlgen.firmware.c.misra import ADVISORY, MANDATORY, rule_class
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder, generate, write_harness
-from ctrlgen.firmware.misra import ADVISORY, MANDATORY, rule_class
-from ctrlgen.firmware.real import Real
-from ctrlgen.model.feedforward import ControllerStatus
 from ctrlgen.verification.check import Check
 from ctrlgen.verification.host import run_host
 from ctrlgen.verification.hostile import check_hostile

@@ -16,17 +16,17 @@ from conftest import SCENARIOS
 
 from ctrlgen import Controller, InputError, build_model, load_device, load_scenario
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
-from ctrlgen.calibration.files import binary
+from ctrlgen.calibration.constants_files import binary
+from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.controller.run_time_check import check_run_time
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import generate
-from ctrlgen.firmware.online import online_context
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.run_time import derived_values
-from ctrlgen.firmware.toolchains import FLAGS
-from ctrlgen.model.controller_step import ControllerStatus
-from ctrlgen.model.motion_feedforward import controller_of
-from ctrlgen.model.run_time_check import check_run_time
+from ctrlgen.firmware.online.online import online_context
+from ctrlgen.firmware.online.start_constants import derived_values
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.trajectory.scenario import Scenario
 

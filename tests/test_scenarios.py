@@ -43,7 +43,7 @@ def test_scenario_gives_what_it_expects(name, tmp_path, compiler):
 
 
 def test_the_trajectory_file_has_its_columns_and_numbers(circle, tmp_path):
-    from ctrlgen.reporting.report import write_trajectory
+    from ctrlgen.verification.scenario_report import write_trajectory
 
     write_trajectory(circle, tmp_path / "t.csv")
     with open(tmp_path / "t.csv") as file:
@@ -61,8 +61,8 @@ def test_the_trajectory_file_has_its_columns_and_numbers(circle, tmp_path):
 def test_the_report_is_one_file_that_refers_to_nothing_outside(circle, tmp_path):
     import re
 
-    from ctrlgen.reporting.plots import draw_all
-    from ctrlgen.reporting.report import write_report
+    from ctrlgen.trajectory.solution_plots import draw_all
+    from ctrlgen.verification.scenario_report import write_report
 
     write_report(tmp_path, circle, None, expectations(circle), None, draw_all(circle))
     page = (tmp_path / "report.html").read_text()

@@ -10,17 +10,17 @@ import pytest
 from conftest import DEVICE
 
 from ctrlgen import build_model, load_device
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise import Noise
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis
 from ctrlgen.diagnosis.selection import score_gradient as slopes_module
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient
 from ctrlgen.diagnosis.selection.screen import Screen
-from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
+from ctrlgen.estimation.noise import Noise
+from ctrlgen.estimation.settings import CANDIDATE_TERMS
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
 
 H, N = 1e-3, 700

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from axis_records import AXIS, axis_fitter
 
-from ctrlgen.diagnosis.estimation.structure import Structure
 from ctrlgen.diagnosis.evidence.detectability import detectability
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch
 from ctrlgen.effects import Channel
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
 
 DRIVE_GAIN = Hypothesis("drive_gain", "actuator:axis", "axis")
 SENSOR_GAIN = Hypothesis("sensor_gain", "sensor:axis", "axis")

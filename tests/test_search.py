@@ -10,11 +10,6 @@ from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, fitter_of, move,
 from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.estimation.error_model import ErrorModel
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.noise_update import update_noise, update_noise_colour
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
@@ -22,6 +17,11 @@ from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.rivals import replace_cause
 from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise_update import update_noise, update_noise_colour
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 
 

@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, SPEAKS_FOR, Family, ranking
+from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares, predict_share
 from ctrlgen.diagnosis.shares.regressors import Kind, Signals
-from ctrlgen.diagnosis.shares.result import as_json, as_text
-from ctrlgen.diagnosis.shares.shares import model_free_shares, predict_share
+from ctrlgen.diagnosis.shares.shares_table import as_json, as_text
 from ctrlgen.effects import Effect
 
 N, H = 6000, 0.002

@@ -23,7 +23,7 @@ from ctrlgen.diagnosis.selection.verdict import CONSISTENT
 from ctrlgen.diagnosis.shares.families import Family
 from ctrlgen.diagnosis.shares.gather import residual_shares
 from ctrlgen.diagnosis.shares.regressors import Kind
-from ctrlgen.diagnosis.shares.result import ChannelShares, KindShare, Share
+from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share
 from ctrlgen.recordings.recording import Recording
 
 N, FRICTION = 3000, 0.6  # samples a record; dry friction [N]

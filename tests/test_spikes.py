@@ -10,11 +10,11 @@ from axis_records import AXIS, NOISE, H, drive, move, record
 
 import ctrlgen
 from ctrlgen.diagnosis.diagnose import noise_before_fits
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.isolated_outliers import mark_outliers
-from ctrlgen.diagnosis.estimation.spikes import Spikes, find_spikes
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.isolated_outliers import mark_outliers
+from ctrlgen.estimation.spikes import Spikes, find_spikes
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.recordings.validation import ChannelNames, mark, rows_between
 

@@ -15,13 +15,13 @@ import pytest
 from conftest import SCENARIOS, effect_device
 
 from ctrlgen import ControllerStatus, build_model, generate, load_scenario, solve
+from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import FLAGS
-from ctrlgen.firmware.vector_cases import limiter_calls
-from ctrlgen.firmware.vectors import vectors
-from ctrlgen.model.feedforward import Controller
-from ctrlgen.model.motion_feedforward import controller_of
+from ctrlgen.firmware.online.vector_cases import limiter_calls
+from ctrlgen.firmware.online.vectors import vectors
 from ctrlgen.trajectory.scenario import motion_targets
 
 # Share of the branches taken. What is left, by what stands in its line, cannot be entered or not for certain in float:

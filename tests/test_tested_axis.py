@@ -9,7 +9,7 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.hypotheses.hypotheses import hypotheses
+from ctrlgen.estimation.hypothesis import hypotheses
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.simulation import trace
 

@@ -14,17 +14,17 @@ from scipy import stats
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ctrlgen.diagnosis.estimation import residual_tests
-from ctrlgen.diagnosis.estimation.error_model import ErrorModel
-from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.estimation.held_out import HeldOutRefit
-from ctrlgen.diagnosis.estimation.noise import cross_correlation
-from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests, run_residual_tests
-from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, wins_by_block
 from ctrlgen.diagnosis.selection.objections import objections
+from ctrlgen.estimation import residual_tests
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.held_out import HeldOutRefit
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import cross_correlation
+from ctrlgen.estimation.residual_tests import ResidualTests, run_residual_tests
+from ctrlgen.estimation.structure import FreeParameter, Structure
 from ctrlgen.recordings.recording import Record, Recording
 
 N = 1000  # samples to fit, and held out

@@ -11,9 +11,9 @@ import ctrlgen
 from ctrlgen import Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, primary
+from ctrlgen.trajectory.inverse.balanced import PathInverse
+from ctrlgen.trajectory.inverse.violations import violations
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
-from ctrlgen.trajectory.path_inverse import PathInverse
-from ctrlgen.trajectory.violations import violations
 
 DEVICES = DEVICE.parent
 BACKLASH = '\n[[effect]]\nkind = "backlash"\nat = "2X"\ngap = "0.3 um"\n'

@@ -13,7 +13,7 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
 from ctrlgen.diagnosis.selection.verdict import EXPLAINED
-from ctrlgen.reporting.plots import draw_path
+from ctrlgen.trajectory.solution_plots import draw_path
 
 INERTIA, WEIGHT, DAMPING, MOTOR = 2e-4, 0.02, 4e-4, 0.015
 STEP = 2e-3

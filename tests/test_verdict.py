@@ -10,13 +10,10 @@ import pytest
 from misfits import errors_of, left, noise_of
 from scipy import stats
 
-from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
-from ctrlgen.diagnosis.estimation.structure import FreeParameter
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.attribution import Attribution, Share
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.diagnosis_result import findings, held_out_errors
 from ctrlgen.diagnosis.selection.objections import objections
-from ctrlgen.diagnosis.selection.result import findings, held_out_errors
 from ctrlgen.diagnosis.selection.verdict import (
     AMBIGUOUS,
     CONSISTENT,
@@ -30,6 +27,9 @@ from ctrlgen.diagnosis.selection.verdict import (
     verdict,
     within_tolerance,
 )
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.residual_tests import ResidualTests
+from ctrlgen.estimation.structure import FreeParameter
 
 N, JUST = 1000, 1e-6
 CREEP, DRIFT, GAIN, REVERSED = (
@@ -199,7 +199,7 @@ def test_laws_of_one_family_at_one_place_are_one_answer_where_more_than_noise_is
 def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_cause_first(monkeypatch):
     """Reversed 0.9 to 1.1 times: one."""
     monkeypatch.setattr(
-        "ctrlgen.diagnosis.selection.result.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
+        "ctrlgen.diagnosis.selection.diagnosis_result.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
     )
     chosen = trial(causes=(GAIN, REVERSED), free_parameters=(number("effect[0].gain", cause=0),), theta=(1.1,))
     bare = (trial(held=3.0 * N), trial(held=8.0 * N))
@@ -217,7 +217,9 @@ def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_
 
 
 def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monkeypatch):
-    monkeypatch.setattr("ctrlgen.diagnosis.selection.result.prediction_uncertainty", lambda *_: np.array([5e-9]))
+    monkeypatch.setattr(
+        "ctrlgen.diagnosis.selection.diagnosis_result.prediction_uncertainty", lambda *_: np.array([5e-9])
+    )
     valid = np.ones((4, 1), bool)
     valid[3] = False
     nominal, chosen = trial(), trial()

@@ -19,13 +19,13 @@ from result_files import faults
 from typer.testing import CliRunner
 
 from ctrlgen import ToolError, generate
-from ctrlgen.app import pipeline
+from ctrlgen.app import scenario_pipeline as pipeline
 from ctrlgen.app.commands import controllers  # noqa: F401, it registers the command
 from ctrlgen.app.commands.app import app
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.package import verify_package
-from ctrlgen.firmware.real import Real
-from ctrlgen.reporting.build_page import write_build
-from ctrlgen.reporting.build_record import BUDGETS, Build, record
+from ctrlgen.verification.build_page import write_build
+from ctrlgen.verification.build_record import BUDGETS, Build, record
 from ctrlgen.verification.check import Check, CheckFinding, not_run
 from ctrlgen.verification.comparison import Comparison, ComparisonRow
 from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun

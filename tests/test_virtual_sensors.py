@@ -15,7 +15,8 @@ from ctrlgen.devices import Device
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace, simulate
 from ctrlgen.model.virtual_sensors import simulate_sensors
-from ctrlgen.physics.sensor_models import PEAK_TO_PEAK, SENSORS, find_fringes
+from ctrlgen.physics.sensor_models import PEAK_TO_PEAK, SENSORS
+from papers.sensor_calibration import find_fringes
 
 NM, UM, CELSIUS = 1e-9, 1e-6, 273.15
 EDDY = {"kind": "displacement", "at": "delta_x", "model": "3316"}

@@ -6,7 +6,7 @@ import pytest
 from conftest import DEVICES
 
 from ctrlgen import InputError, build_model, load_device, simulate
-from ctrlgen.model.feedforward import Controller
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.trajectory.workspace import Workspace
 
 UM = 1e-6

@@ -29,8 +29,8 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
 from ctrlgen.core.parallel import Failure, run_all
 from ctrlgen.devices.section import Section
-from ctrlgen.diagnosis.hypotheses.hypotheses import selected_laws
-from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, digests
+from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, digests
+from ctrlgen.estimation.hypothesis import selected_laws
 from ctrlgen.version import code_hash
 
 MADE_FROM = "made_from.json"  # in each result folder: what the result depends on

@@ -18,15 +18,14 @@ from ctrlgen.core.errors import CtrlgenError
 from ctrlgen.core.units import from_si, show
 
 if TYPE_CHECKING:
-    from ctrlgen.app import pipeline
+    from ctrlgen.app import scenario_pipeline as pipeline
     from ctrlgen.app.batch import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
-    from ctrlgen.diagnosis.selection.result import Diagnosis
+    from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
     from ctrlgen.model.model import Model
     from ctrlgen.recordings.recording import Recording
-    from ctrlgen.reporting.build_record import Build
-    from ctrlgen.reproduce.row import PrintedNumber
     from ctrlgen.trajectory.scenario import Scenario
+    from ctrlgen.verification.build_record import Build
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
@@ -44,7 +43,7 @@ def print_shaper(scenario: Scenario, model: Model) -> None:
 
 def print_solution(outcome: pipeline.Outcome) -> None:
     """Title, tracking error, margins and expectations."""
-    from ctrlgen.reporting.report import robust_sentence
+    from ctrlgen.verification.scenario_report import robust_sentence
 
     solution = outcome.solution
     scenario = solution.scenario
@@ -95,7 +94,7 @@ def print_solution(outcome: pipeline.Outcome) -> None:
 
 def print_comparison(outcome: pipeline.Outcome) -> None:
     """One line per arithmetic and comparison."""
-    from ctrlgen.reporting.report import worst_rows
+    from ctrlgen.verification.scenario_report import worst_rows
 
     if outcome.comparison is None or outcome.c is None:
         return
@@ -231,30 +230,6 @@ def print_diagnosis(found: Diagnosis) -> None:
         out.print(f"note: {note}", markup=False, soft_wrap=True)
     for step in next_steps(found):
         out.print(f"next: {step}", markup=False, soft_wrap=True)
-
-
-def print_reproduced(rows: Sequence[PrintedNumber]) -> None:
-    """The printed numbers of the papers beside ours: status and reason."""
-    from ctrlgen.reproduce.row import ReproductionStatus
-
-    colours = {
-        ReproductionStatus.REPRODUCED: "green",
-        ReproductionStatus.DIFFERS: "red",
-        ReproductionStatus.NOT_COMPUTABLE: "yellow",
-    }
-    table = table_of(("", "left"), ("where", "left"), ("printed", "right"), ("ours", "right"), ("", "left"))
-    for row in rows:
-        ours = "" if row.ours is None else f"{row.ours:.6g}"
-        status = f"[{colours[row.status]}]{row.status.value}[/{colours[row.status]}]"
-        table.add_row(
-            row.source,
-            escape(row.where),
-            escape(row.printed if row.unit == "1" else f"{row.printed} {row.unit}"),
-            ours,
-            status,
-            escape(row.reason),
-        )
-    show_table(table)
 
 
 def print_bootstrap(found: Bootstrap) -> None:

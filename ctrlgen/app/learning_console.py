@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def print_learning(learning: Learning) -> None:
     """The runs with their errors, reached and predicted, how the device answered, and what comes next."""
-    from ctrlgen.reporting.learning_page import shown_error, verdict
+    from ctrlgen.learning.learning_page import shown_error, verdict
 
     out.print(f"[bold]learning from runs: {escape(learning.solution.scenario.file.title)}[/bold]", soft_wrap=True)
     table = table_of(

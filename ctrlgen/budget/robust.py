@@ -31,10 +31,10 @@ from ctrlgen.core.units import difference, show
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory import solution as described
-from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.infeasibility import instead
-from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
-from ctrlgen.trajectory.path_inverse import PathInverse
+from ctrlgen.trajectory.inverse.balanced import PathInverse
+from ctrlgen.trajectory.inverse.inertial import InertialInverse
+from ctrlgen.trajectory.inverse.redundant import LeastEffortInverse, motion_inverse, path_inverse
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.scenario_file import Robust
 from ctrlgen.trajectory.solution import Solution, judged_by, unlimited

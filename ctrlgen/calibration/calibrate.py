@@ -2,7 +2,7 @@
 
     min over p of rho(W (y - y(p, s))) + sum (s_j/sd_j)^2,   low <= p <= high
 
-as `ctrlgen.diagnosis.estimation.least_squares` states it, under the noise and the discrepancy of the recording. A constant that the
+as `ctrlgen.estimation.least_squares` states it, under the noise and the discrepancy of the recording. A constant that the
 recording does not tell better than `TOLD` times what its bounds tell keeps its default; the intervals of the others then include what
 it may be within its bounds (uniform, GUM 4.3.7), with which they are correlated (GUM 5.2).
 """
@@ -23,13 +23,13 @@ from ctrlgen.core.files import read_text
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.isolated_outliers import mark_outliers
-from ctrlgen.diagnosis.estimation.noise import estimate_noise
-from ctrlgen.diagnosis.estimation.noise_update import update_guessed_noise
-from ctrlgen.diagnosis.estimation.robust_covariance import widening
-from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
-from ctrlgen.diagnosis.settings import DISCREPANCY, NOISE_UPDATE, SIMULATION, STATISTICS
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.isolated_outliers import mark_outliers
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.noise_update import update_guessed_noise
+from ctrlgen.estimation.robust_covariance import widening
+from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, SIMULATION, STATISTICS
+from ctrlgen.estimation.structure import FreeParameter, Structure
 from ctrlgen.model.assembly import build_model, movable, symbolic_model
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.reader import load_recordings

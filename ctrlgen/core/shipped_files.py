@@ -1,9 +1,13 @@
-"""Folders of the repository that are part of the installed package: the C templates and the examples."""
+"""Folders of the repository that are part of the installed package: the C templates, the examples, the papers' numbers."""
 
 from __future__ import annotations
 
+import sys
+from importlib import import_module
 from importlib.resources import files
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 
 def shipped(name: str) -> Path:
@@ -14,3 +18,20 @@ def shipped(name: str) -> Path:
     package = Path(str(files("ctrlgen")))
     copy = package / f"_{name}"
     return copy if copy.is_dir() else package.parent / name
+
+
+def shipped_package(name: str) -> ModuleType:
+    """The Python package `name` beside ctrlgen in a checkout, or its copy `ctrlgen._NAME` in an installed package.
+
+    Raises ImportError where neither is there.
+    """
+    folder = shipped(name)
+    if folder.name != name:
+        return import_module(f"ctrlgen.{folder.name}")
+    if name not in sys.modules:
+        spec = spec_from_file_location(name, folder / "__init__.py", submodule_search_locations=[str(folder)])
+        if spec is None or spec.loader is None:
+            raise ImportError(f"{folder} is missing: {name} comes with a checkout of ctrlgen and with its wheel")
+        module = sys.modules[name] = module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return sys.modules[name]

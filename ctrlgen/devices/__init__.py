@@ -5,7 +5,7 @@ from __future__ import annotations
 import reprlib
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 
 import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file is read
 from ctrlgen.core.errors import Fault, InputError
@@ -13,8 +13,9 @@ from ctrlgen.core.files import read_toml, validate
 from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics, Limit, Signal
 from ctrlgen.devices.python_file import KIND, changed_device, python_device, python_file_of
 
-for _module in iter_modules(__path__):
-    import_module(f"{__name__}.{_module.name}")
+for _module in walk_packages(__path__, f"{__name__}."):
+    if not _module.name.endswith(".figure"):  # drawing is imported when something is drawn
+        import_module(_module.name)
 
 
 def load_device(path: Path | str) -> Device:

@@ -22,7 +22,7 @@ from ctrlgen.devices.base import (
     Section,
     Signal,
 )
-from ctrlgen.numerics.second_order import second_order
+from ctrlgen.numerics.constraint_second_order import second_order
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics.damping import modal_damping
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
-from ctrlgen.numerics.second_order import second_order
-from ctrlgen.physics import meso_hexapod
+from ctrlgen.numerics.constraint_second_order import second_order
+from ctrlgen.physics import meso_hexapod_kinematics as meso_hexapod
 
 Length = Annotated[Quantity, In("mm", positive=True)]
 Angle = Annotated[Quantity, In("deg")]

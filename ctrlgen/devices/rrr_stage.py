@@ -12,8 +12,9 @@ from pydantic import model_validator
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
 from ctrlgen.devices.hinge import Hinge
-from ctrlgen.physics import piezo_stack, rrr_stage
-from ctrlgen.physics.rrr_stage import Kinetostatics
+from ctrlgen.physics import piezo_stack
+from ctrlgen.physics import rrr_kinetostatics as rrr_stage
+from ctrlgen.physics.rrr_kinetostatics import Kinetostatics
 from ctrlgen.physics.screw import Matrix
 
 Length = Annotated[Quantity, In("mm", positive=True)]

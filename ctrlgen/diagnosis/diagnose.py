@@ -22,29 +22,29 @@ from threadpoolctl import threadpool_limits
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.checkpoint import Checkpoint
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.isolated_outliers import mark_outliers
-from ctrlgen.diagnosis.estimation.noise import Noise, estimate_noise
-from ctrlgen.diagnosis.estimation.noise_update import correct_stated_noise, update_guessed_noise
-from ctrlgen.diagnosis.estimation.profile_likelihood import profiles
-from ctrlgen.diagnosis.estimation.residual_tests import run_residual_tests
-from ctrlgen.diagnosis.estimation.spikes import Spikes, find_spikes
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.diagnosis.selection.attribution import attribute
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
-from ctrlgen.diagnosis.selection.result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, in_another_unit, verdict
-from ctrlgen.diagnosis.settings import NOISE, NOISE_UPDATE, SIMULATION
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
+from ctrlgen.estimation.checkpoint import Checkpoint
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
+from ctrlgen.estimation.isolated_outliers import mark_outliers
+from ctrlgen.estimation.noise import Noise, estimate_noise
+from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
+from ctrlgen.estimation.profile_likelihood import profiles
+from ctrlgen.estimation.residual_tests import run_residual_tests
+from ctrlgen.estimation.settings import NOISE, NOISE_UPDATE, SIMULATION
+from ctrlgen.estimation.spikes import Spikes, find_spikes
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.recording import Recording

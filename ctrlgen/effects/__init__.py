@@ -9,7 +9,7 @@ To add a law:
    from which the diagnosis must recover the parameters. That test file fails while a law has none.
 
 The theorems of `tests/test_effects.py` then hold the law to its claims: off means off, energy, units, C equal to Python. What
-the diagnosis believes of it beforehand has defaults; `ctrlgen/diagnosis/hypotheses/priors.py` takes a row where they are wrong.
+the diagnosis believes of it beforehand has defaults; `ctrlgen/estimation/priors.py` takes a row where they are wrong.
 
 A law's file imports `Effect, Param, Place` (and `State`) from here. Files that begin with an underscore are no laws: the law's
 interface, the reader of [[effect]] tables, and expressions that several laws share.

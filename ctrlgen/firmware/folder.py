@@ -15,18 +15,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ctrlgen.firmware.compression import Compression, compress
-from ctrlgen.firmware.deviations import deviations_context
-from ctrlgen.firmware.misra import CPPCHECK
-from ctrlgen.firmware.online import online_context
+from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.firmware.c.deviations import deviations_context
+from ctrlgen.firmware.c.misra import CPPCHECK
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import write
+from ctrlgen.firmware.online.online import online_context
+from ctrlgen.firmware.online.vectors import played_vectors, vectors
 from ctrlgen.firmware.package import PIECES, owners, write_package
-from ctrlgen.firmware.player import player_context
+from ctrlgen.firmware.player.compression import Compression, compress
+from ctrlgen.firmware.player.player_context import player_context
 from ctrlgen.firmware.player_only import check_online
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.templates import write
-from ctrlgen.firmware.vectors import played_vectors, vectors
 from ctrlgen.model.model import Model
-from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.trajectory.scenario import Scenario, check_tightened, motion_targets
 from ctrlgen.trajectory.solution import Solution
 

@@ -13,9 +13,9 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices.base import Signal
-from ctrlgen.firmware.compression import Candidate
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.templates import comment, write
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import comment, write
+from ctrlgen.firmware.player.compression import Candidate
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, commit
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.controller.null_motion import why_no_null_motion
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
-from ctrlgen.firmware.compression import compress
+from ctrlgen.firmware.c.templates import comment, write
 from ctrlgen.firmware.package import LICENCE, MANIFEST, input_files
-from ctrlgen.firmware.player import player_context
-from ctrlgen.firmware.templates import comment, write
+from ctrlgen.firmware.player.compression import compress
+from ctrlgen.firmware.player.player_context import player_context
 from ctrlgen.model.model import Model
-from ctrlgen.model.null_motion import why_no_null_motion
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.version import __version__, commit, program

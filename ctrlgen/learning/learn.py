@@ -21,10 +21,10 @@ from ctrlgen.learning.repeatability import Repeated, Spectrum
 from ctrlgen.learning.response import Change, Response, response
 from ctrlgen.learning.runs import Runs, check_belongs, errors, load_runs
 from ctrlgen.model.simulation import trace
-from ctrlgen.recordings.files import recording_files, sha256
+from ctrlgen.recordings.recorded_files import recording_files, sha256
+from ctrlgen.trajectory.inverse.violations import Before, violations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, closest_margins, solve
-from ctrlgen.trajectory.violations import Before, violations
 
 FIRST_STEP = (
     0.2  # of the largest drive, by which the first step may change any: what the device answers is not known yet

@@ -6,7 +6,7 @@ where the law is linear in them, B u = f, are
     u = W^-1 B^T (B W^-1 B^T)^-1 f,      W = diag(w_i / r_i^2),
 
 the weighted pseudo-inverse. With it the device has one drive f for each axis and is inverted as any other. Limits are not looked at here:
-`ctrlgen.trajectory.least_effort` keeps them. Source: T. A. Johansen, T. I. Fossen, Automatica 49 (2013) 1087 (control allocation).
+`ctrlgen.trajectory.inverse.redundant` keeps them. Source: T. A. Johansen, T. I. Fossen, Automatica 49 (2013) 1087 (control allocation).
 """
 
 from __future__ import annotations

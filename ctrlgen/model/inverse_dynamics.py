@@ -16,7 +16,7 @@ equations one of every axis's force. There the accelerations a and their derivat
 g being the net forces: the matrices are then solved once, as constant blocks, and each actuator's law by itself.
 
 States that no such equation determines (memories of effects, flexible modes, an integrator of a feedback loop) are internal: here they
-stay at rest, and `ctrlgen.trajectory.sampled_inverse` finds them.
+stay at rest, and `ctrlgen.trajectory.inverse.sampled` finds them.
 Source: A. Isidori, Nonlinear Control Systems, 3rd ed. (1995), section 5.1.
 """
 

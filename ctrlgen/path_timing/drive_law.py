@@ -22,7 +22,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 from ctrlgen.model.inverse_dynamics import inverse_dynamics
 from ctrlgen.model.model import Limit, Model
-from ctrlgen.trajectory.path_inverse import PathInverse
+from ctrlgen.trajectory.inverse.balanced import PathInverse
 
 DEGREE = 5  # of the splines of the equilibria along a path
 

@@ -17,13 +17,13 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import Quantity, read_quantity, show
 from ctrlgen.model.model import Model
-from ctrlgen.path_timing.between import error_between
 from ctrlgen.path_timing.binding import Binding, bindings
-from ctrlgen.path_timing.confirmed import Followed, fewest
 from ctrlgen.path_timing.curve import Curve
+from ctrlgen.path_timing.feasibility import Followed, fewest
+from ctrlgen.path_timing.intersample_error import error_between
 from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.path_timing.repetition import Repetition, at_frequency, check_frequency
-from ctrlgen.trajectory.path_inverse import count_faults
+from ctrlgen.trajectory.inverse.balanced import count_faults
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, check_feasibility, solve
 

@@ -22,10 +22,10 @@ from ctrlgen.path_timing.drive_law import (
     distances_at,
     sides_of,
 )
-from ctrlgen.path_timing.programme import RateBound, SpeedProgramme
-from ctrlgen.path_timing.speed_bound import landed, largest_speeds, largest_steps, steps_in_time
+from ctrlgen.path_timing.maximum_velocity import landed, largest_speeds, largest_steps, steps_in_time
+from ctrlgen.path_timing.time_optimal_nlp import RateBound, SpeedProgramme
 from ctrlgen.path_timing.timing_law import TimingLaw
-from ctrlgen.trajectory.path_inverse import PathInverse
+from ctrlgen.trajectory.inverse.balanced import PathInverse
 from ctrlgen.trajectory.paths import smooth_step
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
 

@@ -10,7 +10,7 @@ import scipy
 
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import Quantity, from_si, written_unit
-from ctrlgen.path_timing.confirmed import Followed
+from ctrlgen.path_timing.feasibility import Followed
 from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.trajectory.paths import Circle
 from ctrlgen.trajectory.solution import Solution, solve

@@ -1,4 +1,4 @@
-"""HTML pages from the templates of this package."""
+"""HTML pages from templates, each of which stands beside the module that fills it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 
 import jinja2
 
-TEMPLATES = Path(__file__).resolve().parent / "templates"
+SHARED = Path(__file__).resolve().parent  # what several pages include
 
 
-def render(template: str, **values: Any) -> str:
-    """The page of a `template` in this package's `templates/`. Raises jinja2.UndefinedError for a value that is missing."""
+def render(template: Path, **values: Any) -> str:
+    """The page of the file `template`. Raises jinja2.UndefinedError for a value that is missing."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, undefined=jinja2.StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
+        loader=jinja2.FileSystemLoader([template.resolve().parent, SHARED]), autoescape=True,
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    return environment.get_template(template).render(**values)
+    return environment.get_template(template.name).render(**values)

@@ -16,8 +16,8 @@ import numpy as np
 
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.model import Model, Signal
-from ctrlgen.trajectory.motion import Command, samples_of, scaled
-from ctrlgen.trajectory.path_inverse import PERIODS
+from ctrlgen.trajectory.inverse.balanced import PERIODS
+from ctrlgen.trajectory.inverse.motion import Command, samples_of, scaled
 
 SHARES = 2.0 ** -np.arange(7, -1, -1)  # of the way to the end of an admissible range, where a shift is tried
 HALVINGS = 9  # of an interval: a shift or a scale to a five-hundredth

@@ -10,11 +10,11 @@ from ctrlgen.core.errors import Infeasibility, SolverError, Unreachable
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.model import Model, Signal
 from ctrlgen.trajectory.alternatives import Alternatives, Inverse
-from ctrlgen.trajectory.motion import Command, samples_of
+from ctrlgen.trajectory.inverse.balanced import InverseTrajectory
+from ctrlgen.trajectory.inverse.motion import Command, samples_of
+from ctrlgen.trajectory.inverse.violations import Violation, violations
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
-from ctrlgen.trajectory.path_inverse import InverseTrajectory
 from ctrlgen.trajectory.scenario import Scenario
-from ctrlgen.trajectory.violations import Violation, violations
 
 FEASIBILITY_TOLERANCE = (
     1e-5  # typical sizes (1 um, or 1 um at the platform's rim) off the command that count as none: 10 pm

@@ -25,8 +25,8 @@ from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
 from ctrlgen.numerics.ipopt import check_signal
-from ctrlgen.trajectory.path_inverse import InverseTrajectory
-from ctrlgen.trajectory.violations import violations
+from ctrlgen.trajectory.inverse.balanced import InverseTrajectory
+from ctrlgen.trajectory.inverse.violations import violations
 
 SLACK_WEIGHT = 1e8  # against IPOPT's barrier, which otherwise keeps the solution sqrt(mu) off an active bound
 TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error

@@ -23,7 +23,7 @@ from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
 from ctrlgen.model.model import Model
 from ctrlgen.model.quasi_static import natural_modes
 from ctrlgen.trajectory.frame import Frame
-from ctrlgen.trajectory.motion import Command, Motion
+from ctrlgen.trajectory.inverse.motion import Command, Motion
 from ctrlgen.trajectory.paths import PathKind, Poses
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES, ScenarioFile
 from ctrlgen.trajectory.shaping import Shaper, Shaping

@@ -15,16 +15,16 @@ from ctrlgen.model.discretisation import one_step_map
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.quasi_static import natural_modes, quasi_static
 from ctrlgen.model.simulation import Trace, periodic_start, simulate
-from ctrlgen.trajectory.inertial_inverse import InertialInverse
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, unreachable
-from ctrlgen.trajectory.least_effort import LeastEffortInverse, motion_inverse, path_inverse
-from ctrlgen.trajectory.motion import Motion
+from ctrlgen.trajectory.inverse.balanced import InverseTrajectory, PathInverse, count_faults
+from ctrlgen.trajectory.inverse.inertial import InertialInverse
+from ctrlgen.trajectory.inverse.motion import Motion
+from ctrlgen.trajectory.inverse.redundant import LeastEffortInverse, motion_inverse, path_inverse
+from ctrlgen.trajectory.inverse.sampled import SampledTrajectory
+from ctrlgen.trajectory.inverse.violations import Before, limited_values, violations
 from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
-from ctrlgen.trajectory.path_inverse import InverseTrajectory, PathInverse, count_faults
-from ctrlgen.trajectory.sampled_inverse import SampledTrajectory
 from ctrlgen.trajectory.scenario import Scenario, check_tightened
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
-from ctrlgen.trajectory.violations import Before, limited_values, violations
 
 SHOWN = 3  # limits that a message names
 LOOKED_AT_BETWEEN = 4  # parts of a sample at whose ends the motion between samples is looked at

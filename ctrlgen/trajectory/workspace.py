@@ -12,9 +12,9 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension
-from ctrlgen.model.feedforward import Controller
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 

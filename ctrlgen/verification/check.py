@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.c.real import Real
 
 PATIENCE = 900.0  # s; a tool that takes longer is stopped
 

@@ -1,7 +1,7 @@
 """Compares the generated C with the model: builds it strictly, runs it, reports where it first differs.
 
 Every compiler present builds every arithmetic. Three references: the controller evaluated by CasADi
-(`ctrlgen.model.feedforward`), IPOPT's solution of the scenario, and the model simulated forward with the
+(`ctrlgen.controller.feedforward`), IPOPT's solution of the scenario, and the model simulated forward with the
 drives that the C computed.
 """
 
@@ -17,15 +17,15 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ctrlgen.controller.feedforward import SECANT_FRACTION, ControllerStatus
+from ctrlgen.controller.motion_feedforward import MotionController
 from ctrlgen.core.units import from_si, same_dimension
-from ctrlgen.firmware.compression import Compression
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import COMPILERS, find_compilers
 from ctrlgen.firmware.folder import CFolder, write_harness
-from ctrlgen.firmware.online import FLOAT_SLACK
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import COMPILERS, find_compilers
-from ctrlgen.model.feedforward import SECANT_FRACTION, ControllerStatus
+from ctrlgen.firmware.online.online import FLOAT_SLACK
+from ctrlgen.firmware.player.compression import Compression
 from ctrlgen.model.model import Model
-from ctrlgen.model.motion_feedforward import MotionController
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.numerics.newton import newton_solver
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.verification.check import run_tool, version_of
 
 # No fused multiply-add: the same bits as on the computer. No unwinding: C needs none.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.real import Real
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.verification.cores import Core
 
 PAGE = 0x1000

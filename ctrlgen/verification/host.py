@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.core.errors import ToolError
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import compile_c, find_compilers
 from ctrlgen.firmware.folder import CFolder, write_harness
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.toolchains import compile_c, find_compilers
 from ctrlgen.verification.reference import ReferenceAnswers
 
 

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.online import rates_in_c
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.templates import write
-from ctrlgen.model.feedforward import ControllerStatus
+from ctrlgen.firmware.online.online import rates_in_c
 from ctrlgen.model.model import Model
-from ctrlgen.model.motion_feedforward import controller_of
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.core.errors import ToolError
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.real import Real
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import MISSING, Machine, available
 from ctrlgen.verification.host import Host

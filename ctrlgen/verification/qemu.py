@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ctrlgen.core.errors import ToolError
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.real import Real
-from ctrlgen.firmware.templates import write
 from ctrlgen.verification.check import Check, CheckFinding, finished, not_run, run_tool, version_of
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile
 

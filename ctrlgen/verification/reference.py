@@ -7,8 +7,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ctrlgen.model.controller_step import State
-from ctrlgen.model.motion_feedforward import controller_of
+from ctrlgen.controller.controller_step import State
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.scenario import motion_targets
 from ctrlgen.trajectory.solution import Solution

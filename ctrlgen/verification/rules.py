@@ -12,10 +12,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from ctrlgen.firmware.deviations import permits
+from ctrlgen.firmware.c.deviations import permits
+from ctrlgen.firmware.c.misra import CPPCHECK, rule_class
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.misra import CPPCHECK, rule_class
-from ctrlgen.firmware.real import Real
 from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
 
 MISRA = "cppcheck --addon=misra"

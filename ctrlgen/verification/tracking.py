@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.real import Real
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.verification.host import Host
 from ctrlgen.verification.reference import ReferenceAnswers

@@ -151,14 +151,14 @@ def equations_page() -> str:
 
 
 def priors_page() -> str:
-    """What the search believes of each law before it sees data, from `ctrlgen/diagnosis/hypotheses/priors.py`."""
-    from ctrlgen.diagnosis.hypotheses import priors
+    """What the search believes of each law before it sees data, from `ctrlgen/estimation/priors.py`."""
     from ctrlgen.effects import Effect
+    from ctrlgen.estimation import priors
 
     lines = [
         GENERATED, "# Priors of the laws", "",
         "What the diagnosis believes of each [law](effects.md) before it sees a recording; "
-        "`ctrlgen/diagnosis/hypotheses/priors.py` states it.", "",
+        "`ctrlgen/estimation/priors.py` states it.", "",
         "- *Odds*: how many times commoner the law is than a wrong gain; it decides among causes that explain alike.",
         "- *Form error*: what the law's form leaves after its parameters are fitted, as a share of what the law explains.",
         "- *Family*: laws that are forms of one physics. A place has at most one of a family.",

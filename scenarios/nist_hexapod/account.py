@@ -11,12 +11,12 @@ import numpy as np
 
 import ctrlgen
 from ctrlgen import Diagnosis
-from ctrlgen.diagnosis.estimation.structure import Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.calibration import calibrate_jacobian
 from ctrlgen.recordings.pose_errors import PoseErrors
 from ctrlgen.recordings.reader import load_recordings
-from ctrlgen.reproduce.s0_data import load_s0
+from papers.s0_data import load_s0
 
 HERE = Path(__file__).parent
 TWO_COMPONENTS = slice(24, 54)  # the poses held out

@@ -84,7 +84,7 @@ def budget(
             load_scenario(scenario, device), uncertainty, probability=chance, draws=draws, seed=seed, finer=finer, progress=advance
         )  # fmt: skip
         if out_folder is not None:
-            from ctrlgen.reporting.budget_page import write_budget
+            from ctrlgen.budget.budget_page import write_budget
 
             advance("report")
             with whole_folder(out_folder) as draft:

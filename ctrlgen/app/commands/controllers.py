@@ -12,7 +12,7 @@ from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, OutFolder, Sce
 from ctrlgen.app.console import out, print_build, print_comparison, print_solution, progress
 
 if TYPE_CHECKING:
-    from ctrlgen.app.pipeline import Outcome
+    from ctrlgen.app.scenario_pipeline import Outcome
     from ctrlgen.trajectory.scenario import Scenario
 
 
@@ -25,7 +25,7 @@ def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = Non
 
     Example:  ctrlgen run scenarios/circle20 --out out/circle20
     """
-    from ctrlgen.app import pipeline
+    from ctrlgen.app import scenario_pipeline as pipeline
 
     with progress(pipeline.STEPS) as advance:
         outcome = pipeline.run(_read(scenario, device), out_folder, advance)
@@ -41,7 +41,7 @@ def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = N
 
     Example:  ctrlgen solve scenarios/raster --out out/raster
     """
-    from ctrlgen.app import pipeline
+    from ctrlgen.app import scenario_pipeline as pipeline
 
     with progress(2) as advance:
         outcome = pipeline.solve_into(_read(scenario, device), out_folder, advance)
@@ -69,7 +69,7 @@ def generate(
 
     Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
     """
-    from ctrlgen.app import pipeline
+    from ctrlgen.app import scenario_pipeline as pipeline
 
     if player:
         with progress(2) as advance:
@@ -90,7 +90,7 @@ def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
 
     Example:  ctrlgen compare scenarios/circle20
     """
-    from ctrlgen.app import pipeline
+    from ctrlgen.app import scenario_pipeline as pipeline
 
     with progress(pipeline.STEPS - 1) as advance:
         outcome = pipeline.compare_only(_read(scenario, device), advance)
@@ -120,7 +120,7 @@ def verify(
 
     Example:  ctrlgen verify scenarios/circle20 --out out/verify
     """
-    from ctrlgen.app import pipeline
+    from ctrlgen.app import scenario_pipeline as pipeline
 
     with progress(pipeline.VERIFY_STEPS) as advance:
         build = pipeline.verify(_read(scenario, device), out_folder, advance, quick)
@@ -146,7 +146,7 @@ def fmu(
 
     Example:  ctrlgen fmu scenarios/circle20 --out out/fmu
     """
-    from ctrlgen.app import pipeline
+    from ctrlgen.app import scenario_pipeline as pipeline
 
     made = pipeline.fmus_into(_read(scenario, device), out_folder, fmi)
     for path in made.paths:

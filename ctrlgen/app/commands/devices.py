@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app
-from ctrlgen.app.console import err, out, print_reproduced, print_workspace, progress
+from ctrlgen.app.console import err, out, print_workspace, progress
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.shipped_files import shipped_package
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)
@@ -37,7 +39,7 @@ def check(
 
     Example:  ctrlgen check scenarios/devices/mems_hexapod.toml
     """
-    from ctrlgen.app.check import check as checked
+    from ctrlgen.app.check_files import check as checked
 
     checked(file, device_path, _picture("--figure", figure) if figure is not None else None)
 
@@ -65,9 +67,9 @@ def bode(
 
     Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --out bode.svg --at delta_x=5um,delta_z=20um
     """
+    from ctrlgen.controller.bode import draw_bode
     from ctrlgen.devices import load_device
     from ctrlgen.model.assembly import build_model
-    from ctrlgen.reporting.bode import draw_bode
     from ctrlgen.trajectory.frame import Frame
     from ctrlgen.trajectory.workspace import middle_pose
 
@@ -96,7 +98,7 @@ def workspace(
 
     Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
     """
-    from ctrlgen.app.pipeline import map_workspace
+    from ctrlgen.app.scenario_pipeline import map_workspace
     from ctrlgen.devices import load_device
 
     print_workspace(map_workspace(load_device(device), at or [], out_folder))
@@ -118,9 +120,9 @@ def reproduce(
 
     Example:  ctrlgen reproduce S3 --differing
     """
-    from ctrlgen.reproduce import all as everything
-    from ctrlgen.reproduce.row import ReproductionStatus
-    from ctrlgen.reproduce.s3_hinges import NEEDS_FEM
+    papers = shipped_package("papers").__name__
+    everything = import_module(f"{papers}.all")
+    row, hinges, console = (import_module(f"{papers}.{name}") for name in ("row", "s3_hinges", "console"))
 
     chosen = [name.upper() for name in source or everything.SOURCES]
     unknown = [name for name in chosen if name not in everything.SOURCES]
@@ -140,10 +142,10 @@ def reproduce(
     if json_:
         print(json.dumps(everything.as_json(rows), indent=1))
         return
-    print_reproduced([row for row in rows if not (differing and row.status is ReproductionStatus.REPRODUCED)])
+    console.print_reproduced([r for r in rows if not (differing and r.status is row.ReproductionStatus.REPRODUCED)])
     counts = everything.counts(rows)
     for name in chosen:
-        numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in ReproductionStatus)
+        numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in row.ReproductionStatus)
         out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)
-    if lacking := sum(row.reason == NEEDS_FEM for row in rows):
-        err.print(f"{lacking} rows of S3: {NEEDS_FEM}", style="yellow", markup=False, soft_wrap=True)
+    if lacking := sum(r.reason == hinges.NEEDS_FEM for r in rows):
+        err.print(f"{lacking} rows of S3: {hinges.NEEDS_FEM}", style="yellow", markup=False, soft_wrap=True)

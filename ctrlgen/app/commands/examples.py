@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from ctrlgen.app.commands.app import DEVICE_PANEL, app
 from ctrlgen.app.console import out, show_table, table_of
-from ctrlgen.app.examples import copy_examples, examples
+from ctrlgen.app.shipped_examples import copy_examples, examples
 from ctrlgen.core.errors import Fault, InputError
 
 

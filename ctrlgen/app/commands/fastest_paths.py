@@ -58,7 +58,7 @@ def fastest(
         found = fastest_path(loaded, sample_rate=sample_rate, frequency=frequency, progress=advance)
         if out_folder is not None:
             from ctrlgen.firmware.player_only import generate_player
-            from ctrlgen.reporting.fastest_page import write_fastest
+            from ctrlgen.path_timing.fastest_page import write_fastest
 
             advance("player and report")
             with whole_folder(out_folder) as draft:

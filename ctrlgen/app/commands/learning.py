@@ -59,7 +59,7 @@ def learn(
         found = learn_next(load_scenario(scenario, device), recordings, progress=advance)
         if out_folder is not None:
             from ctrlgen.firmware.player_only import generate_player
-            from ctrlgen.reporting.learning_page import write_learning
+            from ctrlgen.learning.learning_page import write_learning
 
             advance("report and player")
             with whole_folder(out_folder) as draft:

@@ -71,7 +71,7 @@ def diagnose(
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
-    from ctrlgen.diagnosis.pipeline import Replicates, diagnose_into, unfinished
+    from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, unfinished
 
     if scheduler is not None and not bootstrap:
         raise typer.BadParameter(
@@ -139,7 +139,7 @@ def calibrate(
     Example:  ctrlgen calibrate scenarios/devices/mems_hexapod_run_time.toml scenarios/hexapod_specimen --out out/specimen
     """
     from ctrlgen.app.calibration_console import print_calibration
-    from ctrlgen.calibration.budgets import budgets
+    from ctrlgen.calibration.budgets_compared import budgets
     from ctrlgen.calibration.calibrate import calibrate as calibrated
     from ctrlgen.calibration.device_file import NAME, write_calibrated_device
     from ctrlgen.core.files import check_folder, whole_folder
@@ -150,7 +150,7 @@ def calibrate(
         found = calibrated(device, recording, advance)
         both = None if scenario is None else budgets(found, scenario, device, advance)
         if out_folder is not None:
-            from ctrlgen.reporting.calibration_page import write_calibration
+            from ctrlgen.calibration.calibration_page import write_calibration
 
             advance("report")
             with whole_folder(out_folder) as draft:

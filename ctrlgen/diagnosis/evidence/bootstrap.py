@@ -20,10 +20,10 @@ import numpy as np
 
 from ctrlgen.core.parallel import Failure, run_all, sendable
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
-from ctrlgen.diagnosis.selection.result import Diagnosis, Estimate
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Estimate
 from ctrlgen.diagnosis.settings import BOOTSTRAP
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.structure import FreeParameter, Structure
 from ctrlgen.recordings.recording import Record, Recording
 
 Progress = Callable[[int, int], None]

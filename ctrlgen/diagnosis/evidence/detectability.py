@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ctrlgen.core.units import difference, written_unit
-from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis, numbers
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.settings import DETECTABILITY, MODEL_SELECTION
+from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, numbers
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.ltv_linearisation import simulate_motion
 from ctrlgen.diagnosis.settings import EXCITATION
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.recording import Record
 
 

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.least_squares import initial_state_sd
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.settings import EXPERIMENT
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.recordings.recording import Record
 
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from ctrlgen.core.units import difference
 from ctrlgen.devices import BalancedPhysics
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.simulator import Simulator
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment
 from ctrlgen.diagnosis.evidence.ltv_linearisation import simulate_motion
 from ctrlgen.diagnosis.settings import EXPERIMENT
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.model.model import Model
 
 DRIVE, RECORDING, SCENARIO, COMMAND = "drive.csv", "recording.toml", "scenario.toml", "displacement.csv"

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.devices import BalancedPhysics, DevicePhysics
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.least_squares import initial_state_sd
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_disturbance_inputs
-from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics
 from ctrlgen.diagnosis.settings import LTV_MODEL
 from ctrlgen.effects import Place
+from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import nominal_physics
+from ctrlgen.estimation.least_squares import initial_state_sd
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.recording import Record
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.estimation.noise import drive_period
 from ctrlgen.diagnosis.settings import SPECTRAL_LINES
+from ctrlgen.estimation.noise import drive_period
 from ctrlgen.recordings.recording import Record
 
 

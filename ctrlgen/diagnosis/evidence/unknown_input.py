@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.noise import Noise
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.settings import UNKNOWN_INPUT
+from ctrlgen.estimation.noise import Noise
 
 
 @dataclass(frozen=True, eq=False)

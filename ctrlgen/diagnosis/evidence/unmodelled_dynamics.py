@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.estimation.fit import Fitter
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.evidence.residual_localisation import equivalent_inputs
 from ctrlgen.diagnosis.evidence.unknown_input import UnknownInput, estimate_unknown_input
-from ctrlgen.diagnosis.settings import MAPS, STATISTICS
+from ctrlgen.diagnosis.settings import MAPS
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.settings import STATISTICS
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ import dataclasses
 from typing import Any
 
 from ctrlgen.core.to_json import plain
-from ctrlgen.diagnosis.estimation.spikes import Spikes
 from ctrlgen.diagnosis.report.narrative import sentence
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import Share
-from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
-from ctrlgen.diagnosis.shares.result import as_json
-from ctrlgen.reporting.result_schemas import origin
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Finding
+from ctrlgen.diagnosis.shares.shares_table import as_json
+from ctrlgen.estimation.spikes import Spikes
+from ctrlgen.reporting.result_file import origin
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from ctrlgen.reporting.result_schemas import Keys, Number, Origin
+from ctrlgen.reporting.result_file import Keys, Number, Origin
 
 Interval = tuple[Number, Number]  # 95 %
 Verdict = Literal["consistent", "explained", "partly", "ambiguous", "unexplained"]

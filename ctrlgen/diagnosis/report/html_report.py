@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ctrlgen.core.units import show
 from ctrlgen.devices.changed_numbers import written
-from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
 from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.figures import draw_all
 from ctrlgen.diagnosis.report.narrative import (
     gathered,
     hard,
@@ -22,10 +22,11 @@ from ctrlgen.diagnosis.report.narrative import (
     share_text,
     unknown_lines,
 )
-from ctrlgen.diagnosis.report.plots import draw_all
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, per_cent, shares_sentences
-from ctrlgen.diagnosis.selection.result import Diagnosis, Finding
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Finding
 from ctrlgen.diagnosis.settings import SHARES
+from ctrlgen.estimation.hypothesis import PARAMETER, numbers
+from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.reporting.html import render
 
 CAPTIONS = {
@@ -54,7 +55,7 @@ NEGLIGIBLE = 1e-3  # standard deviations: parameters that moved by less are left
 def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
     """The page as HTML text."""
     return render(
-        "diagnosis.html.j2",
+        Path(__file__).with_name("diagnosis.html.j2"),
         d=diagnosis_record(diagnosis, provenance),
         title=diagnosis.recording.title,
         device_title=diagnosis.device.title,

@@ -6,9 +6,8 @@ import math
 import re
 from collections.abc import Sequence
 
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.selection.attribution import Share
-from ctrlgen.diagnosis.selection.result import ChannelError, Diagnosis, Estimate, Finding
+from ctrlgen.diagnosis.selection.diagnosis_result import ChannelError, Diagnosis, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import (
     AMBIGUOUS,
     CONSISTENT,
@@ -19,6 +18,7 @@ from ctrlgen.diagnosis.selection.verdict import (
     within_tolerance,
 )
 from ctrlgen.effects import Effect
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 
 NAMED = 3  # findings that the first sentence names
 WIDE = 1.0  # a dimensionless number whose interval lies within this is shown in per cent

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.report.narrative import number
-from ctrlgen.diagnosis.selection.result import Diagnosis
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6

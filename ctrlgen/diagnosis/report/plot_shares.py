@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.shares.regressors import Columns, Kind
-from ctrlgen.diagnosis.shares.result import ChannelShares, SharesTable
+from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
 from ctrlgen.reporting.plots import COLOURS
 
 WIDTH = 8.6

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.report.narrative import hypothesis_name, number
 from ctrlgen.diagnosis.selection.candidate_model import Round
-from ctrlgen.diagnosis.selection.result import Diagnosis
-from ctrlgen.diagnosis.settings import SEARCH, STATISTICS
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6

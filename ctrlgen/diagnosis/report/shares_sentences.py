@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ctrlgen.diagnosis.report.narrative import empirical_sentences, number, short
-from ctrlgen.diagnosis.selection.result import Diagnosis
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
 from ctrlgen.diagnosis.shares.regressors import Kind
-from ctrlgen.diagnosis.shares.result import ChannelShares, Share, SharesTable
+from ctrlgen.diagnosis.shares.shares_table import ChannelShares, Share, SharesTable
 
 NAMED = 3  # kinds that a sentence names
 FAMILIES = 2  # families of laws that a sentence names

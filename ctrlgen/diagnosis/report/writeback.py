@@ -20,9 +20,6 @@ from ctrlgen.core.edited_toml import DIGITS, inline_table, replace_quantity, sd_
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.python_file import as_toml
-from ctrlgen.diagnosis.estimation.robust_covariance import robust_deviations
-from ctrlgen.diagnosis.estimation.structure import FreeParameter
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, numbers
 from ctrlgen.diagnosis.report.narrative import (
     BETTER,
     HARD_SPACE,
@@ -33,8 +30,11 @@ from ctrlgen.diagnosis.report.narrative import (
     predicts_better,
     sentence,
 )
-from ctrlgen.diagnosis.selection.result import Diagnosis
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
+from ctrlgen.estimation.hypothesis import PARAMETER, numbers
+from ctrlgen.estimation.robust_covariance import robust_deviations
+from ctrlgen.estimation.structure import FreeParameter
 from ctrlgen.version import program
 
 WIDTH = 110

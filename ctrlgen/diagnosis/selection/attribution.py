@@ -19,14 +19,15 @@ from math import comb
 import numpy as np
 
 from ctrlgen.core.forks import in_forks
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.least_squares import LeastSquaresProblem
-from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
-from ctrlgen.diagnosis.estimation.structure import FreeParameter, Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.trials import FAILURES
-from ctrlgen.diagnosis.settings import ATTRIBUTION, STATISTICS
+from ctrlgen.diagnosis.settings import ATTRIBUTION
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.least_squares import LeastSquaresProblem
+from ctrlgen.estimation.misfit import Misfit, misfit
+from ctrlgen.estimation.settings import STATISTICS
+from ctrlgen.estimation.structure import FreeParameter, Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.error_model import ErrorModel
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.misfit import Misfit
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.screen import Screened
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.misfit import Misfit
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,12 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import CtrlgenError
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.law_terms import CompiledTerms, LawTerm, LawTerms, SignalsRead
 from ctrlgen.effects import Effect, Place
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import DataHints, Hypothesis, nominal_physics
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.effect_terms import channels
 
 UNUSABLE = (CtrlgenError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)

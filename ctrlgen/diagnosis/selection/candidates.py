@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.screen import Screened, Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
+from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.structure import Structure
 
 
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:

@@ -10,13 +10,13 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import difference, show
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
-from ctrlgen.diagnosis.hypotheses.hypotheses import nominal_physics, selected_laws
+from ctrlgen.diagnosis.selection.diagnosis_result import Finding
 from ctrlgen.diagnosis.selection.direct_detection import unfitted_finding
-from ctrlgen.diagnosis.selection.result import Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
+from ctrlgen.estimation.hypothesis import nominal_physics, selected_laws
+from ctrlgen.estimation.raw_readings import detect_directly
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Recording
 

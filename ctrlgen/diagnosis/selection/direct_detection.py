@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
-from ctrlgen.diagnosis.hypotheses.hypotheses import DOMAIN, Hypothesis, nominal_physics, selected_laws
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
-from ctrlgen.diagnosis.selection.result import Estimate, Finding
+from ctrlgen.diagnosis.selection.diagnosis_result import Estimate, Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
+from ctrlgen.estimation.hypothesis import DOMAIN, Hypothesis, nominal_physics, selected_laws
+from ctrlgen.estimation.raw_readings import detect_directly
 from ctrlgen.model.effect_terms import channels
 
 

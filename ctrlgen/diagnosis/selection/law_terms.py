@@ -14,9 +14,9 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Effect, Place
+from ctrlgen.estimation.settings import CANDIDATE_TERMS
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import evaluate
 from ctrlgen.numerics.phi_functions import lag_increment, phi_matrices

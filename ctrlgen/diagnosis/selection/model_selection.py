@@ -17,15 +17,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.error_model import ErrorModel, error_model
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.held_out import refit_to_held_out
-from ctrlgen.diagnosis.estimation.misfit import Misfit, misfit
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.screen import Screened
-from ctrlgen.diagnosis.settings import FIT, HELD_OUT_REFIT, MODEL_SELECTION, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.diagnosis.settings import MODEL_SELECTION
+from ctrlgen.estimation.error_model import ErrorModel, error_model
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.held_out import refit_to_held_out
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.misfit import Misfit, misfit
+from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.estimation.structure import Structure
 
 
 def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> CandidateModel:

@@ -12,12 +12,13 @@ from itertools import combinations
 import numpy as np
 
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.estimation.noise import period_of
-from ctrlgen.diagnosis.hypotheses.direct_detection import detect_directly
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, Hypothesis
-from ctrlgen.diagnosis.settings import OBJECTIONS, STATISTICS
+from ctrlgen.diagnosis.settings import OBJECTIONS
 from ctrlgen.effects import Param
+from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.noise import period_of
+from ctrlgen.estimation.raw_readings import detect_directly
+from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record, Recording
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ctrlgen.diagnosis.estimation.fit import Fit
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.screen import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
 
 
 def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateModel:

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.simulator import Simulator
-from ctrlgen.diagnosis.hypotheses.disturbance_inputs import with_disturbance_inputs
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, CandidateTerms
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
-from ctrlgen.diagnosis.settings import CANDIDATE_TERMS
 from ctrlgen.effects import Place
+from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
+from ctrlgen.estimation.settings import CANDIDATE_TERMS
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.recording import Record
 
 

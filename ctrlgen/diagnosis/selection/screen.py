@@ -16,8 +16,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.hypotheses.hypotheses import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums
@@ -25,6 +23,8 @@ from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_p
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
 from ctrlgen.recordings.recording import Timing

@@ -14,8 +14,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.estimation.fit import Fitter
-from ctrlgen.diagnosis.estimation.noise_update import update_noise
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import scored
@@ -23,7 +21,10 @@ from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
 from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import FIT, SEARCH
+from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.noise_update import update_noise
+from ctrlgen.estimation.settings import FIT
 
 
 class Searcher:

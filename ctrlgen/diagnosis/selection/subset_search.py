@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.settings import SUBSETS
+from ctrlgen.estimation.hypothesis import Hypothesis
 
 
 @dataclass(frozen=True)

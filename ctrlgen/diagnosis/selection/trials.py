@@ -14,15 +14,16 @@ import numpy as np
 
 from ctrlgen.core.errors import CtrlgenError, InputError
 from ctrlgen.core.forks import in_forks
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.noise_update import update_noise_size
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
-from ctrlgen.diagnosis.settings import DISCREPANCY, FIT, SEARCH
+from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise_update import update_noise_size
+from ctrlgen.estimation.settings import DISCREPANCY, FIT
+from ctrlgen.estimation.structure import Structure
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.residual_tests import ResidualTests
-from ctrlgen.diagnosis.estimation.structure import Structure
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis
 from ctrlgen.diagnosis.selection.attribution import Attribution
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
-from ctrlgen.diagnosis.settings import MODEL_SELECTION, STATISTICS, VERDICT
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, VERDICT
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.residual_tests import ResidualTests
+from ctrlgen.estimation.settings import STATISTICS
+from ctrlgen.estimation.structure import Structure
 
 CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
 

@@ -6,21 +6,6 @@ from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
-class CandidateTermsSettings:
-    """Candidate terms propagated along the motion of the current model, and their score."""
-
-    highest_frequency: float = 0.49
-    """Highest frequency of a candidate, as a share of the sampling rate: beyond one half it looks like a lower one, and
-    at one half like nothing or an offset."""
-    settled_time: float = 1e9
-    """Sample time [s] of a settled pose: every lag has passed."""
-    block: int = 500
-    """Samples that are propagated at a time: their sensitivities stay in the processor's cache."""
-    diverged: float = 1e100
-    """Magnitude of a state above which a candidate has diverged and is left out."""
-
-
-@dataclass(frozen=True)
 class ScreenSettings:
     """Score tests of all hypotheses."""
 
@@ -255,7 +240,6 @@ class VerdictSettings:
     """Stated standard deviations from which on such a number is named."""
 
 
-CANDIDATE_TERMS = CandidateTermsSettings()
 SCREEN = ScreenSettings()
 SPATIAL_PERIODS = SpatialPeriodSettings()
 SUBSETS = SubsetSettings()

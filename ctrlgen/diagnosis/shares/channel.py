@@ -22,7 +22,7 @@ from ctrlgen.diagnosis.shares.cross_validation import (
 )
 from ctrlgen.diagnosis.shares.periodic import line_columns, pitch_columns, strongest_line, strongest_pitch
 from ctrlgen.diagnosis.shares.regressors import Design, Kind, Signals, standardised
-from ctrlgen.diagnosis.shares.result import Share
+from ctrlgen.diagnosis.shares.shares_table import Share
 
 
 class ChannelSmoothers:

@@ -18,15 +18,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.estimation.misfit import misfit
-from ctrlgen.diagnosis.hypotheses.hypotheses import Hypothesis, nominal_physics
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.cross_validation import stands_out
 from ctrlgen.diagnosis.shares.gather import ResidualShares, gather
 from ctrlgen.diagnosis.shares.regressors import Kind, Signals
-from ctrlgen.diagnosis.shares.result import ChannelShares, SharesTable
+from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
 from ctrlgen.effects import Effect
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
+from ctrlgen.estimation.misfit import misfit
 from ctrlgen.model.effect_terms import available
 
 READING = "reading."

@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import Enum
 
 from ctrlgen.diagnosis.shares.regressors import Kind
-from ctrlgen.diagnosis.shares.result import SharesTable
+from ctrlgen.diagnosis.shares.shares_table import SharesTable
 
 
 class Family(Enum):

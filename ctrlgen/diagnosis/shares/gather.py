@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.diagnosis.estimation.fit import Fit, Fitter
-from ctrlgen.diagnosis.settings import FIT
 from ctrlgen.diagnosis.shares.channel import share_of
+from ctrlgen.diagnosis.shares.model_free_shares import TooFewSamples, model_free_shares
 from ctrlgen.diagnosis.shares.regressors import Signals
-from ctrlgen.diagnosis.shares.result import Share, SharesTable
-from ctrlgen.diagnosis.shares.shares import TooFewSamples, model_free_shares
+from ctrlgen.diagnosis.shares.shares_table import Share, SharesTable
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.settings import FIT
 from ctrlgen.recordings.recording import Record
 
 

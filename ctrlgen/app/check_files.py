@@ -1,0 +1,109 @@
+"""What `ctrlgen check` says of a device, a scenario, a recording or generated C."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ctrlgen.app.console import out, print_recording, print_shaper
+from ctrlgen.core.errors import Fault, InputError, Unreachable
+from ctrlgen.core.files import read_toml
+from ctrlgen.core.units import show
+from ctrlgen.devices import load_device
+from ctrlgen.devices.mechanism.mechanism import Mechanism
+from ctrlgen.devices.mechanism.modes import summary
+from ctrlgen.devices.sensor import describe
+from ctrlgen.firmware.package import MANIFEST, verify_package
+from ctrlgen.model.assembly import build_model
+from ctrlgen.recordings.schema import FILE as RECORDING
+from ctrlgen.trajectory.scenario import load_scenario, model_of
+from ctrlgen.trajectory.solution import check_feasibility, check_motion, check_static
+
+
+def check(file: Path, device: Path | None = None, figure: Path | None = None) -> None:
+    """Prints a summary of `file`; a recording needs the `device` that it was made on. `figure` also draws a mechanism.
+
+    Raises InputError with every fault of the file, and Unreachable for a scenario whose path cannot be followed.
+    """
+    if device is not None:
+        _check_recording(file, device)
+    elif (file / RECORDING).is_file() or (file.name == RECORDING and file.is_file()):
+        raise InputError(file, [Fault("--device", "is missing; name the device file that this recording was made on")])
+    elif (file / MANIFEST).is_file():
+        if faults := verify_package(file):
+            raise InputError(file, faults)
+        out.print(f"{file}: every file is as it was generated", markup=False)
+    elif file.is_dir() or (file.suffix != ".py" and "kind" not in read_toml(file)):
+        _check_scenario(file)
+    else:
+        _check_device(file, figure)
+
+
+def _check_recording(file: Path, device: Path) -> None:
+    from ctrlgen.recordings.reader import load_recordings  # the libraries of file formats take a moment to import
+
+    print_recording(load_recordings([file], build_model(load_device(device))))
+
+
+def _check_scenario(file: Path) -> None:
+    """Whether the path can be followed; not where the scenario expects that it cannot, when the reason is printed."""
+    scenario = load_scenario(file)
+    model = model_of(scenario)
+    command = scenario.command(model)
+    out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
+    print_shaper(scenario, model)
+    try:
+        if scenario.file.robust is not None:
+            from ctrlgen.budget.robust import solve
+            from ctrlgen.verification.scenario_report import robust_sentence
+
+            out.print(str(robust_sentence(solve(scenario, model))), markup=False, soft_wrap=True)
+            return
+        if scenario.file.feedforward == "static":
+            _, needed = check_static(scenario, model)
+        elif model.inertial:
+            *_, needed = check_motion(scenario, model)
+        else:
+            _, needed = check_feasibility(scenario, model, command)
+    except Unreachable as error:
+        if scenario.file.outcome == "solved":
+            raise
+        out.print(f"as expected: {error}", markup=False, soft_wrap=True)
+        return
+    unsettled = "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
+    if model.inertial:
+        unsettled = "no drive was found in the first place: solve it to know why"
+    found = "the path can be followed within every limit" if needed.exact else unsettled
+    out.print(found, markup=False, soft_wrap=True)
+
+
+def _check_device(file: Path, figure: Path | None) -> None:
+    device = load_device(file)
+    model = build_model(device)
+    if figure is not None:
+        from ctrlgen.devices.mechanism.figure import draw_mechanism  # matplotlib takes a moment to import
+
+        if not isinstance(device, Mechanism):
+            raise InputError("--figure", [Fault(device.name, 'is no mechanism; only kind = "mechanism" is drawn')])
+        draw_mechanism(device, figure)
+    numbers = list(device.quantities())
+    unsourced = [path for path, q in numbers if q.source is None]
+    out.print(
+        f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators",
+        markup=False,
+    )
+    if model.redundant:
+        weights = ", ".join(f"{w:g}" for w in model.drive_weights)
+        out.print(
+            f"  {model.u.numel()} drives for {len(model.axes)} axes: those of least effort, weights {weights}",
+            markup=False,
+        )
+    for line in summary(device) if isinstance(device, Mechanism) else ():
+        out.print(f"  {line}", markup=False, soft_wrap=True)
+    for limit in (*model.limits, *model.rate_limits):
+        low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
+        out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
+    units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
+    for sensor in device.sensor:
+        out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
+    for remark in device.remarks():
+        out.print(f"  note: {remark}", markup=False, soft_wrap=True)

@@ -1,0 +1,254 @@
+"""The pipeline of a scenario: solve, generate its C, compare, report. A result folder appears whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ctrlgen.budget.budget_section import budget_section
+from ctrlgen.budget.robust import solve
+from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.files import whole_folder, write_text
+from ctrlgen.core.units import from_si
+from ctrlgen.devices import Device
+from ctrlgen.firmware.c.toolchains import find_compilers
+from ctrlgen.firmware.fmi.fmu import Fmus, write_fmus
+from ctrlgen.firmware.folder import CFolder, generate
+from ctrlgen.firmware.player_only import check_online, generate_player
+from ctrlgen.model.assembly import build_model
+from ctrlgen.reporting.plots import STYLE, svg
+from ctrlgen.trajectory.frame import Frame
+from ctrlgen.trajectory.metrics import ExpectationResult, expectations
+from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
+from ctrlgen.trajectory.solution import Solution
+from ctrlgen.trajectory.solution_plots import draw_all, draw_workspace
+from ctrlgen.trajectory.workspace import Ball, Workspace
+from ctrlgen.verification import scenario_report as report
+from ctrlgen.verification.build_page import write_build
+from ctrlgen.verification.build_record import Build
+from ctrlgen.verification.comparison import Comparison, compare
+from ctrlgen.verification.hostile import check_hostile
+from ctrlgen.verification.in_loop import run_in_loop
+from ctrlgen.verification.qemu import check_on_boards
+from ctrlgen.verification.reference import ReferenceAnswers
+from ctrlgen.verification.rules import check_rules
+from ctrlgen.verification.tracking import tracking_errors
+
+Progress = Callable[[str], None]
+STEPS = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
+VERIFY_STEPS = 27  # in `verify` with every tool installed: also reference, errors, six cores, three boards, four analysers, two fuzzers
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The results of a run; `c` and `comparison` are None where they were not asked for."""
+
+    solution: Solution
+    c: CFolder | None
+    comparison: Comparison | None
+    expected: tuple[ExpectationResult, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every expectation and every comparison that was made is within tolerance."""
+        return report.passed(self.comparison, self.expected)
+
+
+def quiet(_: str) -> None:
+    """Reports no progress."""
+
+
+def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) -> Solution:
+    """Loads and solves a scenario. Raises InputError, Unreachable, SolverError."""
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    progress("symbolic model")
+    solution = solve(scenario, model_of(scenario), progress)
+    if scenario.file.outcome == "unreachable":
+        raise SolverError(
+            f"{scenario.path}: outcome = 'unreachable', but the path can be followed; remove that line or move the path"
+        )
+    return solution
+
+
+def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
+    """Solves, generates, compares and reports into the folder `out`, which is replaced whole or not at all.
+
+    Raises InputError, Unreachable, SolverError, ToolError. A value out of tolerance is no error: `passed` is then False.
+    """
+    find_compilers()
+    scenario = _with_online(scenario)
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        expected = expectations(solution)
+        progress("C sources")
+        drawn = draw_all(solution)
+        c = generate(solution.scenario, solution.model, draft / "c", solution, drawn)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
+        progress("report")
+        report.write_report(draft, solution, comparison, expected, c, drawn, budget_section(solution))
+        return Outcome(solution, c, comparison, expected)
+
+
+def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet, quick: bool = False) -> Build:
+    """Solves, generates, compares, runs on emulated targets, analyses, fuzzes; writes one page into the folder `out`.
+
+    Left there: build.html, build.json, c/. `quick` leaves out cppcheck and the fuzzer, which take most of the time; they
+    are then listed as not run. Raises InputError, Unreachable, SolverError, ToolError (no C compiler, or one that refuses the
+    C); whatever else fails is in `failures` of what is returned, and what did not run in `not_run`.
+    """
+    find_compilers()
+    scenario = _with_online(scenario)
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        expected = expectations(solution)
+        progress("C sources")
+        c = generate(solution.scenario, solution.model, draft / "c", solution, draw_all(solution))
+        progress("reference")
+        reference = ReferenceAnswers(solution)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"), reference)
+        progress("error along the trajectory")
+        errors = tracking_errors(c, reference)
+        in_loop = run_in_loop(c, reference, lambda target: progress(f"emulated: {target}"))
+        checks = (
+            *check_on_boards(c, lambda board: progress(f"board: {board}")),
+            *check_rules(c, lambda tool: progress(f"rules: {tool}"), quick=quick),
+            *check_hostile(
+                c, solution.scenario, solution.model, lambda tool: progress(f"hostile: {tool}"), quick=quick
+            ),
+        )
+        progress("page")
+        build = Build(solution, c, expected, comparison, in_loop, checks, errors)
+        write_build(draft, build)
+        return replace(build, c=replace(c, path=Path(out) / "c"))
+
+
+def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
+    """Solves and reports into the folder `out`, without C. Raises InputError, Unreachable, SolverError."""
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        expected = expectations(solution)
+        progress("report")
+        report.write_report(draft, solution, None, expected, None, draw_all(solution), budget_section(solution))
+        return Outcome(solution, None, None, expected)
+
+
+def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> CFolder:
+    """Solves and writes only the folder of C, which needs no compiler. Raises InputError, Unreachable, SolverError."""
+    scenario = _with_online(scenario)
+    with whole_folder(Path(out)) as draft:
+        solution = solve_scenario(scenario, progress)
+        c = generate(solution.scenario, solution.model, draft, solution, draw_all(solution))
+    return replace(c, path=Path(out))
+
+
+def player_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> list[Path]:
+    """Solves and writes only the player; the paths of its C. Raises InputError, Unreachable, SolverError."""
+    with whole_folder(Path(out)) as draft:
+        written = generate_player(solve_scenario(scenario, progress), draft)
+    return [Path(out) / path.name for path in written]
+
+
+def fmus_into(scenario: Scenario, out: Path, fmi: int) -> Fmus:
+    """Writes controller and plant as FMI units; only of a robust scenario is the path solved, for the controller's limits. Raises as
+    `write_fmus` and `solve_scenario`."""
+    limited = None if scenario.file.robust is None else solve_scenario(scenario).model
+    return write_fmus(scenario, out, fmi, limited)
+
+
+def _with_online(scenario: Scenario | Path | str) -> Scenario:
+    """The scenario, of a device whose drives the online C can compute. Raises InputError before anything is solved."""
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    with warnings.catch_warnings():  # solving says them
+        warnings.simplefilter("ignore")
+        check_online(scenario, model_of(scenario))
+    return scenario
+
+
+def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) -> Outcome:
+    """Solves, generates into a temporary folder and compares; nothing is kept. Raises as `run`."""
+    find_compilers()
+    scenario = _with_online(scenario)
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
+        solution = solve_scenario(scenario, progress)
+        progress("C sources")
+        c = generate(solution.scenario, solution.model, Path(scratch), solution)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
+    return Outcome(solution, c, comparison, ())
+
+
+@dataclass(frozen=True)
+class WorkspaceSummary:
+    """The workspace of a device: `ranges` at each of the `bases` and the `extent` anywhere, (channels, 2) in SI.
+
+    `translations` and `everything`: the largest balls in the translations and in all channels.
+    """
+
+    workspace: Workspace
+    bases: list[np.ndarray]
+    ranges: list[np.ndarray]
+    extent: np.ndarray
+    translations: Ball
+    everything: Ball
+
+
+def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSummary:
+    """Maps the workspace of a device into the folder `out`: workspace.json and workspace.svg.
+
+    `poses` such as "delta_x=5um,delta_z=20um", channels left out being zero; without any, those of `Workspace.bases`. The
+    balls and the extent are searched from the middle one of the list. Raises InputError.
+    """
+    model = build_model(device)
+    workspace, signal = Workspace(model), model.signals["pose"]
+    if len(signal.channels) < 2 or not workspace.translations:
+        raise InputError(
+            device.name,
+            [
+                Fault(
+                    "workspace",
+                    "cannot be mapped: the device needs a pose of two channels or more, one of them a translation",
+                )
+            ],
+        )
+    frame = Frame(signal.channels, signal.units)
+    bases = [frame.pose(pose, "--at") for pose in poses] or workspace.bases()
+    ranges = [workspace.ranges(base) for base in bases]
+    middle = bases[len(bases) // 2]
+    balls = workspace.ball(middle, workspace.translations), workspace.ball(middle, tuple(range(len(signal.channels))))
+    found = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
+    with whole_folder(out) as draft:
+        with plt.rc_context(STYLE):
+            write_text(draft / "workspace.svg", svg(draw_workspace(workspace, bases, balls[0])))
+        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(found), indent=1) + "\n")
+    return found
+
+
+def _workspace_numbers(found: WorkspaceSummary) -> dict[str, Any]:
+    """The numbers of workspace.json, in the reader's units."""
+    signal = found.workspace.model.signals["pose"]
+    named = list(zip(signal.channels, signal.units, strict=True))
+
+    def row(values: np.ndarray) -> dict[str, Any]:
+        return {f"{c} [{u}]": np.asarray(from_si(values[i], u)).tolist() for i, (c, u) in enumerate(named)}
+
+    return {
+        "device": found.workspace.model.name,
+        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(found.bases, found.ranges, strict=True)],
+        "anywhere": row(found.extent),
+        "largest_ball": [
+            {
+                "channels": [signal.channels[i] for i in ball.channels],
+                "centre": row(ball.centre),
+                "radius_in_typical_sizes": ball.radius,
+            }
+            for ball in (found.translations, found.everything)
+        ],
+        "typical_sizes": row(np.array(signal.scale)),
+    }

@@ -1,0 +1,317 @@
+"""What a feedforward controller computes with: its kernels, what of its limits can be met, and what a state is judged by.
+
+`ctrlgen.controller.feedforward` decides with them, `ctrlgen.firmware.online.online` prints them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.controller.composite_bound import composite_bound, worst_in_range
+from ctrlgen.controller.controller_step import ControllerStep, State, row
+from ctrlgen.controller.drive_rate import FREE, RateLimiter
+from ctrlgen.controller.limit_reach import drive_beyond, state_beyond
+from ctrlgen.controller.lost_state import Groups, is_beyond, plausible_sums
+from ctrlgen.controller.named_inverse import NamedInverses, given_inverses, named_inverses
+from ctrlgen.controller.nearest_displacement import coupling, nearest_displacement
+from ctrlgen.controller.null_motion import NullMotion, null_motion
+from ctrlgen.controller.run_time_choices import choices, with_constants
+from ctrlgen.devices import Limit, Signal
+from ctrlgen.model.allocation import inverse_of
+from ctrlgen.model.assembly import build_model
+from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
+from ctrlgen.model.model import Model
+
+SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
+# The memory of an effect does not scale with the displacement, so its share of the excess is removed over several rounds.
+COMPOSITE_ROUNDS = 8
+
+# what a controller works out that depends on its slack
+OF_SLACK = frozenset({"slack", "slacks", "state_can_be_limited", "drive_can_be_limited", "rate", "variants"})
+
+
+@dataclass(frozen=True)
+class ControllerKernels:
+    """One device, one followed signal, one sample time (None: equilibria only)."""
+
+    model: Model
+    follow: str
+    sample_time: float | None
+    slack: float = SLACK
+
+    @cached_property
+    def static(self) -> Inverse:
+        """Kernels for equilibria."""
+        return inverse_of(self.nominal, self.follow, None)
+
+    @property
+    def _step_time(self) -> float | None:
+        """The sample time of the kernels for the next sample; None where there are none."""
+        return self.sample_time
+
+    @cached_property
+    def moving(self) -> Inverse | None:
+        """Kernels for the next sample; None where there is no sample time."""
+        return None if self._step_time is None else inverse_of(self.nominal, self.follow, self._step_time)
+
+    @cached_property
+    def named(self) -> NamedInverses:
+        """The same kernels with their numbers as formulas of the device's parameters."""
+        return named_inverses(self.model.device, self.follow, self._step_time)
+
+    @cached_property
+    def given(self) -> NamedInverses | None:
+        """The same kernels in terms of the run-time constants; None for a device without."""
+        device = self.model.device
+        if not device.given_at_start:
+            return None
+        found = given_inverses(device, self.follow, self._step_time)
+        return replace(found, model=found.model.limited_as(self.model))
+
+    def at(self, values: dict[str, float]) -> Self:
+        """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them. What is
+        reserved of limits is the same."""
+        model = build_model(with_constants(self.model.device, values)).limited_as(self.model)
+        return type(self)(model, self.follow, self.sample_time, self.slack)
+
+    def with_slack(self, slack: float) -> Self:
+        """The same controller with another slack; the kernels, and what else does not depend on it, are this one's."""
+        _ = self.static, self.moving  # worked out now, for both
+        other = replace(self, slack=slack)
+        other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in OF_SLACK})
+        other.__dict__["variants"] = tuple(variant.with_slack(slack) for variant in self.variants)
+        return other
+
+    @cached_property
+    def variants(self) -> tuple[Self, ...]:
+        """The controllers of devices with other run-time constants, within their ranges
+        (`ctrlgen.controller.run_time_choices`): decisions that are taken before the C runs hold for all of them."""
+        return tuple(self.at(values) for values in choices(self.model.device.given_at_start))
+
+    @cached_property
+    def newton_steps(self) -> int:
+        """Steps to the displacement that balances the forces: one where the balance is linear in it."""
+        return max(c._own_newton_steps for c in (self, *self.variants))
+
+    @cached_property
+    def _own_newton_steps(self) -> int:
+        m = self.nominal
+        return NEWTON_STEPS if ca.depends_on(ca.jacobian(m.balance, m.z), m.z) else 1
+
+    @cached_property
+    def nominal(self) -> Model:
+        """The model with every free parameter at its nominal value."""
+        return build_model(self.model.device) if self.model.p.numel() else self.model
+
+    @cached_property
+    def guarded_limits(self) -> tuple[Limit, ...]:
+        """Composite limits that can be broken by displacements inside their range."""
+        limits = [limit for limit in self.nominal.composite_limits() if limit.upper is not None]
+        x = self.nominal.x
+        return tuple(
+            limit for limit in limits if ca.depends_on(limit.expr, x) or worst_in_range(self.nominal, limit) > 1
+        )
+
+    @cached_property
+    def composite_shares(self) -> ca.Function:
+        """(x, z, wanted) -> the square of each guarded limit's value over its bound at displacement `wanted`; above 1 it is broken."""
+        m = self.nominal
+        wanted = ca.SX.sym("wanted", m.z.numel())
+        x_then = ca.vertcat(m.x[: m.n_states], (self.moving or self.static).memory(m.x, m.z, wanted))
+        squares = [
+            ca.substitute(limit.expr, ca.vertcat(m.x, m.z), ca.vertcat(x_then, wanted)) ** 2 * (1 / limit.upper**2)
+            for limit in self.guarded_limits if limit.upper
+        ]  # fmt: skip
+        names = ["x", "z", "wanted"]
+        return ca.Function(
+            "composite_shares",
+            [m.x, m.z, wanted],
+            [ca.vertcat(ca.SX(0, 1), *squares)],
+            names,
+            ["shares"],
+            {"cse": True},
+        )
+
+    @cached_property
+    def composite_ratio(self) -> ca.Function:
+        """(x, z, wanted) -> the largest ratio of a guarded limit's value to its bound at displacement `wanted`; above 1 it is broken."""
+        arguments = [ca.SX.sym(name, *self.composite_shares.size_in(name)) for name in self.composite_shares.name_in()]
+        shares = self.composite_shares(*arguments)
+        worst = ca.sqrt(ca.mmax(shares)) if shares.numel() else ca.SX(0)  # one root at the end
+        return ca.Function(
+            "composite_ratio", arguments, [worst], self.composite_shares.name_in(), ["ratio"], {"cse": True}
+        )
+
+    @property
+    def composite_rounds(self) -> int:
+        """How often a displacement is scaled toward home: once where the limited quantities are proportional to it."""
+        m = self.nominal
+        bent = ca.depends_on(ca.jacobian(m.signals["displacement"].expr, m.z), m.z)
+        return COMPOSITE_ROUNDS if bent or m.x.numel() > m.n_states else 1
+
+    @cached_property
+    def nearest_slopes(self) -> np.ndarray | None:
+        """(n, n) of `ctrlgen.controller.nearest_displacement`; None where one displacement moves one channel."""
+        return coupling(self.nominal, self.follow)
+
+    @cached_property
+    def nearest(self) -> ca.Function:
+        """beyond -> the displacement in range whose followed signal is nearest to that of the displacement `beyond`."""
+        return nearest_displacement(self.nominal.z_bounds, self.nearest_slopes)
+
+    @cached_property
+    def composite_bound(self) -> ca.Function | None:
+        """wanted -> a cheap upper bound of `composite_ratio` (`ctrlgen.controller.composite_bound`); None where there is none."""
+        m = self.nominal
+        if not self.guarded_limits or m.x.numel() > m.n_states:
+            return None
+        return composite_bound(m, self.follow, self._composite_ratios)
+
+    def _composite_ratios(self, displacements: np.ndarray) -> np.ndarray:
+        """`composite_ratio` at each column of `displacements`, with no memory of effects."""
+        m, count = self.nominal, displacements.shape[1]
+        cold = np.tile(m.rest[:, None], (1, count))
+        return self.composite_ratio.map(count)(cold, 0 * displacements, displacements).full().ravel()
+
+    @cached_property
+    def state_can_be_limited(self) -> bool:
+        """Whether a displacement in range can need an actuator state beyond its limits (`ctrlgen.controller.limit_reach`)."""
+        if self.rate is not None:
+            return bool(np.any(np.isfinite([bound[: self.nominal.n_states] for bound in self.nominal.x_bounds])))
+        return any(state_beyond(c.nominal, *c._kernels, c._own_slacks(c.slack)) for c in (self, *self.variants))
+
+    @cached_property
+    def drive_can_be_limited(self) -> tuple[bool, bool]:
+        """Whether a displacement in range can need a drive beyond its limits to settle there, or to step there, from any state
+        (`ctrlgen.controller.limit_reach`). An actuator that never does for an equilibrium needs no line search to settle."""
+        if self.rate is not None:
+            return True, True
+        found = [drive_beyond(c.nominal, *c._kernels, c._own_slacks(c.slack)) for c in (self, *self.variants)]
+        return any(settle for settle, _ in found), any(step for _, step in found)
+
+    @property
+    def _kernels(self) -> tuple[Inverse, Inverse]:
+        """Those to settle and those to step."""
+        return self.static, self.moving or self.static
+
+    @property
+    def target(self) -> Signal:
+        """What a target holds."""
+        return self.model.signals[self.follow]
+
+    @cached_property
+    def input_limits(self) -> np.ndarray:
+        """(channels,) largest |target| that is accepted as a command: 1e5 typical sizes, far outside any range."""
+        return 1e5 * np.array(self.target.scale)
+
+    def drive_rounding(
+        self,
+        before: State,
+        target: np.ndarray,
+        step: ControllerStep,
+        settle: bool,
+        share: float,
+    ) -> float:
+        """By how much the drives of a `step` from the state `before` to `target` change where displacement and actuator state do
+        by this `share` of themselves."""
+        k = self.static if settle or self.moving is None else self.moving
+        reached = (step.displacement, step.actuator_state)
+        off = self.drive(k, before, *(value * (1 + share) for value in reached)) - self.drive(k, before, *reached)
+        return float(np.max(np.abs(off)))
+
+    @cached_property
+    def safe_drive(self) -> np.ndarray:
+        """(n_u,) the drive without a usable target: zero, or the admissible value nearest to it. A heater that is off cools passively."""
+        return np.clip(0.0, *self.nominal.u_bounds)
+
+    @cached_property
+    def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Excess over a limit that is clipped without report, for displacement, actuator state and drive.
+
+        That of the drive is what the other two change it by.
+        """
+        return self.slacks_of(self.slack)
+
+    def slacks_of(self, slack: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`slacks` for this share of a signal's typical size."""
+        z_slack, state_slack, u_slacks = zip(*(c._own_slacks(slack) for c in (self, *self.variants)), strict=True)
+        return z_slack[0], state_slack[0], np.max(u_slacks, axis=0)
+
+    def _own_slacks(self, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        m, n = self.nominal, self.nominal.n_states
+        z_slack, state_slack = share * m.z_scale, share * m.x_scale[:n]
+        x, z = self.model.rest, np.zeros(len(self.model.axes))
+        kernel = (self.moving or self.static).drive
+        drives = [row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
+        return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
+
+    @cached_property
+    def plausible(self) -> Groups:
+        """What a state is judged by, see `plausible_sums`."""
+        rated = self.rate is not None
+        own, *others = (plausible_sums(c.nominal, rated) for c in (self, *self.variants))
+        wider = [{those: most for those, most in sums} for sums in others]
+        return tuple((those, max(most, *(w.get(those, most) for w in wider), most)) for those, most in own)
+
+    @cached_property
+    def examined_first(self) -> tuple[bool, bool]:
+        """Whether the state is examined before it is used, to settle and to step: where the displacement of a target depends on it, or
+        effects remember. Else it is examined where a limit is met: till then one that is lost would show in the drives, or none of its
+        numbers enters the answer and all are written anew."""
+        settle, step = zip(*(c._own_examined_first for c in (self, *self.variants)), strict=True)
+        return any(settle), any(step)
+
+    @cached_property
+    def _own_examined_first(self) -> tuple[bool, bool]:
+        m = self.nominal
+        kernels = [k.displacement for k in self._kernels]
+        targets = [ca.SX.sym("target", k.size1_in("target")) for k in kernels]
+        settle, step = (
+            m.x.numel() > m.n_states or ca.depends_on(k(m.x, m.z, target), ca.vertcat(m.x, m.z))
+            for k, target in zip(kernels, targets, strict=True)
+        )
+        return settle, step
+
+    @cached_property
+    def redundancy(self) -> NullMotion | None:
+        """What keeps more drives than axes within their limits; None where there are as many."""
+        return null_motion(self.nominal)
+
+    def drive(self, k: Inverse, state: State, wanted: np.ndarray, state_wanted: np.ndarray) -> np.ndarray:
+        """(n_u,) the drives that displacement and actuator state need, by the kernels `k`; beyond limits where none keep them."""
+        return self.chosen(row(k.drive(*state[:2], wanted, state_wanted)), state)
+
+    def chosen(self, drive: np.ndarray, state: State) -> np.ndarray:
+        """Of all drives (n_u,) that push as `drive`, those of least effort within limits."""
+        if self.redundancy is None:
+            return drive
+        window = () if self.rate is None else (state[2] + self.rate.fall, state[2] + self.rate.rise)
+        return self.redundancy.within(drive, *window)
+
+    @cached_property
+    def rate(self) -> RateLimiter | None:
+        """What keeps the limits on rates of drives; None for a device without, and where no time passes."""
+        if self.sample_time is None or not self.nominal.rate_limits:
+            return None
+        fall, rise = (np.clip(bound * self.sample_time, -FREE, FREE) for bound in self.nominal.rate_bounds)
+        return RateLimiter(fall, rise, self.slacks[2])
+
+    def is_lost(self, *state: np.ndarray) -> bool:
+        """Whether a state cannot be one that the controller left."""
+        return is_beyond(self.plausible, *state)
+
+    def rest(self) -> State:
+        """State of a device at rest at ambient temperature, its drives off."""
+        still = self.model.rest.copy(), np.zeros(len(self.model.axes))
+        return still if self.rate is None else (*still, self.safe_drive.copy())
+
+    @property
+    def limits_can_be_passed(self) -> bool:
+        """Whether a drive that may not turn back faster can lead the device beyond a limit: where actuators or effects remember, or the
+        forces are not linear in the displacement, so that between two admissible drives there may be one that is not."""
+        return self.rate is not None and (self.nominal.x.numel() > 0 or self.newton_steps > 1)

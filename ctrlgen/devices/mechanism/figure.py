@@ -1,0 +1,93 @@
+"""A mechanism drawn in space: bodies, flexures with their names, actuators, the ground and the output point."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from ctrlgen.core.files import write_bytes
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.mechanism import Mechanism
+from ctrlgen.physics.rigid_bodies import GROUND
+from ctrlgen.reporting.plots import COLOURS
+
+MM = 1e3  # per metre
+SHORT = 0.04  # of the mechanism's extent: an element without a length, an actuator's arrow is three times that
+
+
+def draw_mechanism(device: Mechanism, path: Path) -> None:
+    """Writes the figure of a mechanism, .svg or .png."""
+    figure, buffer = mechanism_figure(device), io.BytesIO()
+    with rc_context({"svg.hashsalt": "ctrlgen"}):
+        metadata = {"Date": None, "Creator": "ctrlgen"} if path.suffix == ".svg" else None
+        figure.savefig(buffer, format=path.suffix[1:], dpi=150, metadata=metadata, bbox_inches="tight")
+    write_bytes(path, buffer.getvalue())
+
+
+def mechanism_figure(device: Mechanism) -> Figure:
+    """The mechanism as it is described, in mm."""
+    c = Condensed(device, device.values())
+    free = [np.array(ca.DM(ca.evalf(ca.SX(end)))).ravel() * MM for end in c.ends]
+    along = [np.array(ca.DM(ca.evalf(ca.SX(R))))[:, 0] for R in c.frames]
+    extent = max(float(np.ptp(np.array(free), axis=0).max()), 1e-3)
+    reaches = [e.section.reach(c.p.element[e.index]) for e in device.placed_elements]
+    lengths = [SHORT * extent if reach is None else reach * MM for reach in reaches]
+    fixed = [end - length * x for end, length, x in zip(free, lengths, along, strict=True)]
+    output = np.array([x.si for x in device.output.at]) * MM
+
+    figure = Figure(figsize=(8, 7))
+    ax = figure.add_subplot(projection="3d")
+    joints: list[list[np.ndarray]] = [[] for _ in device.bodies]
+    for e, a, b in zip(device.placed_elements, fixed, free, strict=True):
+        ax.plot(*np.array([a, b]).T, color=COLOURS[0], lw=2.5)
+        ax.text(*((a + b) / 2), e.name, fontsize=6, color=COLOURS[0])
+        for number, point in ((e.first, a), (e.second, b)):
+            if number == GROUND:
+                ax.scatter(*point, marker="s", color="black", s=22)
+            else:
+                joints[number].append(point)
+    joints[device.bodies.index(device.output.body)].append(output)
+    for pushed, direction in zip(device.placed_actuators, c.directions, strict=True):
+        tip = np.array(ca.DM(ca.evalf(ca.SX(c.point(pushed))))).ravel() * MM if c.pushes else free[c.element_of(pushed)]
+        arrow = 3 * SHORT * extent * np.array(ca.DM(ca.evalf(ca.SX(direction)))).ravel()
+        ax.quiver(*(tip - arrow), *arrow, color=COLOURS[2], lw=2, arrow_length_ratio=0.35)
+        ax.text(*(tip - arrow), pushed.name, fontsize=8, color=COLOURS[2], fontweight="bold")
+        if c.pushes and pushed.second != GROUND:
+            joints[pushed.second].append(tip)
+    for r in device.placed_readings:
+        if r.section.at is not None:  # a rotation is read anywhere on its body
+            seen = np.array(ca.DM(ca.mtimes(r.turn, ca.DM([x.si for x in r.section.at])))).ravel() * MM
+            ax.scatter(*seen, marker="o", facecolors="none", edgecolors=COLOURS[3], s=40)
+            ax.text(*seen, f" {r.name}", fontsize=7, color=COLOURS[3])
+            if r.second != GROUND:
+                joints[r.second].append(seen)
+    for name, points in zip(device.bodies, joints, strict=True):
+        middle = np.mean(points, axis=0)
+        for point in points:
+            ax.plot(*np.array([middle, point]).T, color="#999999", lw=1)
+        ax.text(*middle, name, fontsize=8, color="#555555")
+    ax.scatter(*output, marker="*", s=120, color=COLOURS[4], label="output point")
+    ax.scatter([], [], [], marker="s", color="black", s=22, label="ground")
+    _equal(ax, [*free, *fixed, output])
+    ax.set_xlabel("x [mm]")
+    ax.set_ylabel("y [mm]")
+    ax.set_zlabel("z [mm]")
+    ax.set_title(device.title, fontsize=10)
+    ax.legend(fontsize=8, loc="upper left")
+    return figure
+
+
+def _equal(ax: Any, points: Sequence[np.ndarray]) -> None:
+    """One scale for the three axes; a flat mechanism is shown in a flat box."""
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
+    span = np.maximum(high - low, 0.25 * (high - low).max())
+    for set_limits, middle, width in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), (low + high) / 2, span, strict=True):
+        set_limits(middle - 0.55 * width, middle + 0.55 * width)
+    ax.set_box_aspect(span, zoom=1.15)

@@ -1,0 +1,370 @@
+"""A mechanism of rigid bodies and flexures, from a file: bodies, what joins them, what moves them, what is followed.
+
+Actuators either push (a force between two bodies, or on one) or prescribe the motion of one element, as a stage's stroke does.
+Motions are small: stiffness, Jacobian and loads are those of the mechanism as drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Annotated, Any, Literal
+
+import casadi as ca
+import numpy as np
+from pydantic import Field, model_validator
+
+from ctrlgen.devices.base import Device, DevicePhysics
+from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
+from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed
+from ctrlgen.devices.mechanism.copies import Copied, Placed
+from ctrlgen.devices.mechanism.flexures import (
+    TWIST,
+    Blade,
+    CircularHinge,
+    Compliance,
+    ComplianceMatrix,
+    Flexible,
+    Strut,
+    Wire,
+)
+from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
+from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_remarks
+from ctrlgen.devices.mechanism.springs import Spring
+from ctrlgen.devices.mechanism.tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
+from ctrlgen.physics import rigid_bodies as mechanism
+from ctrlgen.physics.rigid_bodies import GROUND, Element
+from ctrlgen.physics.screw import inverse_adjoint
+
+AnyElement = Annotated[
+    Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,
+    Field(discriminator="kind"),
+]
+AnyActuator = Annotated[Actuator | ThermalActuator, Field(discriminator="kind")]
+MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
+
+
+class Mechanism(Device):
+    """Drive -> force or displacement -> motion of all bodies -> pose of the output point."""
+
+    kind: Literal["mechanism"]
+    """Rigid bodies and flexures."""
+    material: tuple[Material, ...] = ()
+    """`[[material]]` tables."""
+    pattern: tuple[Pattern, ...] = ()
+    """`[[pattern]]` tables."""
+    body: tuple[Body, ...]
+    """`[[body]]` tables."""
+    element: tuple[AnyElement, ...]
+    """`[[element]]` tables."""
+    actuator: tuple[AnyActuator, ...]
+    """`[[actuator]]` tables: all push, all heat, or all prescribe displacements."""
+    output: Output
+    """`[output]`: what is followed."""
+    reading: tuple[Reading, ...] = ()
+    """`[[reading]]` tables: what is read beside the output."""
+    dynamics: Dynamics | None = None
+    """`[dynamics]`: where inertia counts."""
+    kinematics: Literal["first_order", "second_order"] = "first_order"
+    """Pose and force to first order in the displacements, or with finite rotations and with flexures that shorten as they bend."""
+
+    @model_validator(mode="after")
+    def _refers_to_what_there_is(self) -> Mechanism:
+        empty = [key for key in ("body", "element", "actuator") if not getattr(self, key)]
+        if empty:
+            raise ValueError("; ".join(f"{key}: there is none; add a [[{key}]] table" for key in empty))
+        faults: list[str] = []
+        for what, names in {
+            "material": [m.name for m in self.material], "pattern": [q.name for q in self.pattern], "body": list(self.bodies),
+            "element": [e.name for e in self.element], "actuator": [a.name for a in self.actuator],
+            "reading": [*self.output.channels, *(r.name for r in self._copies(self.reading))],
+        }.items():  # fmt: skip
+            faults += [f"{what}: {name!r} is named twice" for name in dict.fromkeys(names) if names.count(name) > 1]
+        if GROUND_NAME in self.bodies:
+            faults.append('body: "ground" is the name of what does not move; choose another one')
+        known = {q.name for q in self.pattern} | {""}
+        for where, sections in (
+            ("body", self.body),
+            ("element", self.element),
+            ("actuator", self.actuator),
+            ("reading", self.reading),
+        ):
+            for k, section in enumerate(sections):
+                if section.pattern not in known:
+                    faults.append(f"{where}[{k}].pattern: {section.pattern!r} is no pattern")
+        if not faults:
+            faults += self._unknown_names()
+        if len({a.kind for a in self.actuator}) > 1:
+            faults.append(
+                "actuator: some push, some heat or some prescribe a displacement; give one kind, a stack as force with stiffness"
+            )
+        if len({a.time_constant is None for a in self.actuator}) > 1:
+            faults.append("actuator: some have a time_constant and some do not; give one to all or to none")
+        if len({getattr(a, "heater_resistance", None) is None for a in self.actuator}) > 1:
+            faults.append(
+                "actuator: some have a heater_resistance and some do not; the drives are all voltages or all powers"
+            )
+        if not faults and len(self.output.channels) != len(self.placed_actuators):
+            counts = f"{len(self.output.channels)} channels, {len(self.placed_actuators)} actuators"
+            faults.append(f"output.channels: {counts}; follow as many channels as there are actuators")
+        if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):
+            faults.append(f"body: nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground")
+        if not faults and (free := self._held_by_springs_alone()):
+            faults.append(
+                f"body: springs leave {', '.join(free)} free in some direction; add a spring or a flexure there"
+            )
+        if not faults and self.cubic_steps > MOST_STEPS:
+            faults.append(
+                "element: at the largest travel the cubic springs push harder than the flexures beside them can hold (or soften "
+                "until nothing holds them); lower their k_3, or the travel"
+            )
+        faults += self._beyond_second_order()
+        if not faults:
+            faults += self._unmoved()
+        if not faults and self.dynamics is not None:
+            faults += self._without_inertia()
+        if faults:
+            raise ValueError("; ".join(faults))
+        _ = (
+            self.channel_scale,
+            self.reading_scale,
+            self.cubic_steps,
+        )  # those of the file: a copy with other numbers keeps them
+        return self
+
+    def _without_inertia(self) -> list[str]:
+        """What keeps the table `dynamics` from being of use."""
+        if self.actuator[0].kind == "thermal":
+            return [
+                "dynamics: belongs to actuators that push by force; a heater is far slower than its mechanism rings"
+            ]
+        if self.actuator[0].kind == "displacement":
+            return [
+                "dynamics: inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs"
+            ]
+        if not len(guyan_modes(self).frequencies):
+            return [
+                "dynamics: the actuators move no mass in some direction; give mass and inertia to the bodies that they move"
+            ]
+        return []
+
+    def _beyond_second_order(self) -> list[str]:
+        """What the expansion of the equilibrium does not hold."""
+        stiffens = [e.name for e in self.element if getattr(e, "geometric_stiffening", False)]
+        faults, asked = [], "geometric_stiffening" if stiffens else "kinematics" if self.second_order else ""
+        if asked and any(isinstance(e, Spring) and e.cubic for e in self.element):
+            faults.append(f"{asked}: the second order is that of linear flexures; leave it out, or the springs' k_3")
+        if stiffens and self.kinematics == "first_order" and "kinematics" in self.model_fields_set:
+            faults.append(
+                f'kinematics: geometric_stiffening of {", ".join(stiffens)} is of second order, not of "first_order"; leave out one of them'
+            )
+        if stiffens and self.actuator and self.actuator[0].kind == "displacement":
+            faults.append(
+                f"geometric_stiffening: of {', '.join(stiffens)} has no effect where actuators prescribe displacements; leave it out, "
+                'and write kinematics = "second_order"'
+            )
+        return faults
+
+    def _unmoved(self) -> list[str]:
+        """Channels that no actuator moves, or that move only together."""
+        moved = self._output_motion * np.array([self.size] * 3 + [1.0] * 3)[:, None]  # turns as displacements
+        rows, channels = moved[[TWIST.index(c) for c in self.output.channels]], self.output.channels
+        still = [c for c, row in zip(channels, rows, strict=True) if np.abs(row).max() <= MOVED * np.abs(moved).max()]
+        if still:
+            return [
+                f"output.channels: no actuator moves {', '.join(still)}; follow others, or push in another direction"
+            ]
+        if np.linalg.cond(rows / np.abs(rows).max(axis=1, keepdims=True)) > 1 / MOVED:
+            return [
+                f"output.channels: {', '.join(channels)} move only together; follow others, or place the actuators otherwise"
+            ]
+        least = MOVED * max(a.travel.si for a in self.actuator)
+        unread = [
+            r.name for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
+            if seen * (1.0 if r.section.about is None else self.size) <= least
+        ]  # fmt: skip
+        return (
+            [f"reading: no actuator moves what {', '.join(unread)} reads; read in another direction"] if unread else []
+        )
+
+    def _unknown_names(self) -> list[str]:
+        faults = []
+        materials = {m.name for m in self.material}
+        for k, e in enumerate(self.element):
+            faults += [
+                f"element[{k}].{key}: {name!r} is no body" + (f" with the pattern {e.pattern!r}" if e.pattern else "")
+                for key, name in (("from", e.from_), ("to", e.to)) if self._number(name, e.pattern, 1) is None
+            ]  # fmt: skip
+            if isinstance(e, Flexible) and e.material not in materials:
+                faults.append(f"element[{k}].material: {e.material!r} is no material")
+        elements = {e.name: e for e in self.element}
+        for k, a in enumerate(self.actuator):
+            if a.kind != "force":
+                moved = elements.get(a.on)
+                if moved is None or moved.pattern != a.pattern:
+                    faults.append(
+                        f"actuator[{k}].on: {a.on!r} is no element"
+                        + (f" with the pattern {a.pattern!r}" if a.pattern else "")
+                    )
+                elif a.kind == "thermal" and not isinstance(moved, BentBeam):
+                    faults.append(f"actuator[{k}].on: {a.on!r} is no bent_beam, which a heater needs")
+                elif (
+                    isinstance(moved, BentBeam)
+                    and a.kind == "thermal"
+                    and not any(m.name == moved.material and m.expansion for m in self.material)
+                ):
+                    faults.append(f"actuator[{k}].on: give the material of {a.on!r} its expansion and expansion_slope")
+                continue
+            faults += [
+                f"actuator[{k}].{key}: {name!r} is no body"
+                for key, name in (("on", a.on), ("against", a.against)) if self._number(name, a.pattern, 1) is None
+            ]  # fmt: skip
+        for k, r in enumerate(self.reading):
+            faults += [
+                f"reading[{k}].{key}: {name!r} is no body" + (f" with the pattern {r.pattern!r}" if r.pattern else "")
+                for key, name in (("body", r.body), ("against", r.against)) if self._number(name, r.pattern, 1) is None
+            ]  # fmt: skip
+        if self.output.body not in self.bodies:
+            faults.append(f"output.body: {self.output.body!r} is no body; there are {', '.join(self.bodies)}")
+        return faults
+
+    @property
+    def second_order(self) -> bool:
+        """Whether pose and force are of second order at least."""
+        return self.kinematics == "second_order" or self.geometric_stiffening
+
+    @property
+    def geometric_stiffening(self) -> bool:
+        """Whether the energy is of fourth order, as an element states."""
+        return any(getattr(e, "geometric_stiffening", False) for e in self.element)
+
+    @cached_property
+    def bodies(self) -> tuple[str, ...]:
+        """The names of all bodies, copies with their number."""
+        return tuple(b.name for b in self.placed_bodies)
+
+    @cached_property
+    def size(self) -> float:
+        """The largest distance of an element's end from the origin [m]."""
+        return max(float(np.linalg.norm([x.si for x in e.at])) for e in self.element) or 1e-3
+
+    def _number(self, name: str, pattern: str, copy: int) -> int | None:
+        """The number of a body as an element of a `pattern` names it, from its copy; None where there is none."""
+        if name == GROUND_NAME:
+            return GROUND
+        for known in (
+            (f"{name}_{copy}",)
+            if pattern and any(b.name == name and b.pattern == pattern for b in self.body)
+            else (name,)
+        ):
+            if known in self.bodies:
+                return self.bodies.index(known)
+        return None
+
+    def _copies(self, sections: Iterable[Any]) -> Iterator[Copied]:
+        for index, section in enumerate(sections):
+            pattern = next((q for q in self.pattern if q.name == section.pattern), None)
+            if pattern is None:
+                yield Copied(section, index, section.name, 0, ca.DM.eye(3))
+                continue
+            for k, turn in enumerate(pattern.turns, start=1):
+                yield Copied(section, index, f"{section.name}_{k}", k, turn)
+
+    def _between(self, copy: Copied, first: str, second: str) -> Placed:
+        numbers = [self._number(name, copy.section.pattern, copy.copy) for name in (first, second)]
+        ends = [GROUND if n is None else n for n in numbers]
+        return Placed(copy.section, copy.index, copy.name, copy.copy, copy.turn, ends[0], ends[1])
+
+    @cached_property
+    def placed_bodies(self) -> tuple[Copied, ...]:
+        """Every copy of every body, by its number."""
+        return tuple(self._copies(self.body))
+
+    @cached_property
+    def placed_elements(self) -> tuple[Placed, ...]:
+        """Every copy of every element."""
+        return tuple(self._between(c, c.section.from_, c.section.to) for c in self._copies(self.element))
+
+    @cached_property
+    def placed_actuators(self) -> tuple[Placed, ...]:
+        """Every copy of every actuator; one that prescribes a displacement names an element and no bodies, a heater those of its."""
+        found, elements = [], {e.name: e for e in self.element}
+        for c in self._copies(self.actuator):
+            ends = (
+                (c.section, "against", "on") if c.section.kind != "thermal" else (elements[c.section.on], "from_", "to")
+            )
+            found.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
+        return tuple(found)
+
+    @cached_property
+    def channel_scale(self) -> tuple[float, ...]:
+        """A typical size [rad, m] of each channel that is followed: what all actuators at the largest travel make of it, as the
+        file describes it."""
+        reach = np.abs(self._output_motion).sum(axis=1) * max(a.travel.si for a in self.actuator)
+        return tuple(float(reach[TWIST.index(c)]) for c in self.output.channels)
+
+    @cached_property
+    def cubic_steps(self) -> int:
+        """Steps of Newton's method that find the stretch of the cubic springs, as the file describes them; above `MOST_STEPS` where
+        so many do not."""
+        if not any(isinstance(e, Spring) and e.cubic for e in self.element):
+            return 0
+        steps = Condensed(self, self.values()).cubic_steps()
+        return MOST_STEPS + 1 if steps is None else steps + SPARE_STEPS if steps else 0
+
+    def _held_by_springs_alone(self) -> list[str]:
+        """Bodies that can move without a force, because what joins them are springs."""
+        if not any(isinstance(e, Spring) for e in self.element):
+            return []
+        count, c = len(self.bodies), Condensed(self, self.values())
+        size = np.array([1 / self.size] * 3 + [1.0] * 3)  # turns as displacements
+        rows = []
+        for e, R, end in zip(self.placed_elements, c.frames, c.ends, strict=True):
+            held = e.section.directions if isinstance(e.section, Spring) else range(6)
+            local = ca.DM(inverse_adjoint(R, end)).full()[list(held)] * size / size[list(held), None]
+            row = np.zeros((len(local), 6 * count))
+            for body, sign in ((e.second, 1), (e.first, -1)):
+                if body != GROUND:
+                    row[:, 6 * body : 6 * body + 6] = sign * local
+            rows.append(row)
+        _, values, motions = np.linalg.svd(np.vstack([*rows, np.zeros((6 * count, 6 * count))]))
+        free = motions[values < MOVED * values.max()]
+        return [name for i, name in enumerate(self.bodies) if np.abs(free[:, 6 * i : 6 * i + 6]).max(initial=0) > MOVED]
+
+    @cached_property
+    def placed_readings(self) -> tuple[Placed, ...]:
+        """Every copy of every reading."""
+        return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies(self.reading))
+
+    @cached_property
+    def reading_scale(self) -> tuple[float, ...]:
+        """A typical size [rad, m] of each reading, as `channel_scale`."""
+        travel, n = max(a.travel.si for a in self.actuator), len(self.placed_actuators)
+        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).reading_motion))).full()[:, :n]
+        return tuple(float(x) for x in np.abs(moved).sum(axis=1) * travel)
+
+    @property
+    def _output_motion(self) -> np.ndarray:
+        """(6, n) at home."""
+        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
+        return moved[:, : len(self.placed_actuators)]
+
+    @property
+    def _joints(self) -> list[Element]:
+        """Who is joined to whom."""
+        return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
+
+    def remarks(self) -> list[str]:
+        """Remarks on hinge equations used outside their t/R range, and on inertia that the condensed model does not show."""
+        hinges = [e for e in self.element if isinstance(e, CircularHinge)]
+        dense = {m.name for m in self.material if m.density is not None}
+        light = [
+            f"{e.name}: a hinge has no mass of its own; count it to the bodies that it joins"
+            for e in hinges if e.material in dense
+        ]  # fmt: skip
+        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()] + light + inertia_remarks(self)
+
+    def physics(self, p: SimpleNamespace) -> DevicePhysics:
+        """The condensed mechanism with the values `p`."""
+        return mechanism_physics(Condensed(self, p))

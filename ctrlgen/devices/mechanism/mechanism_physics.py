@@ -1,0 +1,100 @@
+"""The equations of a mechanism as a device's physics: in balance, or with the inertia of its bodies."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+
+from ctrlgen.core.units import written_unit
+from ctrlgen.devices.base import BalancedPhysics, DevicePhysics, InertialPhysics, Limit, SensedPoints, rate_limit
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.drives import transduction
+from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.physics.damping import modal_damping
+
+
+def mechanism_physics(c: Condensed) -> DevicePhysics:
+    """The condensed mechanism as physics: with the table `dynamics` that of bodies with inertia, else in balance."""
+    device, p, acting = c.device, c.p, transduction(c)
+    axes, sections = acting.drive.channels, [a.section for a in device.placed_actuators]
+
+    def restoring_force_parts(d: ca.SX) -> dict[str, ca.SX]:
+        linear, springs = ca.mtimes(c.held_stiffness, d), c.restoring_force(d)
+        if bent and c.pushes:
+            return {"linear": linear, "geometric": restoring_force(d) - springs}
+        return {"linear": linear, "cubic": springs - linear} if c.cubics else {}
+
+    def limits(signal: SimpleNamespace) -> list[Limit]:
+        found = acting.limits(signal)
+        for i, (axis, s) in enumerate(zip(axes, sections, strict=True)):
+            d, reach = signal.displacement[i], s.travel.si
+            found.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
+        return found + _flexure_limits(c, signal.mechanism_displacement)
+
+    J, channels, second = c.jacobian, device.output.channels, SecondOrder(c)
+    bent = device.second_order
+
+    def restoring_force(d: ca.SX) -> ca.SX:
+        force = c.restoring_force(d)
+        return force + second.restoring_force(d, device.geometric_stiffening) if bent and c.pushes else force
+
+    def pose(d: ca.SX) -> ca.SX:
+        linear = ca.mtimes(J, c.loads(d))
+        return linear + second.pose(d) if bent else linear
+
+    common: dict[str, Any] = dict(
+        axes=axes, components=channels, pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
+        pose_scale=device.channel_scale, drive=acting.drive, state=acting.state, rest=acting.rest,
+        displacement_scale=max(s.travel.si for s in sections), bipolar=any(low < 0 for low, _ in acting.drive_range),
+        force_scale=acting.force_scale, force_unit="N" if c.pushes else "um",
+        restoring_force=restoring_force, restoring_force_parts=restoring_force_parts,
+        pose=pose, limits=limits, sensed=_sensed(c, second if bent else None),
+        second_order_kinematics=None if bent or c.cubics else second.pose,
+        rate_limits=tuple(
+            rate_limit(acting.drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
+            for i, s in enumerate(sections) if getattr(s, "rate", None) is not None
+        ),
+    )  # fmt: skip
+    if p.dynamics is None:
+        return BalancedPhysics(
+            **common, force=lambda u, x, d: acting.force(u, x), rates=acting.rates, heating_power=acting.heat, power=acting.power
+        )  # fmt: skip
+    D = modal_damping(c.mass, c.held_stiffness, p.dynamics.damping_ratio)
+    return InertialPhysics(
+        **common, mass=c.mass, dynamics=lambda u, x, d, v: (acting.force(u, x), acting.rates(x, u)),
+        damping_force=lambda v: ca.mtimes(D, v),
+    )  # fmt: skip
+
+
+def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
+    """The readings beside those of the output, to first order or to second."""
+    readings, rows = c.device.placed_readings, c.reading_motion
+    if not readings:
+        return None
+    units = tuple("um" if r.section.about is None else "urad" for r in readings)
+    names = tuple(r.name for r in readings)
+
+    def at(d: ca.SX) -> ca.SX:
+        linear = ca.mtimes(rows, c.loads(d))
+        return linear if second is None else linear + second.sensed(d)
+
+    return SensedPoints(names, units, c.device.reading_scale, at)
+
+
+def _flexure_limits(c: Condensed, d: ca.SX) -> list[Limit]:
+    """Rotations and stresses of the flexures with the axes displaced by `d` (n,), as they are at rest there."""
+    found = []
+    for k, e in enumerate(c.device.placed_elements):
+        most = getattr(e.section, "rotation_limit", None)
+        if most is not None:
+            angle = ca.fabs(ca.mtimes(c.rotation(k), c.loads(d)))
+            found.append(Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si))
+    for m in c.device.material:
+        if m.stress_limit is not None:
+            names, stress = c.stress(m.name, d, 1e-9 * m.stress_limit.si)
+            if names:
+                label = f"stress of {m.name}"
+                found.append(Limit(f"stress_{m.name}", label, names, "MPa", stress, None, m.stress_limit.si))
+    return found

@@ -1,0 +1,232 @@
+"""What follows from a mechanism's equations at home: degrees of freedom, natural frequencies, and the lines that describe it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+import scipy
+
+from ctrlgen.core.units import show
+from ctrlgen.devices.mechanism.condensed import Condensed, Drawing
+from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.physics.rigid_bodies import GROUND
+from ctrlgen.physics.screw import inverse_adjoint
+
+INDEPENDENT = 1e-3  # singular value of unit rows below which a constraint adds nothing: no drawing is more exact
+INERT = 1e-9  # of the largest mass of an axis, below which rounding moves it and no body
+FAR = 0.1  # of a frequency: as far as mass and stiffness of a drawing are from the built one's, roughly
+LIKE = 0.5  # of the modal assurance criterion: below it a condensed mode is no single mode
+STILL = 1e-9  # m/m or rad/m: of the motion per actuator, below which it is rounding
+
+
+def freedoms(device: Drawing) -> tuple[int, int]:
+    """(degrees of freedom, times over-constrained) of the mechanism without its actuators.
+
+    Each flexure holds its stiff directions ideally, a blade three and a wire one: c rows A of relative twists of all bodies,
+    6 n - rank(A) and c - rank(A). Source: J. B. Hopkins, M. L. Culpepper, Precis. Eng. 34 (2010) 259 (ideal constraints).
+    """
+    c = Condensed(device, device.values())
+    count, rows = len(device.bodies), []
+    turn = np.array([device.size] * 3 + [1.0] * 3)  # twists (theta; delta) as displacements, wrenches (M; F) as forces
+    swap = [3, 4, 5, 0, 1, 2]
+    yields = {
+        k: turn[:, None] * ca.DM(ca.evalf(ca.SX(C))).full()[:, swap] * turn
+        for k, C in enumerate(c.compliances) if C is not None
+    }  # fmt: skip
+    largest = max((float(np.linalg.eigvalsh((C + C.T) / 2).max()) for C in yields.values()), default=0.0)
+    for k, e in enumerate(device.placed_elements):
+        if k not in yields:
+            continue  # a spring holds nothing
+        pivot = c.ends[k] - e.section.pivot(c.p.element[e.index]) * c.frames[k][:, 0]
+        local = inverse_adjoint(c.frames[k], pivot)  # twist in the element's frame
+        own = e.section.constrained(yields[k], largest) * turn
+        A = np.zeros((len(own), 6 * count))
+        held = own @ ca.DM(ca.evalf(ca.SX(local))).full()
+        for body, sign in ((e.second, 1), (e.first, -1)):
+            if body != GROUND:
+                A[:, 6 * body : 6 * body + 6] = sign * held
+        rows.append(A)
+    A = np.vstack([np.zeros((0, 6 * count)), *rows]) * np.tile([1 / device.size] * 3 + [1.0] * 3, count)
+    A /= np.linalg.norm(A, axis=1, keepdims=True)
+    rank = int(np.linalg.matrix_rank(A, tol=INDEPENDENT))
+    return 6 * count - rank, len(A) - rank
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Natural `frequencies` (k,) [Hz], ascending, and the `motions` (6 bodies, k) of all bodies in them, twists at the origin with turns
+    counted as displacements; `mass` (6 bodies, 6 bodies) in the same units."""
+
+    frequencies: np.ndarray
+    motions: np.ndarray
+    mass: np.ndarray
+
+    def likeness(self, other: Modes) -> np.ndarray:
+        """(k, k') modal assurance criterion, 1 for the same motion. Source: R. J. Allemang, D. L. Brown, Proc. IMAC 1 (1982) 110."""
+        size = [np.einsum("ij,ik,kj->j", m.motions, self.mass, m.motions) for m in (self, other)]
+        return (self.motions.T @ self.mass @ other.motions) ** 2 / np.outer(*size)
+
+
+def natural_frequencies(device: Drawing) -> np.ndarray:
+    """The natural frequencies [Hz] with the drives held, ascending; empty where no body has a mass."""
+    return free_modes(device).frequencies
+
+
+def free_modes(device: Drawing) -> Modes:
+    """All modes with the drives held; none where no body has a mass.
+
+    K v = w^2 M v of all bodies, those without mass condensed first (which is exact), flexures with mass bent as at rest between their
+    ends: a stack counts with its stiffness, a force
+    without one leaves its axis free, a prescribed displacement holds it. Cubic springs count with their slope at home, none.
+    """
+    c = Condensed(device, device.values())
+    count = len(device.bodies)
+    K = np.zeros((6 * count, 6 * count))
+    M, heavy = _mass(c)
+    swap = np.r_[3:6, 0:3]  # a wrench as (moment; force) beside a twist: the stiffness is then symmetric
+    for e in c.held_elements():
+        k = ca.DM(ca.evalf(ca.SX(e.stiffness))).full()[swap]
+        for i, j, sign in (
+            (e.first, e.first, 1),
+            (e.second, e.second, 1),
+            (e.first, e.second, -1),
+            (e.second, e.first, -1),
+        ):
+            if GROUND not in (i, j):
+                K[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += sign * k
+    if not heavy:
+        return Modes(np.zeros(0), np.zeros((6 * count, 0)), M)
+    scale = _as_displacements(device)
+    K = K * np.outer(scale, scale)
+    light = [i for i in range(6 * count) if i not in heavy]
+    follows = -np.linalg.solve(K[np.ix_(light, light)], K[np.ix_(light, heavy)])
+    K_h = K[np.ix_(heavy, heavy)] + K[np.ix_(heavy, light)] @ follows
+    squares, shapes = scipy.linalg.eigh((K_h + K_h.T) / 2, M[np.ix_(heavy, heavy)])
+    motions = np.zeros((6 * count, len(squares)))
+    motions[heavy], motions[light] = shapes, follows @ shapes
+    return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), motions, M)
+
+
+def guyan_modes(device: Drawing) -> Modes:
+    """The modes of the model with inertia, whose bodies move as they do at rest: as many as actuators; none where the actuators prescribe
+    displacements, or move no mass in some direction."""
+    c = Condensed(device, device.values())
+    M, heavy = _mass(c)
+    n = len(device.placed_actuators)
+    moved = np.vstack([ca.DM(ca.evalf(ca.SX(T[:, :n]))).full() for T in c.twists]) / _as_displacements(device)[:, None]
+    inert = moved.T @ M @ moved
+    if not (c.pushes and heavy) or np.linalg.eigvalsh(inert).min() <= INERT * np.linalg.eigvalsh(inert).max():
+        return Modes(np.zeros(0), moved[:, :0], M)
+    K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
+    squares, shapes = scipy.linalg.eigh((K + K.T) / 2, inert)
+    return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), moved @ shapes, M)
+
+
+def _as_displacements(device: Drawing) -> np.ndarray:
+    """(6 bodies,) by which a twist is multiplied where turns are counted as displacements at the mechanism's size."""
+    return np.tile([1 / device.size] * 3 + [1.0] * 3, len(device.bodies))
+
+
+def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
+    """The mass matrix of all bodies, turns counted as displacements, and its rows that are not zero."""
+    count = len(c.device.bodies)
+    M = np.zeros((6 * count, 6 * count))
+    heavy: set[int] = set()
+    for i in range(count):
+        if (own := c.body_mass(i)) is not None:
+            M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = ca.DM(ca.evalf(ca.SX(own))).full()
+            heavy |= {i}
+    for k, e in enumerate(c.elements):
+        if (own := c.flexure_mass(k, ca.DM.eye(12)[:6, :], ca.DM.eye(12)[6:, :])) is not None:
+            both = ca.DM(ca.evalf(ca.SX(own))).full()
+            ends = [(b, slice(6 * at, 6 * at + 6)) for at, b in enumerate((e.first, e.second)) if b != GROUND]
+            for i, row in ends:
+                for j, column in ends:
+                    M[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += both[row, column]
+            heavy |= {i for i, _ in ends}
+    scale = _as_displacements(c.device)
+    return M * np.outer(scale, scale), [6 * i + n for i in sorted(heavy) for n in range(6)]
+
+
+def summary(device: Drawing) -> list[str]:
+    """What `ctrlgen check` prints of a mechanism: its parts, and how stiff it is at the output point."""
+    c = Condensed(device, device.values())
+    C = ca.DM(ca.evalf(ca.SX(c.output_compliance))).full()
+    springs = sum(C is None for C in c.compliances)
+    lines = [
+        f"{len(device.bodies)} bodies, {len(c.elements) - springs} flexures, "
+        + (f"{springs} springs, " if springs else "")
+        + f"{len(device.placed_actuators)} actuators"
+    ]
+    free, over = freedoms(device)
+    lines.append(f"degrees of freedom without actuators: {free}; redundant constraints: {over}")
+    forces = ", ".join(f"{name} {show(1 / C[3 + i, i], 'N/um')}" for i, name in enumerate("xyz"))
+    moments = ", ".join(f"{name} {show(1 / C[i, 3 + i], 'N*m/rad')}" for i, name in enumerate("xyz"))
+    lines.append(f"stiffness at the output point: {forces}; about {moments}")
+    if len(modes := natural_frequencies(device)):
+        lines.append(f"natural frequencies with the drives held: {', '.join(show(f, 'Hz') for f in modes[:6])}")
+    condensed, left_out = condensed_modes(device)
+    if condensed:
+        used = "solved with it" if device.dynamics is not None else "a table [dynamics] solves with it"
+        more = "" if left_out is None else f"; first mode left out: {show(left_out, 'Hz')}"
+        lines.append(f"inertia condensed to the actuators (Guyan; {used}): {', '.join(map(str, condensed))}{more}")
+    seen = ca.vertcat(c.jacobian, c.reading_motion)[:, : len(device.placed_actuators)]
+    turns = [name.startswith("theta") for name in device.output.channels]
+    turns += [r.section.about is not None for r in device.placed_readings]
+    names = [*device.output.channels, *(r.name for r in device.placed_readings)]
+    for channel, turn, row in zip(names, turns, ca.DM(ca.evalf(ca.SX(seen))).full(), strict=True):
+        unit = "urad/um" if turn else "um/um"
+        parts = ", ".join(
+            f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
+        )
+        lines.append(f"{channel}: {parts or 'not moved'}")
+    return lines + (_second_order_lines(c) if device.second_order else [])
+
+
+def _second_order_lines(c: Condensed) -> list[str]:
+    """What the second order adds to the channels that are followed, at the largest travels, whatever their signs."""
+    found = np.abs(ca.DM(ca.evalf(ca.SX(SecondOrder(c).output))).full())
+    travel = np.array([a.section.travel.si for a in c.device.placed_actuators])
+    reach = np.abs(ca.DM(SecondOrder(c).products(ca.DM(travel))).full()).ravel()
+    shown = (
+        f"{name} {show(value, 'urad' if name.startswith('theta') else 'um')}"
+        for name, value in zip(c.device.output.channels, found @ reach, strict=True)
+    )
+    return [f"second order at the largest travels, at most: {', '.join(shown)}"]
+
+
+@dataclass(frozen=True)
+class CondensedMode:
+    """A mode of the model with inertia [Hz], and the mode of all bodies that is like it; None where it is not like one alone."""
+
+    frequency: float
+    whole: float | None
+
+    def __str__(self) -> str:
+        if self.whole is None:
+            return f"{show(self.frequency, 'Hz')} (no single mode of the whole)"
+        off = 100 * (self.frequency / self.whole - 1)
+        return f"{show(self.frequency, 'Hz')} ({off:+.2g} % of {show(self.whole, 'Hz')})"
+
+
+def condensed_modes(device: Drawing) -> tuple[tuple[CondensedMode, ...], float | None]:
+    """How far the modes of the bodies moving as at rest are from their modes, and the first mode [Hz] that is left out."""
+    full, reduced = free_modes(device), guyan_modes(device)
+    if not len(reduced.frequencies):
+        return (), None
+    like = reduced.likeness(full)
+    partner = like.argmax(axis=1)
+    modes = tuple(
+        CondensedMode(float(f), float(full.frequencies[k]) if of[k] > LIKE else None)
+        for f, of, k in zip(reduced.frequencies, like, partner, strict=True)
+    )
+    return modes, next((float(f) for k, f in enumerate(full.frequencies) if k not in partner), None)
+
+
+def inertia_remarks(device: Drawing) -> list[str]:
+    """Modes of the model with inertia that are far from those of the bodies."""
+    modes, _ = condensed_modes(device) if device.dynamics is not None else ((), None)
+    far = [str(m) for m in modes if m.whole is None or abs(m.frequency / m.whole - 1) > FAR]
+    return [f"the bodies do not move as at rest in the modes {', '.join(far)}: drive them far slower"] if far else []

@@ -1,0 +1,225 @@
+"""The tables of a mechanism's file beside its elements: materials, patterns, bodies, what moves them, what is followed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import casadi as ca
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
+from ctrlgen.devices.mechanism.flexures import Direction, Name, Place
+from ctrlgen.devices.section import Section
+from ctrlgen.physics.screw import Matrix, rotation_z
+
+PerDrive = Annotated[Quantity, In(None)]
+Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
+GROUND_NAME = "ground"
+
+
+class Material(Section):
+    """`[[material]]`: what flexures are made of."""
+
+    name: Name
+    """By which elements name it."""
+    young: Annotated[Quantity, In("GPa", positive=True)]
+    """Young's modulus."""
+    poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
+    """Poisson's ratio."""
+    density: Annotated[Quantity, In("kg/m^3", positive=True)] | None = None
+    """Mass per volume: with it, its blades, wires and struts have mass. Left out: none has."""
+    stress_limit: Annotated[Quantity, In("MPa", positive=True)] | None = None
+    """Largest stress in its blades, wires and struts and in the necks of its hinges; a limit where it is given."""
+    expansion: Annotated[Quantity, In("1/K", positive=True)] | None = None
+    """Coefficient of thermal expansion at 0 degC; needed where a thermal actuator heats it."""
+    expansion_slope: Annotated[Quantity, In("1/K^2", low=0.0)] | None = None
+    """Increase of the coefficient per kelvin, given with `expansion`."""
+
+    @model_validator(mode="after")
+    def _expands(self) -> Material:
+        if (self.expansion is None) != (self.expansion_slope is None):
+            raise ValueError(
+                'expansion and expansion_slope belong together; write expansion_slope = "0 1/K^2" where it is constant'
+            )
+        return self
+
+
+class Pattern(Section):
+    """`[[pattern]]`: copies of bodies, elements and actuators that name it, turned about z or mirrored."""
+
+    name: Name
+    """By which they name it; copy k of a body NAME is called NAME_k, from 1."""
+    times: Annotated[int, Field(ge=2, le=100)] | None = None
+    """How many there are, the first as written; left out for a mirror."""
+    angles: tuple[Annotated[Quantity, In("deg")], ...] = ()
+    """Angle of each copy; left out: evenly spaced over a turn."""
+    mirror: Literal["x", "y", "z"] | None = None
+    """The second copy is the image of the first in the plane through the origin that is normal to this axis."""
+
+    @model_validator(mode="after")
+    def _is_one_or_the_other(self) -> Pattern:
+        if self.mirror is not None and (self.times is not None or self.angles):
+            raise ValueError("mirror: makes two copies; leave out times and angles")
+        if self.mirror is None and self.times is None:
+            raise ValueError("times: is missing; say how many copies, or give mirror")
+        if self.angles and len(self.angles) != self.times:
+            raise ValueError(f"angles: has {len(self.angles)} for {self.times} copies; give one for each, or none")
+        return self
+
+    @property
+    def turns(self) -> list[Matrix]:
+        """The rotation or reflection (3, 3) of each copy."""
+        if self.mirror is not None:
+            return [ca.DM.eye(3), ca.diag(ca.DM([-1 if axis == self.mirror else 1 for axis in "xyz"]))]
+        times = self.times or 0
+        angles = [a.si for a in self.angles] or [2 * np.pi * k / times for k in range(times)]
+        return [ca.DM(rotation_z(angle)) for angle in angles]
+
+
+class Body(Section):
+    """`[[body]]`: a rigid part."""
+
+    name: Name
+    """By which elements, actuators and the output name it."""
+    pattern: str = ""
+    """The pattern by which it is copied."""
+    mass: Annotated[Quantity, In("g", positive=True)] | None = None
+    """For the natural frequencies, and with a table `[dynamics]` for the model; a body without mass follows the others."""
+    centre: Place | None = None
+    """Centre of mass in the global frame. Left out: the origin."""
+    inertia: tuple[Inertia, Inertia, Inertia] | None = None
+    """Moments of inertia about axes through the centre of mass that are parallel to x, y and z as it is drawn."""
+
+    @model_validator(mode="after")
+    def _turns_as_it_moves(self) -> Body:
+        if (self.mass is None) != (self.inertia is None):
+            raise ValueError("mass and inertia belong together; give both or none")
+        return self
+
+
+class Actuator(Section):
+    """`[[actuator]]`: what moves the mechanism. One gives one axis, named after it."""
+
+    name: Name
+    """Of the axis and its drive."""
+    kind: Literal["force", "displacement"]
+    """Pushes on a body, or prescribes the motion of an element."""
+    on: str
+    """The body that is pushed, or the element whose free end is moved."""
+    against: str = GROUND_NAME
+    """The body that a force pushes against."""
+    at: Place | None = None
+    """Where a force acts; its travel is that of this point."""
+    along: Direction
+    """In which direction; of any length."""
+    gain: PerDrive
+    """Force or displacement per drive, such as "0.2 N/V" or "1 um/V"."""
+    low: PerDrive
+    """Lowest drive; its unit is that of the drive."""
+    high: PerDrive
+    """Highest drive."""
+    rate: tuple[PerDrive, PerDrive] | None = None
+    """Largest change of the drive by time, such as "5 V/ms", or the lowest and the highest, such as ["-2 V/ms", "5 V/ms"]."""
+    time_constant: Annotated[Quantity, In("ms", positive=True)] | None = None
+    """Time constant with which the force or displacement follows the drive; left out: at once."""
+    stiffness: Annotated[Quantity, In("N/um", positive=True)] | None = None
+    """Stiffness of a stack beside its blocked force, along its direction."""
+    travel: Annotated[Quantity, In("um", positive=True)]
+    """Largest travel to both sides; a limit."""
+    pattern: str = ""
+    """The pattern by which it is copied."""
+
+    @field_validator("rate", mode="before")
+    @classmethod
+    def _is_to_both_sides(cls, stated: Any) -> Any:
+        """One rate is the largest to both sides."""
+        return (f"-{stated}", stated) if isinstance(stated, str) else stated
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Actuator:
+        faults = []
+        drive = written_unit(self.low.text)
+        if self.rate is not None:
+            slowest, fastest = self.rate
+            if any(not same_dimension(written_unit(q.text), f"({drive})/s") for q in self.rate):
+                faults.append(f"rate: {fastest.text!r} is no rate of a drive in {drive}; write for example {drive}/ms")
+            elif not slowest.si < 0 < fastest.si:
+                faults.append("rate: must be above zero, or a rate below zero and one above")
+        if not same_dimension(drive, written_unit(self.high.text)):
+            faults.append(f"high: {self.high.text!r} is not of the dimension of low = {self.low.text!r}")
+        elif not self.low.si < self.high.si:
+            faults.append(f"low = {self.low.text!r} is not below high = {self.high.text!r}")
+        wanted = "N" if self.kind == "force" else "m"
+        if not same_dimension(f"({written_unit(self.gain.text)})*({drive})", wanted):
+            faults.append(
+                f"gain: {self.gain.text!r} is no {self.kind} per drive in {drive}; write for example {wanted}/{drive}"
+            )
+        if np.linalg.norm(self.along) == 0:
+            faults.append("along: is zero; give a direction")
+        if self.kind == "force" and self.at is None:
+            faults.append("at: is missing; say where the force acts")
+        for key in ("at", "stiffness") if self.kind == "displacement" else ():
+            if getattr(self, key) is not None:
+                faults.append(
+                    f"{key}: belongs to a force; the element says where a displacement acts and how stiff it is"
+                )
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+
+class Output(Section):
+    """`[output]`: the point that is followed and read."""
+
+    body: str
+    """On this body (of a pattern: with the number of the copy)."""
+    at: Place
+    """In the global frame."""
+    channels: tuple[Literal["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"], ...] = Field(
+        min_length=1
+    )
+    """Components of its motion, as many as actuators: rotations, and displacements of the point."""
+
+
+class Reading(Section):
+    """`[[reading]]`: a reading beside those of the output: of the displacement of a point of a body, or of its rotation."""
+
+    name: Name
+    """Of the reading, as in the column "reading.NAME" of a recording, or as a `[[sensor]]` table names it."""
+    body: str
+    """The body that is looked at."""
+    against: str = GROUND_NAME
+    """The body on which the sensor stands."""
+    at: Place | None = None
+    """The point whose displacement is read, in the global frame."""
+    along: Direction | None = None
+    """Direction of the displacement that is read; of any length."""
+    about: Direction | None = None
+    """Axis of the rotation that is read, in place of `at` and `along`."""
+    pattern: str = ""
+    """The pattern by which it is copied."""
+
+    @model_validator(mode="after")
+    def _reads_one_thing(self) -> Reading:
+        if (self.about is None) == (self.along is None):
+            raise ValueError("give either along (and at), for a displacement, or about, for a rotation")
+        if (self.along is None) != (self.at is None):
+            raise ValueError(
+                "at and along belong together: say which point's displacement is read; a rotation has no point"
+            )
+        if np.linalg.norm(self.direction) == 0:
+            raise ValueError(f"{'along' if self.about is None else 'about'}: is zero; give a direction")
+        return self
+
+    @property
+    def direction(self) -> Direction:
+        """`along` or `about`."""
+        return self.along or self.about or (0.0, 0.0, 0.0)
+
+
+class Dynamics(Section):
+    """`[dynamics]`: the model has the inertia of the bodies, condensed to the actuators. Left out: it is in balance at every moment."""
+
+    damping_ratio: Annotated[Quantity, In("1", low=0.0, high=1.0)]
+    """Of every mode of the condensed mechanism, such as "2 %"."""

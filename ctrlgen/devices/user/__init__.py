@@ -1,0 +1,1 @@
+"""Devices whose physics their user writes as functions."""

@@ -1,0 +1,131 @@
+"""The whole diagnosis from files to a folder with report.html, diagnosis.json and device.next.toml, written as a whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ctrlgen.core.files import whole_folder, write_text
+from ctrlgen.core.to_json import plain
+from ctrlgen.devices import Device, files_of, load_device
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
+from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.html_report import page
+from ctrlgen.diagnosis.report.writeback import write_next
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
+from ctrlgen.estimation.checkpoint import Checkpoint
+from ctrlgen.model.assembly import build_model
+from ctrlgen.recordings.reader import load_recordings
+from ctrlgen.recordings.recorded_files import recording_files, sha256
+from ctrlgen.recordings.recording import Recording
+from ctrlgen.version import code_hash
+
+Progress = Callable[[str], None]
+Paths = Path | str | Sequence[Path | str]
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """Number of bootstrap replicates, and where they run (see `ctrlgen.core.parallel`)."""
+
+    count: int
+    scheduler: str | None = None
+    jobs: int | None = None
+
+    def of(self, found: Diagnosis, seed: int, step: Progress) -> Bootstrap:
+        """The bootstrap of a diagnosis; `step` is called with its progress."""
+        step(f"bootstrap, {self.count} replicates")
+
+        def told(done: int, of: int) -> None:
+            step(f"bootstrap, {done} of {of} replicates")
+
+        return bootstrap(found, self.count, seed, self.scheduler, self.jobs, told)
+
+
+def diagnose(
+    device: Device | Path | str,
+    recording: Recording | Paths,
+    seed: int = 0,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
+    laws: Sequence[str] | None = None,
+    jobs: int | None = None,
+) -> Diagnosis:
+    """The physics that `recording` shows and `device` leaves out; each may be an object or its file, a recording also several.
+
+    Deterministic for a given `seed`, whatever the number of processes, `jobs`: one per core unless given, 0 for this one alone.
+    `progress` is called with a sentence before each step. `laws` restricts the hypotheses to the effects of these names and the
+    device's own parameters. Raises InputError.
+    """
+    device = device if isinstance(device, Device) else load_device(device)
+    if not isinstance(recording, Recording):
+        if progress:
+            progress("reading")
+        paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
+        recording = load_recordings(paths, build_model(device))
+    return diagnose_recording(device, recording, seed, progress, checkpoint, laws, jobs)
+
+
+def diagnose_into(
+    device: Path | str,
+    recordings: Sequence[Path | str],
+    out: Path | str,
+    seed: int = 0,
+    progress: Progress | None = None,
+    replicates: Replicates | None = None,
+    laws: Sequence[str] | None = None,
+    jobs: int | None = None,
+) -> Diagnosis:
+    """`diagnose`, reported into the folder `out`, which is replaced as a whole or left unchanged. Raises InputError.
+
+    An interrupted diagnosis leaves its fits in a file beside `out`; the same call continues from them. With `replicates`
+    bootstrap.json is written too, and the diagnosis' `extra` holds it as "bootstrap".
+    """
+    step = progress or (lambda _: None)
+    with whole_folder(Path(out)) as draft:
+        model = build_model(load_device(device))
+        step("reading")
+        recording = load_recordings(list(recordings), model)
+        checkpoint = _checkpoint(Path(out), device, recordings, seed, laws)
+        if checkpoint.reused:
+            step(f"continuing after {checkpoint.reused} fits")
+        found = diagnose(model.device, recording, seed, step, checkpoint, laws, jobs)
+        if replicates is not None:
+            found.extra["bootstrap"] = replicates.of(found, seed, step)
+            write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
+        step("report")
+        write_next(found, Path(device), draft / "device.next.toml")
+        settles = (found.next_experiment or {}).get("settles")
+        for name, content in found.extra["files"].items() if settles else ():
+            write_text(draft / "next_experiment" / name, content)
+        provenance = Provenance(digests(Path(device), recordings), seed)
+        record = diagnosis_record(found, provenance)
+        write_text(draft / "diagnosis.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
+        write_text(draft / "report.html", page(found, provenance))
+    checkpoint.done()  # only now: a diagnosis interrupted during its replicates need not repeat its fits
+    return found
+
+
+def unfinished(out: Path) -> Path:
+    """The checkpoint file of a diagnosis into `out`; it exists until the diagnosis is done."""
+    out = out.resolve()  # "." has no name of its own
+    return out.with_name(f"{out.name}.unfinished")
+
+
+def _checkpoint(
+    out: Path, device: Path | str, recordings: Sequence[Path | str], seed: int, laws: Sequence[str] | None
+) -> Checkpoint:
+    """The checkpoint of a diagnosis into `out`, valid for the same program, files, seed and effects."""
+    files = digests(Path(device), recordings)
+    return Checkpoint(
+        unfinished(out), {"code": code_hash(), "seed": seed, "laws": laws and sorted(laws), "files": files}
+    )
+
+
+def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:
+    """SHA-256 of every file that a diagnosis reads, by name."""
+    own = [(file.name, file) for file in files_of(device)]
+    return {name: sha256(path) for name, path in (*own, *recording_files(recordings))}

@@ -1,0 +1,203 @@
+"""All plots of a diagnosis as SVG; those of the held-out residual, over time or poses and by frequency, are drawn here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.signal import freqz, welch
+
+from ctrlgen.core.units import from_si
+from ctrlgen.diagnosis.report.narrative import short
+from ctrlgen.diagnosis.report.plot_maps import draw_unknown, draw_where
+from ctrlgen.diagnosis.report.plot_shares import draw_shares
+from ctrlgen.diagnosis.report.plot_uncertainty import (
+    draw_confusability,
+    draw_intervals,
+    draw_profiles,
+    draw_rivals,
+)
+from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
+from ctrlgen.recordings.recording import Record
+from ctrlgen.reporting.plots import COLOURS, STYLE, svg
+
+BEFORE, AFTER, NOISE = COLOURS[2], COLOURS[0], "#d9d9d9"
+WIDTH = 8.6
+POINTS = 700  # columns of a long curve; of each the smallest and the largest sample are drawn
+SEGMENT = 2048  # samples of a window of the spectrum
+BANDS = 20  # bands a decade
+
+
+def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
+    """SVG text by name of every plot for which this diagnosis has data."""
+    residuals = Residuals(diagnosis)
+    drawings: dict[str, Callable[[], Figure | None]] = {
+        "residuals": lambda: draw_residuals(residuals),
+        "spectrum": lambda: draw_spectrum(residuals),
+        "shares_before": lambda: _shares(diagnosis, after=False),
+        "shares_after": lambda: _shares(diagnosis, after=True),
+        "where": lambda: draw_where(diagnosis),
+        "unknown": lambda: draw_unknown(diagnosis),
+        "rivals": lambda: draw_rivals(diagnosis),
+        "confusability": lambda: draw_confusability(diagnosis),
+        "intervals": lambda: draw_intervals(diagnosis),
+        "profiles": lambda: draw_profiles(diagnosis),
+    }
+    with plt.rc_context(STYLE):
+        figures = {name: draw() for name, draw in drawings.items()}
+        return {name: svg(figure) for name, figure in figures.items() if figure is not None}
+
+
+def _shares(diagnosis: Diagnosis, after: bool) -> Figure | None:
+    """The model-free shares of one residual; None where there are none, and after no correction."""
+    if diagnosis.shares is None or (after and not diagnosis.search.chosen.causes):
+        return None
+    units = dict(zip(diagnosis.recording.channels, diagnosis.recording.units, strict=True))
+    return draw_shares(diagnosis.shares.after if after else diagnosis.shares.before, units)
+
+
+class Residuals:
+    """Held-out residuals of the nominal and of the chosen model, in the recording's units."""
+
+    def __init__(self, diagnosis: Diagnosis) -> None:
+        self.diagnosis, self.recording, fitter = diagnosis, diagnosis.recording, diagnosis.fitter
+        self.records: list[Record] = fitter.held_out_records
+        self.settled = self.recording.kind == "poses"
+        search = diagnosis.search
+        self.scales = [from_si(1.0, unit) - from_si(0.0, unit) for unit in self.recording.units]
+        self.before, self.after = (
+            [np.where(r.valid, r.observed - fitter.predict(trial.fit, r), np.nan) * self.scales for r in self.records]
+            for trial in (search.nominal, search.chosen)
+        )
+        self.changed = bool(diagnosis.findings)
+
+    def spans(self) -> Iterator[tuple[int, np.ndarray]]:
+        """(record, its abscissa): seconds or poses, the records one after another."""
+        first = 0.0
+        for k, record in enumerate(self.records):
+            n, step = len(record.time), 1.0 if self.settled else record.sample_time
+            yield k, first + step * np.arange(n)
+            first += step * n
+
+    def floor(self, i: int) -> float | None:
+        """Noise standard deviation of channel i in its unit, None where it is not known."""
+        return self.diagnosis.held_out[self.recording.channels[i]].noise_floor
+
+
+def draw_residuals(residuals: Residuals) -> Figure:
+    """By channel: the residual before and after the correction, and after alone on its own scale with the noise; one panel
+    where nothing was corrected."""
+    channels, wide = residuals.recording.channels, 1 + residuals.changed
+    size = (WIDTH, 0.9 + 1.55 * len(channels))
+    figure, axes = plt.subplots(len(channels), wide, figsize=size, sharex=True, squeeze=False)
+    for i, (channel, unit) in enumerate(zip(channels, residuals.recording.units, strict=True)):
+        if residuals.changed:
+            _curve(axes[i, 0], residuals, residuals.before, i, BEFORE, "before")
+        for panel in axes[i]:
+            _curve(panel, residuals, residuals.after, i, AFTER, "after")
+        axes[i, 0].set_ylabel(f"{short(channel)} [{unit}]")
+        floor = residuals.floor(i)
+        if floor is not None:
+            axes[i, -1].axhspan(-2 * floor, 2 * floor, color=NOISE, zorder=0)
+    known = all(residuals.floor(i) is not None for i in range(len(channels)))
+    title = "after, on its own scale" if residuals.changed else "residual"
+    axes[0, -1].set_title(title + (" (grey: noise, ± 2 sd)" if known else ""), fontsize=9)
+    for panel in axes[-1]:
+        panel.set_xlabel("held-out pose" if residuals.settled else "time in the held-out records [s]")
+    if residuals.changed:
+        axes[0, 0].set_title("before and after", fontsize=9)
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize=8)
+    return figure
+
+
+def _curve(panel: Axes, residuals: Residuals, parts: list[np.ndarray], i: int, colour: str, label: str) -> None:
+    """One channel over all held-out records, with a line between records."""
+    style: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3} if residuals.settled else {"lw": 0.9}
+    for k, x in residuals.spans():
+        panel.plot(*thinned(x, parts[k][:, i]), color=colour, label=label if k == 0 else None, **style)
+        if k > 0:
+            panel.axvline(x[0], color="#999999", lw=0.7, ls=":")
+
+
+def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A long curve reduced to the smallest and largest sample of each of `POINTS` columns."""
+    if len(x) <= 2 * POINTS:
+        return x, y
+    pieces = np.array_split(np.arange(len(x)), POINTS)
+    places = []
+    for piece in pieces:
+        seen = piece[np.isfinite(y[piece])]
+        ends = {int(seen[np.argmin(y[seen])]), int(seen[np.argmax(y[seen])])} if len(seen) else {int(piece[0])}
+        places += sorted(ends)
+    return x[places], y[places]
+
+
+def draw_spectrum(residuals: Residuals) -> Figure | None:
+    """Amplitude spectral density of the residual before and after, and of the noise; None for poses and short records."""
+    records = [k for k, part in enumerate(residuals.before) if min(len(_judged(y)) for y in part.T) >= 64]
+    if residuals.settled or not records:
+        return None
+    n = len(residuals.recording.channels)
+    columns = min(n, 2)
+    rows = -(-n // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.8 + 2.3 * rows), squeeze=False)
+    for i, channel in enumerate(residuals.recording.channels):
+        panel, unit = axes.flat[i], residuals.recording.units[i]
+        curves = (
+            (residuals.before, BEFORE, "before"),
+            (residuals.after, AFTER, "after" if residuals.changed else "residual"),
+        )
+        for parts, colour, label in curves[not residuals.changed :]:
+            f, density = residual_density(residuals, parts, records, i)
+            panel.loglog(f, density, color=colour, lw=1.1, label=label)
+        noise = _noise_density(residuals, i, f)
+        if noise is not None:
+            panel.loglog(f, noise, color="#777777", lw=1.1, ls="--", label="noise")
+        panel.set_ylabel(f"{short(channel)} [{unit}/√Hz]")
+        panel.set_xlabel("frequency [Hz]")
+        lowest = density if noise is None else np.concatenate([density, noise])
+        panel.set_ylim(bottom=0.4 * np.min(lowest[lowest > 0], initial=np.inf))
+        panel.legend(fontsize=8)
+    for panel in axes.flat[n:]:
+        panel.set_visible(False)
+    return figure
+
+
+def _judged(values: np.ndarray) -> np.ndarray:
+    """The samples from the first to the last usable one: without the lead-in."""
+    seen = np.flatnonzero(np.isfinite(values))
+    return values[seen[0] : seen[-1] + 1] if len(seen) else values[:0]
+
+
+def residual_density(
+    residuals: Residuals, parts: list[np.ndarray], records: list[int], i: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Welch's amplitude spectral density over the held-out records that have the longest one's sample time; marked samples
+    count as zero."""
+    longest = max(records, key=lambda k: len(residuals.records[k].time))
+    h = residuals.records[longest].sample_time
+    alike = [k for k in records if residuals.records[k].sample_time == h]
+    stretches = [_judged(parts[k][:, i]) for k in alike]
+    size = min(SEGMENT, *map(len, stretches))
+    total, weight = np.zeros(size // 2 + 1), 0
+    for values in map(np.nan_to_num, stretches):
+        f, power = welch(values, 1 / h, nperseg=size, detrend=False)
+        total, weight = total + len(values) * power, weight + len(values)
+    edges = np.geomspace(f[1], f[-1], max(2, int(BANDS * np.log10(f[-1] / f[1]))))
+    band = np.searchsorted(edges, f[1:], side="right")
+    count = np.bincount(band)
+    middle, mean = (np.bincount(band, v[1:])[count > 0] / count[count > 0] for v in (f, total / weight))
+    return middle, np.sqrt(mean)
+
+
+def _noise_density(residuals: Residuals, i: int, f: np.ndarray) -> np.ndarray | None:
+    noise = residuals.diagnosis.fitter.noise
+    if not noise.known[i]:
+        return None
+    h = max(residuals.records, key=lambda r: len(r.time)).sample_time
+    _, response = freqz([1.0], np.concatenate([[1.0], -noise.ar[i]]), worN=2 * np.pi * f * h)
+    return np.abs(response) * noise.sd[i] * residuals.scales[i] * np.sqrt(2 * h)

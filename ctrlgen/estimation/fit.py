@@ -1,0 +1,274 @@
+"""Steps 2 and 7: the free parameters of a structure from the records to fit, by Levenberg-Marquardt.
+
+The problem is that of `least_squares`: the parameters of all causes and the device's own uncertain numbers are fitted
+jointly, with the initial states of the records.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from ctrlgen.devices import Device
+from ctrlgen.estimation.checkpoint import Checkpoint, key_of
+from ctrlgen.estimation.error_model import ErrorModel, error_model
+from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
+from ctrlgen.estimation.noise import Noise
+from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, STATISTICS
+from ctrlgen.estimation.simulator import RecentSimulators, Simulator
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
+from ctrlgen.recordings.recording import Record, Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted structure with k free parameters.
+
+    `theta` (k,) [SI]; `initial_states` [SI] of each record to fit; `chi2` Huber's loss of the whitened readings, over `n`
+    independent samples; `penalty` the squares of the prior. `residual` (m,) and its Jacobian `J` (m, k + n_s) by the parameters
+    and the initial states [SI] at the optimum: rows of the readings of records of `shapes` (samples, channels), then of the
+    prior.
+    """
+
+    structure: Structure
+    theta: np.ndarray
+    initial_states: tuple[np.ndarray, ...]
+    chi2: float
+    n: float
+    residual: np.ndarray
+    J: np.ndarray
+    penalty: float
+    shapes: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def objective(self) -> float:
+        """What was minimised: chi2 + penalty."""
+        return self.chi2 + self.penalty
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Covariance (k, k) [SI^2] of the parameters, the block of (J'J)^-1."""
+        scale = np.linalg.norm(self.J, axis=0)
+        scale[scale == 0] = 1.0
+        inverse = np.linalg.pinv((self.J / scale).T @ (self.J / scale), rcond=1e-14)
+        k = len(self.theta)
+        return (inverse / np.outer(scale, scale))[:k, :k]
+
+    @cached_property
+    def information_root(self) -> np.ndarray:
+        """R (k, k) with |R dp|^2 = dp' C^-1 dp, C the covariance: QR of J after projection out of the initial states."""
+        k = len(self.theta)
+        if self.J.shape[1] == k:
+            return np.linalg.qr(self.J).R
+        Q = np.linalg.qr(self.J[:, k:])[0]
+        return np.linalg.qr(self.J[:, :k] - Q @ (Q.T @ self.J[:, :k])).R
+
+    @property
+    def restarted(self) -> Structure:
+        """Its structure with all parameters starting at their fitted values."""
+        s = self.structure
+        own = {u.path: float(v) for u, v in zip(s.free_parameters, self.theta, strict=True) if u.cause is None}
+        return Structure(s.device, s.causes, tuple(self.values(k) for k in range(len(s.causes))), own)
+
+    def values(self, cause: int) -> dict[str, float]:
+        """The parameters [SI] by name of one cause, by its place in the structure."""
+        found = dict(self.structure.starts[cause])
+        for p, value in zip(self.structure.free_parameters, self.theta, strict=True):
+            if p.cause == cause:
+                found[p.name] = float(value)
+        return found
+
+    def nested_case(self, cause: int) -> str | None:
+        """The effect that the law of one cause contains as a special case, where that lies in the 95 % interval; else None."""
+        nested = self.structure.causes[cause].prior.nested_case
+        if nested is None:
+            return None
+        parameters = self.structure.free_parameters
+        i = next(i for i, p in enumerate(parameters) if p.cause == cause and p.name == nested.parameter)
+        sd = np.sqrt(max(self.covariance[i, i], 0.0))
+        return nested.effect if abs(self.theta[i] - nested.value) <= STATISTICS.z_95 * sd else None
+
+
+@dataclass(frozen=True, eq=False)
+class Fitter:
+    """Fits structures to one recording under the noise of its channels and the discrepancy `errors` of the models fitted.
+
+    Without `errors` there is noise alone. The compiled simulators used last are kept in `cache`, which copies share, and optima in the
+    `checkpoint` where there is one.
+    """
+
+    recording: Recording
+    noise: Noise
+    checkpoint: Checkpoint | None = None
+    errors: ErrorModel | None = None
+    cache: dict = field(default_factory=RecentSimulators)
+
+    @property
+    def error(self) -> ErrorModel:
+        """Noise and discrepancy."""
+        return self.errors or ErrorModel.of_noise(self.noise)
+
+    def with_noise(self, noise: Noise) -> Fitter:
+        """The same under another noise, without discrepancy."""
+        return replace(self, noise=noise, errors=None)
+
+    def with_errors_of(self, fit: Fit) -> Fitter:
+        """The same with the discrepancy that `fit` leaves on the records to fit."""
+        residuals = [r.observed - self.predict(fit, r) for r in self.fit_records]
+        return replace(self, errors=error_model(self.noise, self.fit_records, [np.nan_to_num(e) for e in residuals]))
+
+    @property
+    def fit_records(self) -> list[Record]:
+        """The records to fit."""
+        return [r for r in self.recording.records if r.role == "fit"]
+
+    @property
+    def held_out_records(self) -> list[Record]:
+        """The held-out records."""
+        return [r for r in self.recording.records if r.role == "hold_out"]
+
+    def simulator(self, structure: Structure, record: Record) -> Simulator:
+        """The compiled simulator of a structure for a record's sample time and drive convention."""
+        return structure.simulators(self.recording, self.cache)[record.timing]
+
+    def problem(self, structure: Structure) -> LeastSquaresProblem:
+        """The least-squares problem of a structure."""
+        return LeastSquaresProblem(structure, self.recording, self.error, self.cache)
+
+    def fit(
+        self,
+        structure: Structure,
+        theta: np.ndarray | None = None,
+        steps: int = FIT.max_steps,
+        nested: Fit | None = None,
+    ) -> Fit:
+        """The optimum reached from `theta` (k,) [SI], or from the structure's own starting values, in at most so many steps.
+
+        A fit that ends above the fit `nested` in it started too far away. It is repeated from `nested`'s initial states with
+        its new causes almost off, and once more with the device's own numbers as stated, which `nested` may have bent to
+        stand in for the new causes. The best of them is returned.
+        """
+        problem = self.problem(structure)
+        start = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_initial)])
+        found = self._optimum(problem, start, steps)
+        if nested is None or found.objective <= nested.objective:
+            return found
+        near = start.copy()
+        for i, p in enumerate(structure.free_parameters):
+            if p.amplitude and structure.cause_of(p) not in nested.structure.causes:
+                near[i] = p.nominal + FIT.restart_amplitude * (near[i] - p.nominal)
+        if len(states := np.concatenate([np.zeros(0), *nested.initial_states])) == problem.n_initial:
+            near[problem.k :] = states
+        stated = np.concatenate([structure.start, np.zeros(problem.n_initial)])
+        for i, p in enumerate(structure.free_parameters):
+            if p.cause is None:
+                stated[i] = p.nominal
+        again = (self._optimum(problem, x, steps) for x in (near, stated))
+        return min(found, *again, key=lambda fit: fit.objective)
+
+    def described(self, device: Device) -> tuple[Fitter, Fit]:
+        """The device as described, without causes, and the fitter with the discrepancy that it leaves.
+
+        Discrepancy and fit are estimated in turn (feasible generalised least squares), first at the stated numbers. Where the
+        residual is far above the noise, the fit is repeated with each uncertain number one standard deviation below and above
+        its stated value: a device that drifts, or saturates in a loop, has several local optima.
+        """
+        fitter = self.with_errors_of(self.fit(Structure(device), steps=0))
+        for _ in range(DISCREPANCY.updates):
+            before, found = fitter, fitter.fit(Structure(device))
+            fitter = fitter.with_errors_of(found)
+            if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same):
+                break
+        found = fitter.fit(Structure(device))
+        if np.all(fitter.error.rms < FIT.poor_start_rms * self.noise.floor):
+            return fitter, found
+        for p in found.structure.free_parameters:
+            for start in (p.nominal - p.sd, p.nominal + p.sd) if p.sd else ():
+                again = fitter.fit(Structure(device, nominal_starts={p.path: start}))
+                found = min(found, again, key=lambda fit: fit.objective)
+        return fitter.with_errors_of(found), found
+
+    def initial_objective(self, structure: Structure) -> float:
+        """The objective at the structure's starting values."""
+        problem = self.problem(structure)
+        start = np.concatenate([structure.start, np.zeros(problem.n_initial)])
+        residual = problem.residual(problem.to_scaled(start))
+        return float(residual @ residual)
+
+    def _optimum(self, problem: LeastSquaresProblem, start: np.ndarray, steps: int) -> Fit:
+        """The optimum from `start` [SI], taken from the checkpoint where it was found before."""
+        if self.checkpoint is None:
+            return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps))
+        s, noise, corner = problem.structure, self.error.weighted, self.error.corner
+        valid = [int(r.valid.sum()) for r in self.recording.records]
+        key = key_of(
+            s.causes, s.starts, sorted(s.nominal_starts.items()), start, steps, noise.sd, corner, *noise.ar, valid
+        )
+        optimum = self.checkpoint.recall(key)
+        if optimum is None:
+            optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps)
+            self.checkpoint.keep(key, optimum)
+        return _fit_at(problem, optimum)
+
+    def predict(self, fit: Fit, record: Record) -> np.ndarray:
+        """Readings (n, n_y) [SI] of a fitted structure on any record, with the initial state that suits this record best."""
+        return self.begun(fit, record)[1]
+
+    def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
+        """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
+
+        One Gauss-Newton step from rest, shortened until it lowers the objective; from rest where no step does.
+        """
+        simulator = self.simulator(fit.structure, record)
+        sd = initial_state_sd(simulator)
+        rest = np.zeros(len(sd))
+        if len(sd) == 0:
+            return rest, simulator.simulate(record, fit.theta)
+        y, Y = simulator.sensitivities(record, fit.theta, rest, by_free=False)
+        white = self._white(record, y)
+        J = self.error.whiten(Y, record.valid).reshape(len(white), len(sd)) * sd
+        if not (np.isfinite(white).all() and np.isfinite(J).all()):
+            return rest, y
+        with_prior = np.vstack([J, np.eye(len(sd))])
+        step = np.linalg.lstsq(with_prior, np.concatenate([white, rest]), rcond=None)[0]
+        for _ in range(HELD_OUT_REFIT.halvings):  # a gap or a friction threshold makes the first step useless
+            shifted = simulator.simulate(record, fit.theta, sd * step)
+            residual = self._white(record, shifted)
+            if residual @ residual + step @ step <= white @ white:
+                return sd * step, shifted
+            step = step / 4
+        return rest, y
+
+    def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
+        """Whitened residual (n n_y,), not bounded."""
+        return self.error.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
+
+    def whitened_residual(self, fit: Fit, record: Record) -> np.ndarray:
+        """Residual (n, n_y) of a fitted structure on any record, whitened by the noise; zero where a sample is not usable."""
+        return limited(whiten_residual(self.noise, record, self.predict(fit, record)))
+
+    def held_out_squares(self, fit: Fit) -> float:
+        """Sum of the whitened squares of the held-out records, with the parameters of the fit."""
+        return sum(float(np.sum(self.whitened_residual(fit, r) ** 2)) for r in self.held_out_records)
+
+
+def _fit_at(problem: LeastSquaresProblem, x: np.ndarray) -> Fit:
+    """The fit with the scaled variables x."""
+    residual, J = problem.evaluate(x)
+    values, k = problem.to_si(x), problem.k
+    n_readings = sum(r.observed.size for r in problem.records)
+    readings, prior = residual[:n_readings], residual[n_readings:]
+    return Fit(
+        structure=problem.structure,
+        theta=values[:k],
+        initial_states=tuple(np.split(values[k:], np.cumsum([len(s) for s in problem.initial_sd])[:-1])),
+        chi2=float(readings @ readings),
+        n=float(sum(problem.error.effective(r.valid).sum() for r in problem.records)),
+        residual=residual,
+        J=J / problem.si_by_scaled(values),
+        penalty=float(prior @ prior),
+        shapes=tuple(r.observed.shape for r in problem.records),
+    )

@@ -1,0 +1,228 @@
+"""Every hypothesis of what the model leaves out: an effect of the library at a place of the device where it can act, or a
+number of the device that is off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import Quantity
+from ctrlgen.devices import Device, DevicePhysics
+from ctrlgen.devices.base import Section
+from ctrlgen.effects import Channel, Effect, Param, Place
+from ctrlgen.estimation.priors import DEFAULT, LawPrior, prior_of
+from ctrlgen.estimation.settings import CANDIDATE_TERMS
+from ctrlgen.model.effect_terms import available, channels, partner_channels
+
+DOMAIN = {
+    Place.DRIVE: "actuator", Place.HEAT: "actuator", Place.FORCE: "stage", Place.DISPLACEMENT: "stage",
+    Place.POSE: "mechanism", Place.SENSOR: "sensor",
+}  # fmt: skip
+PARAMETER = "parameter"
+
+
+@dataclass(frozen=True)
+class DataHints:
+    """What the recording shows at one channel [SI]: where the search may start.
+
+    peaks: the largest value of the signal ("channel"), of the displacement ("travel") and of its rate ("travel/s"), and a
+        twelfth of the duration ("s"). A limit beyond the peak leaves no trace in the recording.
+    suggested: start values by the names of `ParameterPrior.start_from_data`, and the "lines" [Hz] of the residual's spectrum.
+    """
+
+    peaks: dict[str, float] = field(default_factory=dict)
+    suggested: dict[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One effect at one place; or, where `effect` is "parameter", one number of the device, at `path`.
+
+    location: where a report says it is, such as "actuator:1X".
+    at, of: the channel on which the effect acts, or "all"; for effects of pairs, the other channel.
+    count: how many of the same effect a structure has there already, where the effect is repeatable.
+    highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
+    """
+
+    effect: str
+    location: str
+    at: str = ""
+    of: str | None = None
+    path: str = ""
+    count: int = 0
+    highest: float = float("inf")
+
+    def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
+        """The hypothesis to add to `causes`: itself, one more where it is there and repeatable, None where it cannot be added.
+
+        A place has at most one law of a family, and one cause of a law that is not repeatable.
+        """
+        if any(
+            (c.family, c.location) == (self.family, self.location) and c.effect != self.effect
+            for c in causes
+            if c.family
+        ):
+            return None
+        same = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
+        if not same:
+            return self
+        return replace(self, count=1 + max(c.count for c in same)) if self.prior.repeatable else None
+
+    @property
+    def family(self) -> str | None:
+        """The family of laws of which a place has at most one; None where the law belongs to none."""
+        return self.prior.family
+
+    @property
+    def prior(self) -> LawPrior:
+        """What the search believes of the law; the default for a number of the device."""
+        return DEFAULT if self.effect == PARAMETER else prior_of(self.law)
+
+    @property
+    def law(self) -> type[Effect]:
+        """The effect's class. Raises KeyError for a parameter."""
+        return Effect.library[self.effect]
+
+    def shapes(self, channel: Channel, hints: DataHints) -> list[dict[str, float]]:
+        """Every combination of start values of the shape parameters, which are all but the amplitude [SI].
+
+        A law without shape parameters has one empty combination.
+        """
+        shaped = [p for p in self.law.params if p is not self.law.amplitude()]
+        starts = [self._starts(p, channel, hints) for p in shaped]
+        return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*starts)]
+
+    def secants(self, channel: Channel, hints: DataHints) -> list[float]:
+        """The amplitudes [SI] to which the law is linearised from `off` too, where its prior gives some."""
+        p = self.law.amplitude()
+        return self._starts(p, channel, hints) if self.prior.of(p).start_values else []
+
+    def _starts(self, p: Param, channel: Channel, hints: DataHints) -> list[float]:
+        """Start values of one parameter [SI], those that the recording suggests included."""
+        low, high = self.bounds(p, channel)
+        prior = self.prior.of(p)
+        if prior.scales_with_peak and p.unit in hints.peaks:
+            return [min(max(value * hints.peaks[p.unit], low), high) for value in prior.start_values]
+        suggested = [
+            *hints.suggested.get(prior.start_from_data, ()),
+            *(hints.suggested.get("lines", ()) if p.unit == "Hz" else ()),
+        ]
+        starts = prior.start_values or (() if suggested else (sum(p.bounds) / 2,))
+        tried = [*(channel.si(value, p) for value in starts), *(value for value in suggested if value >= low)]
+        return [value for value in tried if value <= high] or [(low + high) / 2]
+
+    def bounds(self, p: Param, channel: Channel) -> tuple[float, float]:
+        """The bounds of a parameter [SI] at this channel and this sampling rate."""
+        low, high = (channel.si(b, p) for b in p.bounds)
+        if p.unit == "Hz":
+            return low, max(low, min(high, self.highest))
+        if p.unit == "s" and self.prior.of(p).scales_with_peak and self.law.place is not Place.SENSOR:
+            # An actuated change within one sample shows its middle in the motion, not its duration.
+            low = min(high, max(low, CANDIDATE_TERMS.highest_frequency / self.highest))
+        return low, high
+
+
+def selected_laws(names: Sequence[str] | None = None) -> tuple[type[Effect], ...]:
+    """The effects of these names, all for None, in alphabetical order. Raises InputError for a name that is no effect's."""
+    unknown = sorted(set(names or ()) - set(Effect.library))
+    if unknown:
+        known = ", ".join(sorted(Effect.library))
+        raise InputError("laws", [Fault(name, f"is not a known effect; known are: {known}") for name in unknown])
+    return tuple(law for name, law in sorted(Effect.library.items()) if names is None or name in names)
+
+
+def hypotheses(
+    device: Device,
+    physics: DevicePhysics,
+    observed: tuple[str, ...],
+    sample_time: float | None,
+    ambient: bool,
+    laws: Sequence[type[Effect]] | None = None,
+) -> list[Hypothesis]:
+    """Every effect of `laws` (None: all) that can act on `device` and reach the channels `observed`, then every number that may
+    be off.
+
+    `sample_time` [s] is None for settled poses; `ambient` says whether the recording has the temperature of the surroundings.
+    """
+    laws = selected_laws() if laws is None else laws
+    found = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
+    return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
+
+
+def _of_law(
+    law: type[Effect], physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+) -> Iterator[Hypothesis]:
+    there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
+    prior = prior_of(law)
+    if not prior.suspected or prior.unless & there:
+        return
+    if not law.requires <= there or (law.place is Place.HEAT and "heat" not in there):
+        return
+    domain = prior.domain or DOMAIN[law.place]
+    highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
+    places = channels(physics, law.place)
+    seen = {channel.removeprefix("reading.") for channel in observed}
+    if law.place is Place.SENSOR:
+        places = [channel for channel in places if channel.name in seen]
+    if law.pairs:
+        for k, channel in enumerate(places):
+            for j, other in enumerate(partner_channels(physics, law)):
+                if law.applies_to(channel.paired_with(other)) and not (law.symmetric and j < k):
+                    yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, other.name, highest=highest)
+        return
+    fitting = [channel for channel in places if law.applies_to(channel)]
+    for channel in () if prior.acts_on_all else fitting:
+        yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest)
+    if prior.acts_on_all or (len(fitting) > 1 and law.place is not Place.SENSOR):
+        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
+
+
+def _numbers(device: Device) -> Iterator[tuple[str, str]]:
+    """(path, location) of every number that is not a count."""
+    for path, section, number in numbers(device):
+        if not number.whole:
+            owner = (
+                "" if isinstance(section, Device) else getattr(section, "name", "")
+            )  # of several alike, such as axes
+            yield path, f"{section.domain}:{f'{owner}.' if owner else ''}{path.rpartition('.')[2]}"
+
+
+def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
+    """Every number outside the effects with the section that holds it."""
+
+    def walk(node: object, prefix: str, section: Section) -> Iterator[tuple[str, Section, Quantity]]:
+        if isinstance(node, Quantity):
+            yield prefix, section, node
+        elif isinstance(node, Section):
+            for key in type(node).model_fields:
+                if key != "effect":
+                    yield from walk(getattr(node, key), f"{prefix}.{key}" if prefix else key, node)
+        elif isinstance(node, tuple):
+            for i, member in enumerate(node):
+                yield from walk(member, f"{prefix}[{i}]", section)
+
+    yield from walk(device, "", device)
+
+
+_PHYSICS: dict[int, tuple[Device, DevicePhysics]] = {}
+
+
+def nominal_physics(device: Device) -> DevicePhysics:
+    """The physics of a device with its own numbers, made once: a hexapod's takes a tenth of a second."""
+    if id(device) not in _PHYSICS:
+        _PHYSICS.clear()
+        _PHYSICS[id(device)] = (device, device.physics(device.values()))
+    return _PHYSICS[id(device)][1]
+
+
+def nuisances(device: Device) -> dict[str, float]:
+    """Path and standard deviation [SI] of every number with a stated `sd`, or of a section with a tolerance."""
+    found = {}
+    for path, section, number in numbers(device):
+        sd = number.sd if number.sd is not None else (section.relative_sd or 0.0) * abs(number.si)
+        if sd and not number.whole:
+            found[path] = sd
+    return found

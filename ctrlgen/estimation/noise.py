@@ -1,0 +1,344 @@
+"""Step 1: the noise of every channel, estimated before any model is fitted.
+
+The misfit of a model is never taken as noise while another source exists. Of a time series, in order of trust: a record at
+rest; differences of repeated periods; dwells of the drive; the stated standard deviation; last, with a note, the fastest
+part of the readings, which `residual_noise` then refines. The noise is autoregressive, its order chosen by BIC. Of settled
+poses: the stated standard deviation; then the scatter of repeated poses, which lost motion and creep widen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from scipy import stats
+from scipy.signal import lfilter
+
+from ctrlgen.estimation.settings import NOISE, STATISTICS
+from ctrlgen.numerics.quantisation_step import quantisation_step
+from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
+from ctrlgen.recordings.recording import Record, Recording
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Autoregressive noise e of each channel: e[k] = a[0] e[k-1] + a[1] e[k-2] + ... + sd w[k], w white with unit variance.
+
+    `sd` (n_y,) [SI] of the innovations, `ar` the coefficients a of each channel, `notes` a sentence a channel on their
+    source. `known` (n_y,) is False where only the misfit tells the noise, `guessed` (n_y,) True where only the fastest part
+    of the readings does. `count` (n_y,) is the number of independent samples that the estimate rests on, infinite where it
+    was stated.
+    """
+
+    sd: np.ndarray
+    ar: tuple[np.ndarray, ...]
+    known: np.ndarray
+    notes: tuple[str, ...]
+    count: np.ndarray
+    guessed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+
+    def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
+        """`values` (n, n_y, ...) [SI] filtered so that the noise in them becomes white with unit variance.
+
+        Zero where a sample, or one of the earlier samples that its filter needs, is not `valid` (n, n_y).
+        """
+        white, usable = np.zeros_like(values), self.usable(valid)
+        for i, a in enumerate(self.ar):
+            clean = np.where(valid[:, i].reshape(-1, *(1,) * (values.ndim - 2)), values[:, i], 0.0)
+            white[len(a) :, i] = self.whiten_channel(clean, i)
+            white[~usable[:, i], i] = 0.0
+        return white
+
+    def whiten_channel(self, values: np.ndarray, i: int) -> np.ndarray:
+        """`values` (n, ...) [SI] of channel i whitened, (n - order, ...): without the first samples, as many as the order."""
+        sd, a = self.sd[i], self.ar[i]
+        n, order = len(values), len(a)
+        white = values[order:] / sd
+        for lag, coefficient in enumerate(a, 1):
+            white -= coefficient / sd * values[order - lag : n - lag]
+        return white
+
+    def usable(self, valid: np.ndarray) -> np.ndarray:
+        """Which samples (n, n_y) can be whitened: they and the earlier samples that the filter needs are `valid` (n, n_y)."""
+        good = valid.copy()
+        for i, a in enumerate(self.ar):
+            for lag in range(1, len(a) + 1):
+                good[lag:, i] &= valid[:-lag, i]
+            good[: len(a), i] = False
+        return good
+
+    @property
+    def floor(self) -> np.ndarray:
+        """Standard deviation (n_y,) [SI] of the noise itself, not of its innovations."""
+        return np.array([stationary_deviation(sd, a) for sd, a in zip(self.sd, self.ar, strict=True)])
+
+
+def stationary_deviation(sd: float, a: np.ndarray) -> float:
+    """Standard deviation of autoregressive noise with innovations `sd` and coefficients `a`.
+
+    sd times the root of the summed squares of the impulse response, over 4096 samples.
+    """
+    impulse = np.zeros(4096)
+    impulse[0] = 1.0
+    return float(sd * np.sqrt(np.sum(lfilter([1.0], np.concatenate([[1.0], -a]), impulse) ** 2)))
+
+
+@dataclass(frozen=True)
+class _ChannelNoise:
+    """The fields of `Noise` for one channel."""
+
+    sd: float
+    note: str
+    count: float
+    ar: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    known: bool = True
+    guessed: bool = False
+
+
+def estimate_noise(recording: Recording, settling: float) -> Noise:
+    """The noise of each observed channel.
+
+    `settling` [s] is the time that the device itself needs after a change of its drive; dwells are read after it.
+    """
+    estimate = _of_poses if recording.kind == "poses" else _of_series
+    rows = [estimate(recording, i, settling) for i in range(len(recording.channels))]
+    return Noise(
+        sd=np.array([r.sd for r in rows]),
+        ar=tuple(r.ar for r in rows),
+        known=np.array([r.known for r in rows]),
+        notes=tuple(f"{name}: {r.note}" for name, r in zip(recording.channels, rows, strict=True)),
+        count=np.array([r.count for r in rows]),
+        guessed=np.array([r.guessed for r in rows]),
+    )
+
+
+def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
+    """Channel i of settled poses."""
+    if stated := recording.noise[i]:
+        return _ChannelNoise(stated, "as stated", np.inf)
+    sd, count = _repeatability(recording.records, i)
+    if count >= NOISE.fewest_repeats and sd > 0:
+        return _ChannelNoise(sd, f"from repeated poses, {count} beyond the first of each", float(count))
+    few = f"only {count} poses repeat an earlier one" if count else "no pose repeats"
+    note = f"not stated, and {few}; estimated from the residual of the best model"
+    return _ChannelNoise(1.0, note, np.inf, known=False)
+
+
+def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
+    """Channel i of a time series."""
+    values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
+    rounding = quantisation_step(values) / np.sqrt(12.0)  # standard deviation of a uniform rounding error
+    moving = [r for r in recording.records if r.role != "rest"]
+    sources = {  # degree of the polynomial to subtract, stretches of noise
+        "a record at rest": (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
+        "repeated periods": (1, [e for r in moving for e in _period_differences(r, i)]),
+        "dwells of the drive": (NOISE.dwell_degree, [e for r in moving for e in _dwells(r, i, settling)]),
+    }
+    for source, (degree, stretches) in sources.items():
+        # a constant stretch is a dead or coarse channel: it tells no noise
+        long = [s for s in stretches if len(s) >= NOISE.shortest_stretch and np.ptp(s) > 0]
+        quiet = _without_events([without_lines(_detrended(s, degree)) for s in long])
+        if quiet:
+            return _from_stretches(quiet, source, rounding, degree + 1)
+    if stated := recording.noise[i]:
+        sd, _ = _with_rounding(stated, np.zeros(0), rounding)
+        return _ChannelNoise(sd, "as stated, taken as white", NOISE.stated_samples)
+    thirds = [d for r in recording.records for d in _third_differences(r, i)]
+    banded = any(r.band for r in recording.records)
+    # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
+    deviation = _quiet_deviation if banded else _robust_deviation
+    sd = max(deviation(np.concatenate(thirds)) / np.sqrt(20.0), rounding, 1e-300)
+    note = "from the fastest part of the readings, taken as white; a record at rest would tell it better"
+    return _ChannelNoise(sd, note, sum(map(len, thirds)) / NOISE.robust_cost, guessed=True)
+
+
+def _from_stretches(stretches: list[np.ndarray], source: str, rounding: float, removed: int) -> _ChannelNoise:
+    """The autoregressive noise of stretches of pure noise.
+
+    A polynomial with as many coefficients as were `removed` takes the power of so many of the L/tau independent samples of a
+    stretch with it, tau the correlation time; the variance is raised by what it took.
+    """
+    innovation, a = autoregression(stretches)
+    tau = (innovation / max(1 - float(np.sum(a)), 1e-3) / max(stationary_deviation(innovation, a), 1e-300)) ** 2
+    kept = sum(max(len(s) - removed * max(tau, 1.0), len(s) / 2) for s in stretches) / sum(map(len, stretches))
+    sd, a = _with_rounding(innovation / np.sqrt(kept), a, rounding)
+    n, ratio = sum(map(len, stretches)), stationary_deviation(sd, a) / sd
+    note = f"from {source}, {n} samples, autoregressive of order {len(a)}"
+    if ratio > NOISE.slow_ratio:
+        note += f"; it is slow, {ratio:.0f} times its innovations: part of it may be motion of the device, not of its sensor"
+    return _ChannelNoise(sd, note, float(n), a)
+
+
+def _repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
+    """Standard deviation [SI] of channel i within groups of poses with one drive, and its degrees of freedom."""
+    drive = np.concatenate([r.drive[r.valid[:, i]] for r in records])
+    y = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
+    span = np.ptp(drive, axis=0)
+    levels = np.round(drive / np.where(span > 0, NOISE.same_drive * span, 1.0))
+    _, group = np.unique(levels, axis=0, return_inverse=True)
+    group = group.ravel()
+    mean = np.bincount(group, y) / np.bincount(group)
+    count = len(y) - len(mean)
+    return float(np.sqrt(np.sum((y - mean[group]) ** 2) / max(count, 1))), count
+
+
+def _at_rest(record: Record, i: int) -> np.ndarray:
+    """The valid readings of channel i without their regression on the recorded ambient, which is a cause and no noise."""
+    good = record.valid[:, i]
+    y = record.observed[good, i]
+    if record.ambient is None or not len(y):
+        return y
+    T = record.ambient[good] - np.mean(record.ambient[good])
+    return y - T * (T @ y) / (T @ T) if T @ T > 0 else y
+
+
+def _detrended(stretch: np.ndarray, degree: int) -> np.ndarray:
+    """A stretch without its polynomial of `degree` by least squares: what still settles is no noise."""
+    t = np.linspace(-1, 1, len(stretch))
+    return stretch - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, stretch, degree))
+
+
+def without_lines(stretch: np.ndarray) -> np.ndarray:
+    """A stretch (n,) without the sinusoids that stand out of its spectrum: a vibration is a disturbance, not noise."""
+    n, padding = len(stretch), 8
+    for _ in range(NOISE.most_lines):
+        power = periodogram(stretch, np.hanning(n), padding)
+        level = local_floor(power, padding * NOISE.level_bins)
+        peak = int(np.argmax(power / np.maximum(level, 1e-300)))
+        if power[peak] < NOISE.line_ratio * level[peak]:
+            break
+        phase = 2 * np.pi * peak / (padding * n) * np.arange(n)
+        basis = np.column_stack([np.sin(phase), np.cos(phase)])
+        stretch = stretch - basis @ np.linalg.lstsq(basis, stretch, rcond=None)[0]
+    return stretch
+
+
+def _without_events(stretches: list[np.ndarray]) -> list[np.ndarray]:
+    """The stretches whose variance is not far above the median: in the others something happened."""
+    power = [float(np.var(s)) for s in stretches]
+    return [s for s, p in zip(stretches, power, strict=True) if p <= NOISE.loudest_stretch * np.median(power)]
+
+
+def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
+    """Noise of a device that moves, from noise at rest and the standard deviation of the rounding error [SI].
+
+    A quantisation step above the noise hides it at rest, and on the move its rounding error is white noise itself.
+    """
+    floor = stationary_deviation(sd, a)
+    return (float(np.hypot(rounding, floor)), np.zeros(0)) if rounding > floor else (sd, a)
+
+
+def _third_differences(record: Record, i: int) -> list[np.ndarray]:
+    """Third differences of channel i over so many rows as make twice the cut-off of the low-pass that the columns passed:
+    within its band, for beyond it there is no noise left to see. Over neighbouring rows where they passed none."""
+    y = record.observed[record.valid[:, i], i]
+    every = max(round(1 / (2 * record.band * record.sample_time)), 1) if record.band else 1
+    return [np.diff(y[first::every], 3) for first in range(every)]
+
+
+def _quiet_deviation(values: np.ndarray) -> float:
+    """Standard deviation of the quietest values (n,), as if they were normal: within the band of a low-pass the device moves
+    too, and less than the noise only now and then."""
+    share = NOISE.quiet_share
+    return float(np.quantile(np.abs(values), share) / stats.norm.ppf((1 + share) / 2)) if len(values) else 0.0
+
+
+def _robust_deviation(values: np.ndarray) -> float:
+    """Standard deviation of normal values (n,) by their median absolute deviation."""
+    return float(STATISTICS.mad_to_sd * np.median(np.abs(values - np.median(values))))
+
+
+def drive_period(drive: np.ndarray) -> int | None:
+    """Samples after which the drive (n, n_u) repeats exactly, at least twice; None where it does not."""
+    n, span = len(drive), np.ptp(drive, axis=0).max(initial=0.0)
+    if span == 0 or n < 100:
+        return None
+    near, first = NOISE.same_drive * span, drive[:32]
+    lags = np.flatnonzero(np.all(np.abs(drive[: n - 32] - first[0]) <= near, axis=1))
+    for lag in lags[lags >= 50]:
+        if 2 * lag > n:
+            return None
+        begins = np.all(np.abs(drive[lag : lag + 32] - first) <= near)  # cheap: tried before the whole record
+        if begins and np.all(np.abs(drive[lag:] - drive[:-lag]) <= near):
+            return int(lag)
+    return None
+
+
+def period_of(record: Record) -> float | None:
+    """Period [s] with which the drive of a record repeats, as stated or exactly; None where it does not."""
+    if record.period is not None:
+        return record.period
+    samples = drive_period(record.drive)
+    return None if samples is None else samples * record.sample_time
+
+
+def _period_differences(record: Record, i: int) -> list[np.ndarray]:
+    """Differences of neighbouring periods over sqrt(2), so that they have the noise's own size; the first period, which
+    holds a transient, is left out, and no period is used twice."""
+    period = period_of(record)
+    P = round(period / record.sample_time) if period else 0
+    if not P or len(record.time) < 3 * P:
+        return []
+    y = np.where(record.valid[:, i], record.observed[:, i], np.nan)
+    periods = y[P : len(y) // P * P].reshape(-1, P)
+    differences = np.diff(periods[: len(periods) // 2 * 2], axis=0)[::2] / np.sqrt(2.0)
+    return [d[np.isfinite(d)] for d in differences]
+
+
+def _dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
+    """The valid readings of channel i while the drive is constant, from `settling` [s] after its last change."""
+    moved = np.any(np.diff(record.drive, axis=0) != 0, axis=1)
+    edges = np.flatnonzero(np.concatenate([[True], moved, [True]]))
+    wait = int(np.ceil(settling / record.sample_time))
+    dwells = ((a + wait, b) for a, b in pairwise(edges) if b - a - wait >= NOISE.shortest_stretch)
+    return [record.observed[a:b, i][record.valid[a:b, i]] for a, b in dwells]
+
+
+def autoregression(stretches: list[np.ndarray]) -> tuple[float, np.ndarray]:
+    """Standard deviation of the innovations and coefficients of autoregressive noise, (0, none) of a constant.
+
+    Yule-Walker equations with the autocovariances of all stretches; of the orders up to `NOISE.longest_order` the one with
+    the least BIC, n ln(variance) + order ln(n).
+    """
+    n, orders = sum(map(len, stretches)), range(1, NOISE.longest_order + 1)
+    r = np.array([sum(float(s[: len(s) - k] @ s[k:]) for s in stretches) / n for k in (0, *orders)])
+    if r[0] <= 0:
+        return 0.0, np.zeros(0)
+    best = (n * np.log(r[0]), r[0], np.zeros(0))
+    for order in orders:
+        toeplitz = r[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
+        a = np.linalg.solve(toeplitz, r[1 : order + 1])
+        variance = r[0] - a @ r[1 : order + 1]
+        if variance <= 0:
+            break
+        bic = n * np.log(variance) + order * np.log(n)
+        if bic < best[0]:
+            best = (bic, variance, a)
+    return float(np.sqrt(best[1])), best[2]
+
+
+def ljung_box(e: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
+    """p of the hypothesis that `e` (n,) has no autocorrelation at lags 1 ... `lags`.
+
+    n (n + 2) sum r_k^2/(n - k) against chi-square (G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297).
+    """
+    n, e = len(e), e - np.mean(e)
+    total = float(e @ e)
+    if total == 0:
+        return 1.0
+    r = np.array([float(e[k:] @ e[:-k]) / total for k in range(1, lags + 1)])
+    return float(stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))
+
+
+def cross_correlation(e: np.ndarray, drive: np.ndarray, lags: int = STATISTICS.whiteness_lags) -> float:
+    """p of the hypothesis that white `e` (n,) is uncorrelated with each drive (n, n_u) at lags 0 ... `lags` (Bonferroni)."""
+    n, worst = len(e), 0.0
+    for u in drive.T:
+        u = u - np.mean(u)
+        if np.std(u) == 0:
+            continue
+        for k in range(lags + 1):
+            a, b = e[k:], u[: n - k]
+            worst = max(worst, abs(float(a @ b)) / (np.std(e) * np.linalg.norm(b)))
+    return float(min(1.0, 2 * stats.norm.sf(worst) * (lags + 1) * drive.shape[1]))

@@ -1,0 +1,164 @@
+"""Noise updated from the residual of a fit: guessed noise, the colour of noise known from few samples, and the size of noise
+that only the misfit tells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.noise import Noise, autoregression, cross_correlation, ljung_box, without_lines
+from ctrlgen.estimation.residual_noise import noise_from_residual
+from ctrlgen.estimation.settings import DISCREPANCY, NOISE, NOISE_UPDATE, STATISTICS
+from ctrlgen.recordings.recording import Record
+
+
+def update_noise(fitter: Fitter, fit: Fit) -> Noise:
+    """The noise after a fit with causes; the same object where the fit tells nothing new.
+
+    Guessed noise is estimated again and replaced where it became smaller, for physics that was left out only adds to it.
+    Of other noise the colour may change, see `update_noise_colour`, and of stated noise the size, see `correct_stated_noise`.
+    """
+    noise = fitter.noise
+    if not noise.guessed.any():
+        return correct_stated_noise(fitter.with_noise(update_noise_colour(fitter, fit)), fit)
+    found = update_guessed_noise(fitter, fit)
+    smaller = found.floor < noise.floor
+    if not smaller.any():
+        return noise
+    source = [found if s else noise for s in smaller]
+    return replace(
+        noise,
+        sd=np.where(smaller, found.sd, noise.sd),
+        count=np.where(smaller, found.count, noise.count),
+        ar=tuple(source[i].ar[i] for i in range(len(smaller))),
+        notes=tuple(source[i].notes[i] for i in range(len(smaller))),
+    )
+
+
+def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
+    """Guessed noise estimated from the residual of `fit` at the frequencies at which the readings move least.
+
+    Variances and coefficients of the records to fit are averaged by their numbers of independent samples.
+    """
+    noise, channels = fitter.noise, fitter.recording.channels
+    sd, ar, count, notes = noise.sd.copy(), list(noise.ar), noise.count.copy(), list(noise.notes)
+    for i in np.flatnonzero(noise.guessed).tolist():
+        estimates = [e for r in fitter.fit_records if (e := _of_longest_stretch(fitter, fit, r, i)) is not None]
+        if not estimates:
+            continue
+        weights = [n for *_, n in estimates]
+        order = max(len(a) for _, a, _ in estimates)
+        sd[i] = np.sqrt(np.average([s**2 for s, *_ in estimates], weights=weights))
+        ar[i] = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in estimates], axis=0, weights=weights)
+        count[i] = sum(weights)
+        notes[i] = (
+            f"{channels[i]}: from the residual of the fit at the frequencies at which the readings move least, "
+            f"autoregressive of order {order}; a record at rest would tell it better"
+        )
+    return replace(noise, sd=sd, ar=tuple(ar), count=count, notes=tuple(notes))
+
+
+def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
+    """`noise_from_residual` on the longest stretch of valid samples of channel i."""
+    y = fitter.predict(fit, record)[:, i]
+    good = record.valid[:, i] & np.isfinite(y)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
+    if not len(edges):
+        return None
+    a, b = max(edges.reshape(-1, 2), key=lambda stretch: stretch[1] - stretch[0])
+    highest = 2 * record.band * record.sample_time if record.band else 1.0
+    return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b], highest)
+
+
+def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:
+    """The noise with the size of the residual of `fit` for channels whose stated noise is wrong; the same object where none is.
+
+    What is left is noise of another size, and no physics, where it is white on every record, its variance does not change, and
+    it has nothing to do with the drive. Physics of a stage that moves smoothly is never white.
+    """
+    noise = fitter.noise
+    sd, notes, count = noise.sd.copy(), list(noise.notes), noise.count.copy()
+    for i in np.flatnonzero(noise.count == NOISE.stated_samples).tolist():
+        records = [r for r in fitter.recording.records if r.role != "rest"]
+        residuals = [_residual(fitter, fit, r, i) for r in records]
+        size = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+        ratio = size / noise.floor[i]
+        if not (1 / NOISE_UPDATE.stated_factor < ratio < NOISE_UPDATE.stated_factor) or len(noise.ar[i]):
+            continue
+        if abs(ratio - 1) < NOISE_UPDATE.stated_margin or not all(
+            _is_noise_alone(e, r.drive[r.valid[:, i]]) for e, r in zip(residuals, records, strict=True)
+        ):
+            continue
+        sd[i], count[i] = size, sum(map(len, residuals))
+        notes[i] = (
+            f"{fitter.recording.channels[i]}: the stated noise is {1 / ratio:.2f} of what is left, which is white and has nothing to do "
+            "with the drive; what is left is taken as the noise"
+        )
+    return noise if np.array_equal(sd, noise.sd) else replace(noise, sd=sd, notes=tuple(notes), count=count)
+
+
+def _is_noise_alone(e: np.ndarray, drive: np.ndarray) -> bool:
+    """Whether `e` (n,) is white, of steady variance, and uncorrelated with the `drive` (n, n_u)."""
+    if len(e) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags or np.ptp(e) == 0:
+        return False
+    e = np.clip(e, *(DISCREPANCY.huber_corner * np.std(e) * np.array([-1, 1])))
+    p = (ljung_box(e), ljung_box(e**2 - np.mean(e**2)), cross_correlation(e, drive))
+    return min(p) > NOISE_UPDATE.noise_alone_p
+
+
+def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:
+    """The noise with the colour of the residual of `fit`, per channel; the same object where no channel changes.
+
+    A channel changes where its noise was estimated from fewer samples than there are to fit, the residual is not much
+    larger than the noise, and rest, whitened by the residual's coefficients, is white. The standard deviation follows the
+    residual too, but not beyond the uncertainty of its first estimate.
+    """
+    noise = fitter.noise
+    sd, ar, floor = noise.sd.copy(), list(noise.ar), noise.floor
+    changed = False
+    rests = [r for r in fitter.recording.records if r.role == "rest"]
+    for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.fit_records)).tolist():
+        residuals = [_residual(fitter, fit, r, i) for r in fitter.fit_records]
+        rms = np.sqrt(np.mean(np.concatenate(residuals) ** 2))
+        if rms >= NOISE_UPDATE.largest_residual * floor[i]:
+            continue
+        innovation, a = autoregression(residuals)
+        if all(_has_colour(_residual(fitter, fit, r, i), a) for r in rests):
+            changed = True
+            largest = floor[i] * (1 + STATISTICS.noise_size_margin / np.sqrt(2 * noise.count[i]))
+            sd[i], ar[i] = innovation * min(1.0, largest / rms), a
+    return replace(noise, sd=sd, ar=tuple(ar)) if changed else noise
+
+
+def _residual(fitter: Fitter, fit: Fit, record: Record, i: int) -> np.ndarray:
+    """Observed minus predicted [SI] at the valid samples of channel i."""
+    return (record.observed - fitter.predict(fit, record))[record.valid[:, i], i]
+
+
+def _has_colour(rest: np.ndarray, a: np.ndarray) -> bool:
+    """Whether `rest` (n,) is white after whitening by the coefficients `a`; True where it is too short to tell."""
+    if len(rest) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags or np.ptp(rest) == 0:
+        return True
+    white = np.convolve(rest, np.concatenate([[1.0], -a]), "valid")
+    return ljung_box(without_lines(white)) > NOISE_UPDATE.other_colour_p
+
+
+def update_noise_size(fitter: Fitter, fit: Fit) -> Noise:
+    """Noise that only the misfit tells: the root mean square of the residual of `fit`, over all channels of one unit.
+
+    The variance is divided by the share of samples that the fitted parameters leave free.
+    """
+    recording, noise = fitter.recording, fitter.noise
+    squares, count = np.zeros(len(recording.channels)), np.zeros(len(recording.channels))
+    for record in fitter.fit_records:
+        y = fitter.predict(fit, record)
+        squares += np.sum(np.where(record.valid, record.observed - y, 0.0) ** 2, axis=0)
+        count += record.valid.sum(axis=0)
+    sd = noise.sd.copy()
+    used = len(fit.theta) / max(count.sum(), 1.0)
+    for i in np.flatnonzero(~noise.known):
+        same_unit = [k for k, unit in enumerate(recording.units) if unit == recording.units[i]]
+        sd[i] = np.sqrt(squares[same_unit].sum() / (count[same_unit].sum() * (1 - used)))
+    return replace(noise, sd=sd)

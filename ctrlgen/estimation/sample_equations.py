@@ -1,0 +1,77 @@
+"""The equations of one sample, with everything that depends on the parameters alone computed once for a record.
+
+F(S, u, u+, e, p) and H(S, u, e, p) become functions of constants c(p) instead of p. Where the model holds much that depends
+on p alone (a Jacobian of struts, for instance), c holds those results; else c = p.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+
+from ctrlgen.estimation.settings import SIMULATION
+from ctrlgen.model.discretisation import Sample, one_step_map
+from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau, integrator_of
+from ctrlgen.model.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class SampleEquations:
+    """S at the next sample, `following`, and the readings `y`, as expressions in `given`: S, u, u+, ambient, c.
+
+    `constants` is p -> c, dc/dp. A model with inertia takes the `steps` of its integrator within the sample, under a drive
+    that is `linear` or held; `model` states its rates in terms of c.
+    """
+
+    constants: ca.Function
+    model: Model
+    steps: ExponentialRungeKutta | ImplicitRadau | None
+    linear: bool
+    following: ca.SX
+    y: ca.SX
+    given: list[ca.SX]
+
+    @property
+    def integrator(self) -> ExponentialRungeKutta | ImplicitRadau:
+        """The steps of a model with inertia. Raises ValueError for one without."""
+        if self.steps is None:
+            raise ValueError("a model in balance takes no integrator steps")
+        return self.steps
+
+
+def build_sample_equations(
+    model: Model, y: ca.SX, sample_time: float, linear: bool, poses: bool = False
+) -> SampleEquations:
+    """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`."""
+    expressions = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
+    sample = None if model.inertial else _one_step(model, sample_time, linear, poses)
+    if sample is not None:
+        following = ca.vertcat(sample.x, sample.z)
+        if poses:  # read at the end of the dwell
+            y = ca.substitute(y, ca.vertcat(model.x, model.z, model.u), ca.vertcat(following, sample.u_next))
+        expressions = [following, y]
+    in_symbols, symbols, parametric = ca.extract_parametric(expressions, model.p, {"extract_trivial": True})
+    c, value = model.p, model.p
+    if ca.Function("work", [model.p], parametric).n_instructions() > SIMULATION.parametric_operations:
+        expressions = in_symbols
+        c, value = ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
+    constants = ca.Function("constants", [model.p], [value, ca.jacobian(value, model.p)])
+    if sample is None:
+        rates, held, stepped, y = expressions
+        stepped = dict(zip(model.stepped, ca.vertsplit(stepped), strict=True))
+        nominal = constants(model.p_nominal)[0].full().ravel()
+        model = replace(model, p=c, p_nominal=nominal, sampled_rates=rates, held_value=held, stepped=stepped)
+        sample = _one_step(model, sample_time, linear, poses)
+        following = ca.vertcat(sample.x, sample.z)
+    else:
+        following, y = expressions
+    following, y = ca.cse([following, y])  # before differentiation: afterwards it takes ten times as long
+    given = [ca.vertcat(model.x, model.z), model.u, sample.u_next, model.ambient_symbol, c]
+    steps = integrator_of(model, sample_time) if model.inertial else None
+    return SampleEquations(constants, model, steps, linear, following, y, given)
+
+
+def _one_step(model: Model, sample_time: float, linear: bool, poses: bool) -> Sample:
+    newton_steps = SIMULATION.pose_newton_steps if poses else SIMULATION.newton_steps
+    return one_step_map(model, sample_time, linear, newton_steps, poses)

@@ -1,0 +1,279 @@
+"""Simulation of a record with a model: the readings, and their derivatives by every free parameter.
+
+State S = (x, z), drive u, ambient e, free parameters p:
+
+    S+ = F(S, u, u+, e, p),  y = H(S, u, e, p),
+    D+ = F_S D + F_p,        dy/dp = H_S D + H_p,   D = dS/dp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ctrlgen.devices import Device
+from ctrlgen.estimation.forward_sensitivities import forward_sensitivities
+from ctrlgen.estimation.sample_equations import SampleEquations, build_sample_equations
+from ctrlgen.estimation.settings import SIMULATION
+from ctrlgen.model.assembly import build_model
+from ctrlgen.model.discretisation import balanced
+from ctrlgen.model.model import Model
+from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
+from ctrlgen.recordings.recording import Record
+
+
+class Simulator:
+    """Simulates the readings `channels` (n_y) of `device`, compiled once for records of one `Timing`.
+
+    `free` are the paths of the k parameters p that may change between simulations. A device with inertia settles in no pose:
+    its readings are those of the instants at which the drive changes.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        free: Sequence[str],
+        channels: Sequence[str],
+        sample_time: float,
+        linear: bool = False,
+        poses: bool = False,
+    ) -> None:
+        self.free, self.channels = tuple(free), tuple(channels)
+        self.sample_time, self.linear = sample_time, linear
+        self.ambient = ca.SX.sym("ambient")
+        look_back = sample_time if np.isfinite(sample_time) else None
+        self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True)
+        self.poses = not self.model.inertial and (poses or np.isinf(sample_time))
+        self._with_sensitivities: dict[bool, Recursion] = {}
+        self._by_pattern: dict[tuple, ca.Function] = {}
+        self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
+
+    @cached_property
+    def _clock(self) -> tuple[float, int | None]:
+        """By how much the device's effects shift the recorded drive [s]: a fixed part, and the place in `free` of a free one."""
+        fixed, place = 0.0, None
+        for k, effect in enumerate(self.model.device.effect):
+            if effect.shifts_drive:
+                name = effect.amplitude().name
+                if (path := f"effect[{k}].{name}") in self.free:
+                    place = self.free.index(path)
+                else:
+                    fixed += effect.values[name].si
+        return fixed, place
+
+    def aligned(self, record: Record, p: np.ndarray) -> Record:
+        """The record with its drive at t + tau in place of t, tau the offset of the recorders' clocks; held at its ends.
+
+        Between samples a drive that is linear is interpolated by a cubic spline, a held one by its mean over a sample.
+        """
+        fixed, place = self._clock
+        tau = fixed + (p[place] if place is not None else 0.0)
+        if tau == 0 or self.poses or len(record.time) < SIMULATION.shortest_spline:
+            return record
+        at = np.clip(record.time + tau, record.time[0], record.time[-1])
+        if record.linear:
+            drive = CubicSpline(record.time, record.drive)(at)
+        else:
+            drive = np.column_stack([np.interp(at, record.time, u) for u in record.drive.T])
+        return replace(record, drive=drive)
+
+    @cached_property
+    def free_initial_states(self) -> tuple[int, ...]:
+        """Places in S of the initial states that are fitted: actuators' states, how far dry friction is bent and plays stand
+        off when a record begins, and, with inertia, velocity and displacement; of settled poses the plays alone."""
+        m = self.model
+        if not np.isfinite(self.sample_time):
+            return m.free_memories
+        moving = range(self.n_x - m.v.numel(), self.n_s) if m.inertial else ()
+        return (*range(m.n_states), *m.free_memories, *moving)
+
+    @cached_property
+    def _observed(self) -> ca.SX:
+        signals = self.model.signals
+        rows = []
+        for channel in self.channels:
+            role, name = channel.split(".", 1)
+            rows.append(signals[role].expr[signals[role].channels.index(name)])
+        return ca.vertcat(*rows)
+
+    @cached_property
+    def equations(self) -> SampleEquations:
+        """F and H of one sample, symbolically."""
+        return build_sample_equations(self.model, self._observed, self.sample_time, self.linear, self.poses)
+
+    def linearise(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
+        """F_S, F_f, H_S and H_f at `p` (k,) along any motion, f the m `chosen` parameters by their places in `free`."""
+        c, c_p = self.equations.constants(p)
+        given = self._symbols[:4]
+        c_f = c_p[:, list(chosen)]
+        if self.equations.steps is not None:
+            jacobians = self._jacobians_by_steps(c_f.sparsity())(*given, c, c_f)
+        else:
+            F_S, F_c, H_S, H_c = self._jacobians(*given, c)
+            jacobians = [F_S, F_c @ c_f, H_S, H_c @ c_f]
+        return Linearised(ca.Function("linearised", given, jacobians))
+
+    @cached_property
+    def _jacobians(self) -> ca.Function:
+        """S, u, u+, ambient, c -> F_S, F_c, H_S, H_c, a sample differentiated as a whole."""
+        q = self.equations
+        jacobians = [ca.jacobian(value, by) for value in (q.following, q.y) for by in (q.given[0], q.given[4])]
+        return ca.Function("jacobians", q.given, jacobians)
+
+    def _jacobians_by_steps(self, pattern: ca.Sparsity) -> ca.Function:
+        """S, u, u+, ambient, c, dc/df -> F_S, F_f, H_S, H_f from the sensitivities by S and f; dc/df of one `pattern`."""
+        key = (pattern.shape, tuple(pattern.find()))
+        if key not in self._by_pattern:
+            c_f, n_s = ca.MX.sym("c_f", pattern), self.n_s
+            m = pattern.size2()
+            T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))  # dense: steps fill it
+            seed = ca.vertcat(ca.MX(n_s, pattern.size1()), c_f.T)
+            _, T, _, Y = forward_sensitivities(self.equations, T, seed, self._symbols)
+            jacobians = [part.T for values in (T, Y) for part in (values[:n_s, :], values[n_s:, :])]
+            self._by_pattern[key] = ca.Function("jacobians", [*self._symbols, c_f], jacobians)
+        return self._by_pattern[key]
+
+    def initial_state(self, record: Record, p: np.ndarray) -> np.ndarray:
+        """S (n_s,) before the first sample: actuators at rest; the stage at home, or in balance where it has no inertia."""
+        m = self.model
+        x = m.rest.copy()
+        x[list(m.clocks)] = record.time[0] if np.isfinite(self.sample_time) else 0.0
+        if m.inertial or self.poses:
+            return np.concatenate([x, 0.0 * m.z_scale])
+        z = balanced(m, m.x, m.u, SIMULATION.start_newton_steps)
+        balance = ca.Function("balance", [m.x, m.z, m.u, m.p, self.ambient], [z])
+        return np.concatenate([x, balance(x, m.z_scale, record.drive[0], p, self.ambient_of(record)[0]).full().ravel()])
+
+    @staticmethod
+    def ambient_of(record: Record) -> np.ndarray:
+        """Ambient (n,), zero where none was recorded."""
+        return np.zeros(len(record.time)) if record.ambient is None else record.ambient
+
+    def simulate(self, record: Record, p: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
+        """Readings (n, n_y) [SI] with parameters `p` (k,); `start` is added to the free initial states."""
+        return self.simulate_states(record, p, start)[1]
+
+    def simulate_states(
+        self, record: Record, p: np.ndarray, start: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """S after each sample (n, n_s) and the readings (n, n_y) [SI]; arguments as of `simulate`."""
+        record = self.aligned(record, p)
+        c = np.tile(self.equations.constants(p)[0].full().T, (len(record.time), 1))
+        return self._recursion.run(self.starting_state(record, p, start), *self.inputs(record), c)
+
+    def sensitivities(
+        self, record: Record, p: np.ndarray, start: np.ndarray | None = None, by_free: bool = True
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Readings (n, n_y) [SI] and their derivatives (n, n_y, m) by the free parameters, then by the free initial states.
+
+        Without the derivatives by the parameters where `by_free` is False.
+        """
+        clock = self._clock[1] if by_free else None
+        by_clock = None if clock is None else self._by_clock(record, p, start, clock)
+        record = self.aligned(record, p)
+        c, c_p = self.equations.constants(p)
+        k, n_i, n_y, n = len(self.free) * by_free, len(self.free_initial_states), len(self.channels), len(record.time)
+        T_0 = np.zeros((k + n_i, self.n_s))
+        T_0[k + np.arange(n_i), list(self.free_initial_states)] = 1.0
+        first = np.concatenate([self.starting_state(record, p, start), T_0.ravel(order="F")])
+        constant = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(c_p.nonzeros())))
+        values = self._recursion_with_sensitivities(by_free).run(first, *self.inputs(record), *constant)[1]
+        Y = values[:, n_y:].reshape(n, n_y, k + n_i)
+        if by_clock is not None:
+            Y[:, :, clock] = by_clock
+        return values[:, :n_y], Y
+
+    def _by_clock(self, record: Record, p: np.ndarray, start: np.ndarray | None, clock: int) -> np.ndarray:
+        """Derivative (n, n_y) of the readings by the offset of the clocks: a central difference over one sample."""
+        ends = []
+        for sign in (1, -1):
+            moved = p.copy()
+            moved[clock] += sign * self.sample_time / 2
+            ends.append(self.simulate(record, moved, start))
+        return (ends[0] - ends[1]) / self.sample_time
+
+    @cached_property
+    def _recursion(self) -> Recursion:
+        """S -> S+, y."""
+        q = self.equations
+        return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)]))
+
+    def _recursion_with_sensitivities(self, by_free: bool) -> Recursion:
+        """(S, T) -> (S+, T+), (y, Y), with the nonzeros of dc/dp as a further input."""
+        if by_free not in self._with_sensitivities:
+            n_i, pattern = len(self.free_initial_states), self.equations.constants.sparsity_out(1)
+            c_p = ca.MX.sym("c_p", pattern.nnz())
+            seed = ca.MX(n_i, pattern.size1())
+            if by_free:
+                seed = ca.vertcat(ca.MX(pattern, c_p).T, seed)
+            state, others = ca.MX.sym("state", self.n_s * (1 + seed.shape[0])), self._symbols[1:]
+            S, T = state[: self.n_s], ca.reshape(state[self.n_s :], seed.shape[0], self.n_s)
+            following, T, y, Y = forward_sensitivities(self.equations, T, seed, [S, *others])
+            values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((following, T), (y, Y))]
+            self._with_sensitivities[by_free] = Recursion(ca.Function("one", [state, *others, c_p], values))
+        return self._with_sensitivities[by_free]
+
+    @cached_property
+    def _symbols(self) -> list[ca.MX]:
+        """S, u, u+, ambient, c."""
+        n_u, n_c = self.model.u.numel(), self.equations.constants.size1_out(0)
+        return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
+
+    def starting_state(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+        """S (n_s,) before the first sample, `start` added at `free_initial_states`."""
+        S = self.initial_state(record, p)
+        if start is not None:
+            S[list(self.free_initial_states)] += start
+        return S
+
+    def inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Drive u and u+ (n, n_u), ambient (n, 1). Of poses u+ is the pose's own drive and u that of the pose before."""
+        u, ambient = record.drive, self.ambient_of(record)[:, None]
+        if not self.poses:
+            return u, np.vstack([u[1:], u[-1:]]), ambient
+        return np.vstack([u[:1], u[:-1]]), u, ambient
+
+
+class RecentSimulators(dict[Any, Simulator]):
+    """Simulators by what they simulate; of more than `SIMULATION.kept` the one used longest ago is forgotten."""
+
+    def __getitem__(self, key: Any) -> Simulator:
+        found = self.pop(key)
+        super().__setitem__(key, found)  # now the last one
+        return found
+
+    def __setitem__(self, key: Any, simulator: Simulator) -> None:
+        super().__setitem__(key, simulator)
+        while len(self) > SIMULATION.kept:
+            del self[next(iter(self))]
+
+    def copy(self) -> RecentSimulators:
+        """Another one with the same simulators."""
+        return RecentSimulators(self)
+
+
+class Linearised:
+    """F_S (n_s, n_s), F_f (n_s, m), H_S (n_y, n_s) and H_f (n_y, m) as functions of S, u, u+, ambient.
+
+    `patterns`: which of their entries can differ from zero.
+    """
+
+    def __init__(self, one: ca.Function) -> None:
+        self.patterns = [ca.DM(one.sparsity_out(i), 1).full() > 0 for i in range(one.n_out())]
+        given = one.mx_in()
+        self._one = ca.Function("dense", given, [ca.densify(value) for value in one(*given)])
+        self._batched: dict[int, ca.Function] = {}
+
+    def evaluate_along(self, S: np.ndarray, *inputs: np.ndarray) -> list[np.ndarray]:
+        """The four matrices at n samples, each (n, ., .), for arguments (n, .)."""
+        n = len(S)
+        if n not in self._batched:
+            self._batched[n] = self._one.map(n)
+        values = evaluate(self._batched[n], S, *inputs)
+        return [v.reshape(n, *p.T.shape).transpose(0, 2, 1) for v, p in zip(values, self.patterns, strict=True)]

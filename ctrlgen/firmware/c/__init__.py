@@ -1,0 +1,1 @@
+"""Expressions, numbers and rules of the C that is written."""

@@ -1,0 +1,50 @@
+"""Renders the templates in `codegen/templates/`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from ctrlgen.core.files import write_text
+from ctrlgen.core.shipped_files import shipped
+from ctrlgen.firmware.c.real import Real
+
+# Of the interface of the generated C, in every header: raised when code that was written for an older header must be changed because a
+# function, a structure or the meaning of an argument or a status changed. Additions do not raise it.
+ABI = 1
+
+
+def codegen_folder() -> Path:
+    """Templates and harness."""
+    return shipped("codegen")
+
+
+def render(template: str, context: dict[str, Any]) -> str:
+    """`template` of `codegen/templates/` with `context`. A name that the template asks for and does not get is an error."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    environment.globals |= {"abi": ABI, "hertz": hertz}
+    return environment.get_template(f"{template}.j2").render(context)
+
+
+def hertz(rate: float | None, real: Real | None = None) -> str:
+    """A sample rate as text; with `real` as a constant of C, an unsigned integer where it is a whole number, 0U for None."""
+    value = rate or 0.0
+    if abs(value - round(value)) <= 1e-9 * value:  # 1 / (1 / rate) is off by a rounding
+        return f"{round(value)}" + ("U" if real else "")
+    return real.literal(value) if real else f"{value:.17g}"
+
+
+def write(template: str, context: dict[str, Any], path: Path) -> Path:
+    """`render`, written to `path`, which is returned."""
+    write_text(path, render(template, context))
+    return path
+
+
+def comment(text: str) -> str:
+    """`text` as it may stand inside a C comment, on one line."""
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")

@@ -1,0 +1,95 @@
+"""Reference vectors: targets and the controller's answers to them, for the self test that runs in the firmware."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.controller.feedforward import Controller, ControllerStatus
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.online.online import FLOAT_SLACK
+from ctrlgen.firmware.online.vector_cases import Call, limiter_calls
+from ctrlgen.firmware.player.compression import Compression
+
+VECTORS = 24  # reference vectors along the command
+BEYOND = 16  # far beyond every limit
+CASES = 64  # at most, into the limiter's branches
+SETTLE, FRESH = 1, 2  # bits of how a vector is run: settle and not step; from a device at rest
+PLAYED = 17  # samples of the player
+BETWEEN = (0.1, 0.5, 1.3, 1.7)  # of a sample time before, and after, which the player is asked
+UNUSABLE = 3  # NaN, infinity, minus infinity: each in every channel of the target, and as the time of the player
+
+
+def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
+    """Targets with the drives and the status that the model answers, and the tolerance of the drives.
+
+    The tolerance is the change of drive that four roundings of displacement and actuator state cause, or one of a number of a target
+    that a limit on stress or rotation scales.
+    """
+    controller = controller if real is Real.DOUBLE else controller.with_slack(FLOAT_SLACK)
+    rng = np.random.default_rng(0)
+    scale = np.array(controller.target.scale)
+    still = controller.sample_time is None
+    calls = [Call(target, k == 0 or still, k == 0) for k, target in enumerate(command[:VECTORS])]
+    far = rng.normal(size=(BEYOND, command.shape[1])) * 40 * scale
+    calls += [Call(target, True, False) for target in (*far, np.full(command.shape[1], 1e9))]
+    calls += limiter_calls(controller, real.epsilon, CASES)
+    rows, tolerance, state = [], 0.0, controller.rest()
+    rounding = 4 * real.epsilon
+    for call in calls:
+        target = np.array(call.target, dtype=np.float32).astype(float) if real is Real.FLOAT else call.target
+        before = controller.rest() if call.fresh else state
+        step = controller.step(before, target, settle=call.settle)
+        state = step.state
+        # rounding may make the line search accept another trial in float: only the status is compared there
+        exact = not step.status & ControllerStatus.DRIVE
+        how = SETTLE * call.settle + FRESH * call.fresh
+        rows.append({"target": target, "drive": step.drive, "status": int(step.status), "how": how, "exact": exact})
+        if exact and not step.status & ControllerStatus.INPUT:
+            tolerance = max(tolerance, controller.drive_rounding(before, target, step, call.settle, rounding))
+            if (
+                step.status & ControllerStatus.COMPOSITE
+            ):  # scaled from far away, it moves by the rounding of what it was scaled from
+                for unit in np.eye(len(target)):
+                    near = controller.step(before, target * (1 + rounding / 4 * unit), settle=call.settle)
+                    if near.status == step.status:
+                        tolerance = max(tolerance, float(np.max(np.abs(near.drive - step.drive))))
+    tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
+    return {
+        "rows": rows, "tolerance": tolerance, "unusable": UNUSABLE * command.shape[1], "beyond": min(len(command), VECTORS),
+        "lost": sum(part.size for part in controller.rest()) + 1,
+    }  # fmt: skip
+
+
+def played_vectors(compression: Compression | None, samples: int, rate: float) -> dict[str, Any]:
+    """Samples of the player, the first and the last among them, times between them, and the tolerance of both.
+
+    The tolerance is 16 roundings of the largest drive, since a processor may fuse products and sums.
+    """
+    if compression is None:
+        return {"played": [], "played_tolerance": 0.0, "played_unusable": 0, "timed": []}
+    indices = np.unique(np.linspace(0, samples - 1, PLAYED).round().astype(int))
+    drives = compression.drives(indices)
+    rounding = 16 * compression.real.epsilon * float(np.max(np.abs(drives)))
+    return {
+        "played": [{"index": int(k), "drive": drive} for k, drive in zip(indices, drives, strict=True)],
+        "played_unusable": UNUSABLE,
+        "played_tolerance": max(rounding, float(np.finfo(np.float32).tiny)),
+        "timed": _timed(compression, indices, samples, rate),
+    }
+
+
+def _timed(compression: Compression, indices: np.ndarray, samples: int, rate: float) -> list[dict[str, Any]]:
+    """Times of the player with their drives, rounded as in the C: the place of a time on the curve is then exactly the C's."""
+    number: Any = np.float32 if compression.real is Real.FLOAT else np.float64
+    places = {(int(k) + share) / rate for k in indices for share in BETWEEN}
+    times: np.ndarray = np.array(sorted(places), dtype=number)
+    times = times[times < number(samples / rate)]
+    place: np.ndarray = times * number(rate) + number(samples - 0.5 if compression.closed else -0.5)
+    place = np.maximum(place, number(0))
+    whole = np.floor(place).astype(int)
+    fraction = (place - whole.astype(number)).astype(float)
+    fraction = np.where(compression.closed | (whole < samples - 1), fraction, 0.0)
+    drives = compression.drives(whole % samples, fraction)
+    return [{"time": float(t), "drive": drive} for t, drive in zip(times, drives, strict=True)]

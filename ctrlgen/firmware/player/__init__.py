@@ -1,0 +1,1 @@
+"""The solved drives as C that plays them."""

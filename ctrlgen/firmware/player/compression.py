@@ -1,0 +1,291 @@
+"""How the player stores the solved drive: as a table or as a piecewise cubic, whichever has fewer bytes (docs/player.md).
+
+The tolerance is on the followed signal, not on the drive: the model is driven by what the C computes (a closed path for
+two laps), and may differ from the command by `LENGTH_TOLERANCE` and `ANGLE_TOLERANCE`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from ctrlgen.core.errors import SolverError
+from ctrlgen.core.units import same_dimension
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.player.spline import Spline, fit
+from ctrlgen.model.model import Model
+from ctrlgen.model.simulation import simulate
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
+from ctrlgen.trajectory.solution import Solution
+
+TOLERANCE_SHARE = 0.8  # of the tolerances; the rest is left to compilers that fuse a product and a sum
+INSTRUCTION_BUDGET = 150  # of one sample, Cortex-M4F
+SEARCH_INSTRUCTIONS = 22  # of one sample, to find the piece of a cubic
+STEPS_A_DECADE = 6  # of the drive tolerance, in the search for the coarsest
+FINEST_STEP = 42  # 10^(-42/6) of a drive's range: below a float's rounding
+
+
+@dataclass(frozen=True)
+class SampleTable:
+    """Every sample as solved, `drive` (samples, axes)."""
+
+    drive: np.ndarray
+
+    kind = "table"
+
+    def bytes(self, real: Real) -> int:
+        """Bytes of constants in the C."""
+        return self.drive.size * real.bytes
+
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations of one sample: none."""
+        return 0
+
+    def extremes(self) -> tuple[np.ndarray, np.ndarray]:
+        """(axes,) lowest and highest drive."""
+        return self.drive.min(axis=0), self.drive.max(axis=0)
+
+    def values(self, real: Real) -> np.ndarray:
+        """(samples, axes): the drives in the arithmetic of the C."""
+        return self.drive.astype(np.float32 if real is Real.FLOAT else np.float64)
+
+    def interpolated(self, k: np.ndarray, fraction: np.ndarray, real: Real) -> np.ndarray:
+        """(n, axes): the drives at k + fraction, 0 <= fraction < 1, linear to the next sample; the first follows the last."""
+        low, high = self.values(real)[k], self.values(real)[(k + 1) % len(self.drive)]
+        return low + fraction.astype(low.dtype)[:, None] * (high - low)
+
+
+Curve = SampleTable | Spline
+BETWEEN = 4  # moments a sample at which the rates of a curve are looked at
+RATE_ROUNDING = 1e-3  # of the range of a rate: of drives in float over a quarter of a sample
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One way to store the drive.
+
+    `length` [m], `angle` [rad]: largest error of the followed signal; `drive`: largest difference from the solved drive.
+    `instructions`: estimate for one sample on a Cortex-M4F. `remark`: why it was chosen, or why not. Numbers are None
+    where there is no such curve.
+    """
+
+    kind: str
+    size: str
+    bytes: int | None
+    operations: int | None
+    instructions: int | None
+    length: float | None
+    angle: float | None
+    drive: float | None
+    chosen: bool
+    remark: str
+
+
+@dataclass(frozen=True)
+class Compression:
+    """The chosen `curve` in one arithmetic and all candidates.
+
+    `low`, `high` (axes,): bounds checked at run time, infinite where the curve cannot exceed them.
+    """
+
+    real: Real
+    curve: Curve
+    closed: bool
+    low: np.ndarray
+    high: np.ndarray
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def chosen(self) -> Candidate:
+        """The candidate that became the player."""
+        return next(c for c in self.candidates if c.chosen)
+
+    def drives(self, k: np.ndarray, fraction: np.ndarray | None = None) -> np.ndarray:
+        """(n, axes): what the C answers at sample k plus `fraction` of a sample time."""
+        fraction = np.zeros(len(k)) if fraction is None else fraction
+        if not self.closed:
+            fraction = np.where(k == _samples(self.curve) - 1, 0.0, fraction)
+        values = self.curve.interpolated(k, fraction, self.real)
+        return np.clip(values, self.low.astype(values.dtype), self.high.astype(values.dtype)).astype(float)
+
+
+def compress(solution: Solution) -> dict[Real, Compression]:
+    """For each arithmetic the form of fewest bytes within the tolerances and `INSTRUCTION_BUDGET`; else the table."""
+    drive, closed = solution.drive, solution.scenario.closed
+    low, high = solution.model.u_bounds
+    span = np.ptp(drive, axis=0)
+    span = np.where(span > 0, span, solution.model.u_scale * 1e-3)
+
+    @cache
+    def spline(step: int) -> Spline | None:
+        return fit(drive, low, high, span * 10 ** (-step / STEPS_A_DECADE), closed)
+
+    return {real: _compress(solution, real, spline) for real in Real}
+
+
+def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | None]) -> Compression:
+    bounds = _inward(solution.model, real)
+    n, closed = len(solution.drive), solution.scenario.closed
+
+    def measured(curve: Curve) -> Candidate:
+        compression = Compression(real, curve, closed, *_kept(curve, bounds, real), ())
+        values = compression.drives(np.arange(n))
+        length, angle = _error(solution, values)
+        if isinstance(curve, Spline) and not _keeps_rates(solution, compression):
+            length = np.inf
+        off = float(np.abs(values - solution.drive).max())
+        cost = instructions(curve, int(np.isfinite([compression.low, compression.high]).sum()))
+        return Candidate(
+            curve.kind, _size(curve), curve.bytes(real), curve.operations, cost, length, angle, off, False, ""
+        )
+
+    table = SampleTable(np.clip(solution.drive, *bounds))
+    found: list[tuple[Curve | None, Candidate]] = [(table, measured(table))]
+
+    cubic = _coarsest(spline, measured, table.bytes(real))
+    found.append(cubic or (None, _none("cubic", "no shorter than the table within the tolerance")))
+    usable = [(curve, c) for curve, c in found if curve is not None and _within(c) and _affordable(c)]
+    curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else found[0]
+    assert curve is not None
+    candidates = tuple(
+        replace(c, chosen=c is best, remark=c.remark or _remark(c, best, bool(usable))) for _, c in found
+    )
+    return Compression(real, curve, closed, *_kept(curve, bounds, real), candidates)
+
+
+def _coarsest(
+    spline: Callable[[int], Spline | None], measured: Callable[[Curve], Candidate], most: int
+) -> tuple[Spline, Candidate] | None:
+    """The spline of the coarsest drive tolerance that keeps the tolerance of what is followed; None where it needs `most` bytes.
+
+    Tolerances are refined by decades until one serves, then the coarsest that serves is found by bisection.
+    """
+    too_coarse, step, good = STEPS_A_DECADE - 1, STEPS_A_DECADE, None
+    while good is None:
+        curve = spline(step)
+        if curve is None or (candidate := measured(curve)).bytes is None or candidate.bytes >= most:
+            return None
+        if _within(candidate):
+            good = step, curve, candidate
+        elif step == FINEST_STEP:
+            return None
+        else:
+            too_coarse, step = step, min(step + STEPS_A_DECADE, FINEST_STEP)
+    while good[0] - too_coarse > 1:
+        middle = (too_coarse + good[0]) // 2
+        curve = spline(middle)
+        if curve is not None and _within(candidate := measured(curve)):
+            good = middle, curve, candidate
+        else:
+            too_coarse = middle
+    return good[1:]
+
+
+def instructions(curve: Curve, limited: int) -> int:
+    """Estimated instructions of one sample on a Cortex-M4F in float; `limited`: number of bounds checked at run time.
+
+    Fitted to counts of an emulator for clang -O2 with one to eight drives. A Cortex-M4F has no double in hardware.
+    """
+    if isinstance(curve, SampleTable):
+        return 20 + 2 * curve.drive.shape[1]
+    return round(45 + 12.5 * curve.axes + (SEARCH_INSTRUCTIONS if len(curve.pieces) > 1 else 0) + 6 * limited)
+
+
+def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
+    """Largest distance [m] and angle [rad] between command and model driven by `drives`; a closed path is run for two laps."""
+    m, scenario, start = solution.model, solution.scenario, solution.trace
+    command, role = solution.command, scenario.file.follow
+    if scenario.closed:
+        drives, wanted = np.vstack([drives, drives]), np.vstack([command, command, command[:1]])
+    else:
+        wanted = np.vstack([command, command[-1:]])
+    try:
+        reached = simulate(m, drives, scenario.sample_time or 1.0, start.x[0], start.z[0]).signals[role]
+    except SolverError:
+        return np.inf, np.inf
+    worst = np.abs(reached - wanted).max(axis=0)
+    units = m.signals[role].units
+    length, angle = (
+        max((float(e) for e, u in zip(worst, units, strict=True) if same_dimension(u, unit)), default=0.0)
+        for unit in ("m", "rad")
+    )
+    return length, angle
+
+
+def _keeps_rates(solution: Solution, compression: Compression) -> bool:
+    """Whether the drives, looked at between samples too, change no faster than they may; where those of the solution do not either."""
+    m, n, h = solution.model, len(solution.drive), solution.scenario.sample_time or 1.0
+    if not m.rate_limits:
+        return True
+    k = np.repeat(np.arange(n), BETWEEN)
+    drives = compression.drives(k, np.tile(np.arange(BETWEEN) / BETWEEN, n))
+    if solution.scenario.closed:
+        drives = np.vstack([drives, drives[:1]])
+    change = np.diff(drives, axis=0) / (h / BETWEEN)
+    low, high = m.rate_bounds
+    rounded = np.where(np.isfinite(high - low), RATE_ROUNDING * (high - low), 0.0)
+    return bool(np.all(change >= low - rounded) and np.all(change <= high + rounded))
+
+
+def _within(c: Candidate) -> bool:
+    return (
+        c.length is not None
+        and c.angle is not None
+        and c.length <= TOLERANCE_SHARE * LENGTH_TOLERANCE
+        and c.angle <= TOLERANCE_SHARE * ANGLE_TOLERANCE
+    )
+
+
+def _affordable(c: Candidate) -> bool:
+    return c.instructions is not None and c.instructions <= INSTRUCTION_BUDGET
+
+
+def _remark(c: Candidate, best: Candidate, usable: bool) -> str:
+    """Why this candidate was chosen, or why not."""
+    if c is best:
+        return "fewest bytes" if usable else "as solved; nothing is within the tolerance"
+    if not _within(c):
+        return "not within the tolerance"
+    return f"more bytes than the {best.kind}" if _affordable(c) else f"more than {INSTRUCTION_BUDGET} instructions"
+
+
+def _none(kind: str, remark: str) -> Candidate:
+    return Candidate(kind, "", None, None, None, None, None, None, False, remark)
+
+
+def _size(curve: Curve) -> str:
+    if isinstance(curve, SampleTable):
+        return f"{len(curve.drive)} rows"
+    count = sum(p.segments for p in curve.pieces)
+    return f"{count} segments" + (f" in {len(curve.pieces)} pieces" if len(curve.pieces) > 1 else "")
+
+
+def _samples(curve: Curve) -> int:
+    return len(curve.drive) if isinstance(curve, SampleTable) else curve.samples
+
+
+def _inward(model: Model, real: Real) -> tuple[np.ndarray, np.ndarray]:
+    """The drives' bounds as numbers of the arithmetic, none rounded outward."""
+    low, high = model.u_bounds
+    if real is Real.DOUBLE:
+        return low, high
+    with np.errstate(over="ignore"):
+        below, above = low.astype(np.float32), high.astype(np.float32)
+    below = np.where(below < low, np.nextafter(below, np.float32(np.inf)), below)
+    above = np.where(above > high, np.nextafter(above, np.float32(-np.inf)), above)
+    return below.astype(float), above.astype(float)
+
+
+def _kept(curve: Curve, bounds: tuple[np.ndarray, np.ndarray], real: Real) -> tuple[np.ndarray, np.ndarray]:
+    """The bounds to check at run time: those that the curve's extremes, with eight roundings, may exceed; else infinite."""
+    low, high = curve.extremes()
+    slack = 8 * float(np.finfo(np.float32 if real is Real.FLOAT else np.float64).eps) * np.maximum(abs(low), abs(high))
+    if isinstance(curve, SampleTable):
+        slack = 0 * slack
+    positive = (bounds[0] == 0) & (low >= 0) & isinstance(curve, Spline)  # a sum of products of none below zero
+    keep_low, keep_high = (low - slack < bounds[0]) & ~positive, high + slack > bounds[1]
+    return np.where(keep_low, bounds[0], -np.inf), np.where(keep_high, bounds[1], np.inf)

@@ -1,0 +1,50 @@
+"""The context of the player's template: the solved drives in the form that `compression` chose."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.firmware.c.templates import comment
+from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, Candidate, Compression, SampleTable
+from ctrlgen.firmware.player.spline import Spline
+from ctrlgen.trajectory.solution import Solution
+from ctrlgen.version import __version__
+
+
+def player_context(solution: Solution, compression: Compression, prefix: str) -> dict[str, Any]:
+    """The context of player.c.j2 and player.h.j2."""
+    curve = compression.curve
+    pieces = curve.pieces if isinstance(curve, Spline) else ()
+    limited = {
+        side: [(i, v) for i, v in enumerate(bound.tolist()) if np.isfinite(v)]
+        for side, bound in (("low", compression.low), ("high", compression.high))
+    }
+    return {
+        "prefix": prefix,
+        "title": comment(solution.scenario.file.title),
+        "version": __version__,
+        "device_sha256": solution.scenario.device_sha256,
+        "digest": solution.scenario.digest,
+        "samples": len(solution.drive),
+        "closed": solution.scenario.closed,
+        "curve": curve,
+        "table": curve.drive if isinstance(curve, SampleTable) else None,
+        "segments": [piece.segments for piece in pieces],
+        "scales": [1 / (piece.stop - piece.start) for piece in pieces],
+        "limited": limited if any(limited.values()) else None,
+        "chosen": compression.chosen,
+        "lines": [_line(c) for c in compression.candidates],
+        "budget": INSTRUCTION_BUDGET,
+        "rate": 1 / (solution.scenario.sample_time or 1.0),
+    }
+
+
+def _line(c: Candidate) -> str:
+    """One candidate, as the header's comment lists it."""
+    verdict = f"chosen: {c.remark}" if c.chosen else c.remark
+    if c.bytes is None or c.length is None:
+        return f"{c.kind:<8} {verdict}"
+    off = f"{1e9 * c.length:.2g} nm, {c.angle:.2g} rad"
+    return f"{c.kind:<8} {c.size}: {c.bytes} bytes, {c.operations} operations, about {c.instructions} instructions, {off}; {verdict}"

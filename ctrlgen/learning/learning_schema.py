@@ -1,0 +1,68 @@
+"""What learning.json holds, key by key; `ctrlgen/reporting/schemas/learning.schema.json` is written from it."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin
+
+
+class RunError(Keys):
+    """The error of one run in one group: root mean square length along the path, in the unit of the group."""
+
+    group: str = Field(description="Name of the group.")
+    measured: float = Field(description="Of the mean over all repetitions.")
+    noise: float = Field(description="Of the standard error of that mean.")
+    repeating: float = Field(description="What of the measured error repeats: measured^2 = repeating^2 + noise^2.")
+    repeating_least: float = Field(description="Lower end of its 95 % interval.")
+    repeating_most: float = Field(description="Upper end of its 95 % interval.")
+    predicted: Number = Field(description="What was predicted of it from the runs before; null for the first run.")
+
+
+class RunEntry(Keys):
+    """One run: the same drives, as often as they were repeated."""
+
+    name: str = Field(description="The records that it was read from.")
+    repetitions: int = Field(description="How often it was repeated.")
+    best: bool = Field(description="Whether it is the one that is gone on from.")
+    errors: list[RunError] = Field(description="One entry a group.")
+
+
+class ActuatorEntry(Keys):
+    """How one actuator answered from run to run."""
+
+    drive: str = Field(description="Its channel.")
+    gain: Number = Field(
+        description="Observed change of the signal over the predicted one; null where it did not move."
+    )
+    standard_error: Number = Field(description="Of the gain.")
+
+
+class PredictedEntry(Keys):
+    """What the next run will show in one group."""
+
+    group: str = Field(description="Name of the group.")
+    repeating: float = Field(description="Predicted root mean square length of the error that repeats.")
+
+
+class LearningRecord(Origin):
+    """Result of `ctrlgen learn`: the runs so far, and the drives of the next one."""
+
+    scenario: str = Field(description="Name of the scenario.")
+    title: str = Field(description="Title of the scenario file.")
+    device: str = Field(description="Name of the device.")
+    signal: str = Field(description="The followed signal.")
+    not_read: list[str] = Field(description="Channels without a reading: the model alone keeps them on the path.")
+    groups: list[ChannelGroup] = Field(description="Translations, rotations, channels of other units.")
+    runs: list[RunEntry] = Field(description="All runs in their order.")
+    actuators: list[ActuatorEntry] = Field(description="One entry a drive; empty with a single run.")
+    unexplained: Number = Field(
+        description="Share of the change from run to run that the device as described leaves unexplained; null with a single run."
+    )
+    stop: str = Field(description="Why there is nothing more to learn; empty where there is a next run.")
+    step: float = Field(description="Share of the full step that is taken; lowered after runs that were worse.")
+    predicted: list[PredictedEntry] = Field(description="One entry a group, of the next run.")
+    largest_change: dict[str, float] = Field(
+        description="Largest change of each drive from the best run to the next one, by 'channel [unit]'."
+    )
+    drives: dict[str, list[float]] = Field(description="The next drives at every sample, by 'channel [unit]'.")

@@ -1,1 +1,0 @@
-"""Independent reference models. They import nothing of ctrlgen, so that a comparison with them is a check."""

@@ -1,0 +1,72 @@
+"""What every result file states of its origin.
+
+The JSON Schemas in `ctrlgen/reporting/schemas/` are written from these models (`make schemas`).
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ctrlgen.version import __version__, commit
+
+SCHEMAS = Path(__file__).parent / "schemas"
+SCHEMA_VERSION = 1  # raised when a key changes its name or meaning; one version for all files
+
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Number = float | None  # None where it is not finite
+
+
+class Keys(BaseModel):
+    """An object of a result file: it has these keys and no others."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Program(Keys):
+    """The program that wrote the file."""
+
+    name: Literal["ctrlgen"] = Field(description="Always ctrlgen.")
+    version: str = Field(description="Version of the program.")
+    commit: str | None = Field(
+        description="Commit of its source, with -dirty where files differ from it; null if unknown."
+    )
+
+
+class Origin(Keys):
+    """What every result file states of its origin."""
+
+    schema_version: Literal[1] = Field(description="Version of this schema.")
+    program: Program = Field(description="Name, version and commit of the program.")
+    inputs: dict[str, Sha256] = Field(description="SHA-256 of every file that was read, by name.")
+    seed: int | None = Field(description="Seed of everything drawn at random; null where nothing is.")
+    notes: list[str] = Field(description="What a reader should know of the inputs or of how the result was made.")
+
+
+def origin(inputs: dict[str, str], seed: int | None = None, notes: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The keys of `Origin` for files with these SHA-256 `inputs`."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "program": {"name": "ctrlgen", "version": __version__, "commit": commit() or None},
+        "inputs": dict(inputs),
+        "seed": seed,
+        "notes": list(notes),
+    }
+
+
+class ChannelGroup(Keys):
+    """Channels of the followed signal with one kind of unit."""
+
+    name: str = Field(description="translation, rotation, or 'in' a unit of another kind.")
+    unit: str = Field(description="Unit of every number of this group in the file.")
+    channels: list[str] = Field(description="Its channels.")
+
+
+def schema_text(model: type[BaseModel], name: str) -> str:
+    """The JSON Schema (draft 2020-12) of a result file as text."""
+    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
+    found["title"] = name
+    return json.dumps(found, indent=1) + "\n"

@@ -1,0 +1,1 @@
+"""From a path to the drives that follow it, sample by sample."""

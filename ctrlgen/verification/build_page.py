@@ -1,0 +1,42 @@
+"""Writes build.html and build.json of `ctrlgen verify`: one self-contained page, the verdict first."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from ctrlgen.core.files import write_text
+from ctrlgen.reporting.html import render
+from ctrlgen.verification.build_plots import draw_all, target_name
+from ctrlgen.verification.build_record import Build, record, run_fault
+from ctrlgen.verification.scenario_report import worst_rows
+
+CAPTIONS = {
+    "error_length": "Distance of the model, driven by the generated C on this computer, from the command along the "
+    "trajectory, which starts where IPOPT's solution does. The player's curve is compressed as far as its tolerance allows.",
+    "error_angle": "The same for rotations. A curve is broken where the error is exactly zero.",
+    "instructions": "Executed instructions of the costliest call: along the scenario; over random and hostile targets; of the player. "
+    "Cycles are not emulated.",
+}
+MARKS = {"passed": "ok", "failed": "bad", "not run": "idle"}
+
+
+def write_build(out: Path, build: Build) -> None:
+    """Writes build.html and build.json into the folder `out`."""
+    found = record(build)
+    write_text(out / "build.json", json.dumps(found, indent=1) + "\n")
+    device = build.solution.model.device
+    page = render(
+        Path(__file__).with_name("build.html.j2"),
+        b=found,
+        figures=draw_all(build),
+        captions=CAPTIONS,
+        marks=MARKS,
+        rows=worst_rows(build.comparison),
+        targets=[(target_name(run), run, run.instructions, run_fault(run)) for run in build.in_loop.runs],
+        device_title=device.title,
+        source=device.source,
+        budgets=found["budgets"],
+        limits=[row for row in worst_rows(build.comparison) if "excess over a limit" in row["what"]],
+    )
+    write_text(out / "build.html", page)
