@@ -18,16 +18,15 @@ from scipy.stats import norm
 
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, simulate, solve
+from ctrlgen.budget.chance_constraint import ChanceConstraint
 from ctrlgen.budget.error_budget import budget_of
 from ctrlgen.budget.limits import Margins, margins, slopes_of_limits
 from ctrlgen.budget.linear import propagate
-from ctrlgen.budget.robust import ChanceConstraint
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import load_uncertainties
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.firmware.folder import generate
-from ctrlgen.trajectory import solution as described
 from ctrlgen.trajectory.scenario import model_of
 from ctrlgen.trajectory.scenario_file import Robust
 
@@ -383,9 +382,8 @@ def test_what_an_explanation_offers_can_be_followed(tmp_path):
 
 def test_limits_as_described_are_refused_where_they_are_to_be_tightened(example, tmp_path):
     scenario, model = example
-    for route in (lambda: described.solve(scenario, model), lambda: generate(scenario, model, tmp_path / "c")):
-        with pytest.raises(InputError, match="asks for tightened limits"):
-            route()
+    with pytest.raises(InputError, match="asks for tightened limits"):
+        generate(scenario, model, tmp_path / "c")
     assert not (tmp_path / "c").exists()
 
 

@@ -23,6 +23,7 @@ from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.online.online import rates_in_c
 from ctrlgen.model.model import Model
+from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
 
@@ -82,17 +83,17 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         ControllerStatus.COMPOSITE if controller.guarded_limits else bits
     )
     bits |= ControllerStatus.RATE if controller.rate else bits
-    samples = len(scenario.command(model))
+    samples, clock = len(scenario.bind(model).samples), scenario.clock
     return {
         "real": real, "online": folder.online[real], "player": folder.player.get(real) if folder.player else None,
         "n": len(nominal.axes), "nu": nominal.u.numel(), "nx": nominal.x.numel(), "n_s": nominal.n_states,
         "m": len(controller.input_limits),
-        "rate": scenario.sample_time is not None, "bits": int(bits),
+        "rate": isinstance(clock, Sampled), "bits": int(bits),
         "input_limits": controller.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
         # limits that follow from constants of the start are computed by the C, to a few of its roundings
         "drive_room": 4 * real.epsilon if controller.given else 0.0,
         "u_safe": controller.safe_drive, "z_typical": nominal.z_scale, "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
-        "samples": samples, "duration": samples * (scenario.sample_time or 0.0), **rates_in_c(controller),
+        "samples": samples, "duration": samples * clock.sample_time if isinstance(clock, Sampled) else None, **rates_in_c(controller),
     }  # fmt: skip
 
 
