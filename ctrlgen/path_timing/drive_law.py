@@ -172,11 +172,11 @@ def bell_polynomials(k: int, w: ca.SX) -> ca.SX:
 Law = BalancedLaw | InertialLaw
 
 
-def drive_law(model: Model, follow: str, clock: Sampled) -> Law:
+def drive_law(model: Model, follow: str, sample_time: float) -> Law:
     """That of a model. Raises InputError for a device of which nothing bounds the speed, or whose drives are not determined by it."""
     if model.inertial:
         return InertialLaw(model, follow)
-    return BalancedLaw(model, follow, BalancedInverse(model, follow, clock))
+    return BalancedLaw(model, follow, BalancedInverse(model, follow, Sampled(sample_time)))
 
 
 def distances_at(law: Law, sides: list[Side]) -> ca.Function:

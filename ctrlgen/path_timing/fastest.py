@@ -26,7 +26,7 @@ from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.path_timing.repetition import Repetition, at_frequency, check_frequency
 from ctrlgen.trajectory.infeasibility import check_feasible
 from ctrlgen.trajectory.inverse.choice import count_faults
-from ctrlgen.trajectory.inverse.clock import Sampled, in_time
+from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 
@@ -117,7 +117,7 @@ def fastest(
     if not model.inertial:
         _check_held(scenario, model)
     followed = Followed.of(curve, model, rate)
-    optimiser = Optimiser(followed.inverse.without_memories.model, scenario.file.follow, Sampled(followed.sample_time))
+    optimiser = Optimiser(followed.inverse.without_memories.model, scenario.file.follow, followed.sample_time)
     progress("fastest law of time")
     optimum = optimiser.along(curve, progress)
     progress("set-points")

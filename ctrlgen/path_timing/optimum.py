@@ -26,7 +26,6 @@ from ctrlgen.path_timing.drive_law import (
 from ctrlgen.path_timing.maximum_velocity import landed, largest_speeds, largest_steps, steps_in_time
 from ctrlgen.path_timing.time_optimal_nlp import RateBound, SpeedProgramme
 from ctrlgen.path_timing.timing_law import TimingLaw
-from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.paths import smooth_step
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
 
@@ -95,14 +94,14 @@ class Optimum:
 
 
 class Optimiser:
-    """Finds the fastest laws of a `model` without memories along curves of its signal `follow`, sampled as the `clock` says.
+    """Finds the fastest laws of a `model` without memories along curves of its signal `follow`, sampled every `sample_time` [s].
 
     Raises InputError for a device of which nothing bounds the speed.
     """
 
-    def __init__(self, model: Model, follow: str, clock: Sampled) -> None:
-        self.model, self.sample_time = model, clock.sample_time
-        self.law: Law = drive_law(model, follow, clock)
+    def __init__(self, model: Model, follow: str, sample_time: float) -> None:
+        self.model, self.sample_time = model, sample_time
+        self.law: Law = drive_law(model, follow, sample_time)
         self.sides = sides_of(model.limits, model)
         self.distances = distances_at(self.law, self.sides)
         by_speed = [s for s, own in zip(self.sides, depends_on_speed(self.distances), strict=True) if own]
