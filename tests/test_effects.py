@@ -19,6 +19,7 @@ from conftest import AXIS_FILE, DEVICE
 
 import ctrlgen.effects
 from ctrlgen import Controller, build_model, simulate
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import Device
@@ -461,7 +462,7 @@ def controller_with(effect: type[Effect]) -> Controller:
     where = places[len(places) // 2]
     shape = shapes(effect, where)
     values = {**shape[len(shape) // 2], effect.amplitude().name: size(effect, where, np.random.default_rng(3))}
-    return Controller(
+    return controller_of(
         build_model(device_of(table, written(effect, where, values)), sample_time=SAMPLE_TIME), "pose", SAMPLE_TIME
     )
 
@@ -481,7 +482,7 @@ def test_the_inverse_follows_without_knowing_the_effect(effect):
         assert step.status == 0
         state = step.state
         drives.append(step.drive)
-    reached = simulate(controller.model, np.array(drives), SAMPLE_TIME, *start).signals["pose"]
+    reached = simulate(controller.kernels.model, np.array(drives), SAMPLE_TIME, *start).signals["pose"]
     error = np.abs(reached - targets)
     # The issue's own limits. A drive that fades with time is held constant within a sample: a tenth of a nanometre.
     fades = effect.place is Place.DRIVE and any(s.clock for s in effect.states)

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from conftest import AXIS_FILE, SCENARIOS, effect_device
 
-from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
+from ctrlgen import ControllerStatus, InputError, build_model, load_scenario, simulate
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.deviations import permits
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import FLAGS
@@ -143,7 +144,7 @@ def test_the_same_input_gives_the_same_bytes(units, tmp_path):
 
 
 def test_the_controller_answers_as_the_reference(units, circle, tmp_path):
-    controller, (path, _) = Controller(circle.model, "pose", 1e-3), units
+    controller, (path, _) = controller_of(circle.model, "pose", 1e-3), units
     state, ours, expected = controller.rest(), [], []
     with opened(path, tmp_path / "unit") as unit:
         unit.begin("target", circle.command[0])
