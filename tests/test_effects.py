@@ -372,7 +372,7 @@ def compiled(compiler, tmp_path_factory):
     functions = {f"{kind}_law": Law(effect, 1e-2).whole for kind, effect in Effect.library.items()}
     for effect in CONTROLLED:
         for mode in ("static", "moving"):
-            inverse = getattr(controller_with(effect), mode)
+            inverse = getattr(controller_with(effect).kernels, mode)
             for part in ("displacement", "state", "drive", "advance"):
                 functions[f"{effect.kind}_{mode}_{part}"] = getattr(inverse, part)
     folder = tmp_path_factory.mktemp("laws")
@@ -429,7 +429,7 @@ def test_c_equals_python(effect, compiled, rng):
         assert worst_difference(function, kernel, c, given) < 1e-13
     if effect not in CONTROLLED:
         return
-    m = controller_with(effect).nominal
+    m = controller_with(effect).kernels.nominal
     scale = {
         "x": m.x_scale, "z": m.z_scale, "wanted": m.z_scale, "drive": 0.5 * m.u_scale, "state": m.x_scale[: m.n_states],
         "target": np.array(m.signals["pose"].scale),
