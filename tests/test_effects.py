@@ -33,11 +33,11 @@ from ctrlgen.model.effect_terms import available, channels, partner_channels
 TESTED = {
     "kind": "tested_axis", "name": "tested", "title": "an axis under test", "source": "round numbers",
     "mechanics": {"mass": "1 kg", "damping": "30 N*s/m", "stiffness": "0.2 N/um", "stroke": "100 um", "speed": "5 mm/s", "force": "20 N"},
-}  # fmt: skip
+}
 PAIR = {
     **{key: TESTED[key] for key in ("title", "source")}, "kind": "tested_axes", "name": "pair",
     "axis": [{"name": name, **TESTED["mechanics"]} for name in ("a", "b")],
-}  # fmt: skip
+}
 SAMPLE_TIME = 1e-3
 MODEST = 0.5  # typical sizes: a tenth of the bounds where they are narrower than ten of these
 every_effect = pytest.mark.parametrize("effect", Effect.library.values(), ids=Effect.library)
@@ -224,7 +224,7 @@ class Law:
             tangent_compliance=lambda: every, displacements=every, velocities=every, accelerations=every,
             displacement=held["displacement"], velocity=held["velocity"], force=held["force"], state=held["state"],
             **{s.name: memory[i] for i, s in enumerate(self.effect.states)},
-        )  # fmt: skip
+        )
 
     def walk(self, signals: np.ndarray, start: np.ndarray | None = None) -> ca.Function:
         """(parameters) -> the term at every row of `signals`."""
@@ -424,7 +424,7 @@ def test_c_equals_python(effect, compiled, rng):
         given = {
             "m": rng.uniform(-1, 1, len(effect.states)), "s": rng.uniform(-1, 1, function.size1_in(1)),
             "p": np.array(law.numbers(shape[rng.integers(len(shape))], size(effect, law.where, rng))),
-        }  # fmt: skip
+        }
         assert worst_difference(function, kernel, c, given) < 1e-13
     if effect not in CONTROLLED:
         return
@@ -432,7 +432,7 @@ def test_c_equals_python(effect, compiled, rng):
     scale = {
         "x": m.x_scale, "z": m.z_scale, "wanted": m.z_scale, "drive": 0.5 * m.u_scale, "state": m.x_scale[: m.n_states],
         "target": np.array(m.signals["pose"].scale),
-    }  # fmt: skip
+    }
     for mode, part in product(("static", "moving"), ("displacement", "state", "drive", "advance")):
         function, kernel, c = compiled[f"{effect.kind}_{mode}_{part}"]
         for _ in range(5):
