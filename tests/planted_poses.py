@@ -93,9 +93,8 @@ def warmed(u, late=0.1, tau=0.05, dt=H / 10):
     fine = np.repeat(u, 10, axis=0)
     keep = np.exp(-dt / tau)
     lagged = lfilter([0, 1 - keep], [1, -keep], fine, axis=0)
-    lagged += (
-        (fine - lagged) * (1 - keep) / 2
-    )  # held through a step, of which the delayed heat has come half of the way
+    # Held through a step, of which the delayed heat has come half of the way
+    lagged += (fine - lagged) * (1 - keep) / 2
     return Hexapod().series((1 - late) * fine + late * lagged, dt)[::10]
 
 
@@ -107,7 +106,8 @@ def payload(r):
     return y
 
 
-FAR_OFF = {  # as far as a rig that was put up by hand
+# As far as a rig that was put up by hand
+FAR_OFF = {
     "abbe_arm": (
         posed(lambda p: p + np.outer(p[:, 1] * 0.4e6, at(3, 1))),
         Planted("sensor:delta_x", {"arm": 0.4}, "theta_y"),
@@ -138,7 +138,8 @@ def yielding(u):
     return np.array(out)
 
 
-IN_ORDER = {  # of poses, whose order is the memory
+# Of poses one after the other: their order is the memory
+IN_ORDER = {
     "displacement_hysteresis": (
         played,
         Planted("stage:axis", {"share": 0.2, "reach": 2e-5}, within={"share": 0.1, "reach": 0.1}),

@@ -26,7 +26,8 @@ from ctrlgen.recordings.schema import RecordingFile
 from ctrlgen.trajectory.scenario_file import ScenarioFile
 
 DOCS = ROOT / "docs"
-IN_ORDER = {  # pages that build on files of the pages before them; the first diagnosis has a test of its own
+# Pages that build on files of the pages before them; the first diagnosis has a test of its own
+IN_ORDER = {
     "device": ["tutorial/first_device.md"],
     "mechanism": ["howto/own_mechanism.md"],
 }

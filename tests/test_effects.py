@@ -17,9 +17,8 @@ from ctrlgen import build_model
 from ctrlgen.core.units import same_dimension
 from ctrlgen.effects import Channel, Effect, Place
 
-IN_THE_MODEL = {
-    kind: effect for kind, effect in Effect.library.items() if not effect.shifts_drive
-}  # test_law_values has the rest
+# The rest, which shifts the drive, is in test_law_delays
+IN_THE_MODEL = {kind: effect for kind, effect in Effect.library.items() if not effect.shifts_drive}
 every_law = pytest.mark.parametrize("effect", IN_THE_MODEL.values(), ids=IN_THE_MODEL)
 
 

@@ -103,9 +103,8 @@ def test_a_pattern_is_the_same_as_the_copies_written_out(tmp_path):
         ]
     )
     turned = np.kron(np.eye(2), T)
-    assert (
-        np.abs(turned @ C @ turned.T - C).max() < 1e-9 * np.abs(C).max()
-    )  # three legs: the same after a third of a turn
+    # The frame has three legs: it is the same after a third of a turn
+    assert np.abs(turned @ C @ turned.T - C).max() < 1e-9 * np.abs(C).max()
     angles = 'name = "leg"\ntimes = 3\nangles = ["0 deg", "120 deg", "240 deg"]'
     same = loaded(tmp_path, text.replace('name = "leg"\ntimes = 3', angles, 1))
     assert np.abs(dm(Condensed(*with_values(same)).output_compliance) - C).max() < 1e-12 * np.abs(C).max()
@@ -126,9 +125,8 @@ def test_every_number_of_a_mechanism_may_be_free(tmp_path):
     z, k = np.array([1e-5, 2e-5]), free.index(thickness)
     fixed = build_model(device)
     fixed_pose = ca.Function("pose", [fixed.z], [fixed.signals["pose"].expr])
-    assert (
-        np.abs((pose(z, model.p_nominal)[0] - fixed_pose(z)).full()).max() < 1e-16
-    )  # of 70 um: rounding, another order of sums
+    # The pose is 70 um: rounding, another order of sums
+    assert np.abs((pose(z, model.p_nominal)[0] - fixed_pose(z)).full()).max() < 1e-16
     step = 1e-6 * model.p_nominal[k]
     ends = []
     for side in (-1, 1):

@@ -77,9 +77,8 @@ def test_the_3_rrr_stage_as_a_mechanism_has_the_papers_matrices(tmp_path, case):
     special = load_device(DEVICE.parent / f"rrr_case{case}.toml")
     c = Condensed(*with_values(loaded(tmp_path, rrr_text(special))))
     k, angle = stage(special), special.values().frame_angle
-    T = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )  # the paper's output frame
+    # The paper's output frame
+    T = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     for mine, paper in ((dm(c.stiffness), dm(k.input_stiffness)), (T @ dm(c.jacobian), dm(k.complete_J))):
         assert np.abs((mine - paper) / np.abs(paper).max(axis=1, keepdims=True)).max() < 1e-9
     C_o = dm(c.output_compliance)[np.ix_([3, 4, 2], [0, 1, 5])]  # (dx, dy, dalpha) per (F_x, F_y, M_z)
@@ -132,9 +131,8 @@ def test_an_axis_of_the_xy_stage_as_a_mechanism_has_the_papers_stiffness(tmp_pat
     size = np.sqrt(np.abs(np.outer(paper[range(6), [3, 4, 5, 0, 1, 2]], paper[range(6), [3, 4, 5, 0, 1, 2]])))[
         :, [3, 4, 5, 0, 1, 2]
     ]
-    assert (
-        np.abs((mine - paper) / size).max() < 1e-9
-    )  # of each entry's own size: turns and displacements differ by thousands
+    # The difference is of each entry's own size: turns and displacements differ by thousands
+    assert np.abs((mine - paper) / size).max() < 1e-9
 
 
 def meso_hexapod_text(device) -> str:

@@ -28,12 +28,13 @@ from ctrlgen.estimation.hypothesis import Hypothesis
 
 COMPONENTS = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 TURNED, SHIFTED = 1e-6, 5e-9  # noise of a pose [rad, m]
+# The battery's names for them
 ALSO = {
     "softening": "stiffening",
     "frame_turn": "frame_rotation_z",
     "step": "force_step",
     "viscous": "asymmetric_viscous",
-}  # the battery's names for them
+}
 IN_THE_LOOP = {"link_load"}  # found on the finite-rotation plant of tests/test_loop.py
 SMOOTHERS = {"empirical_history", "empirical_position", "empirical_speed"}  # written in tests/test_empirical_terms.py
 
@@ -119,7 +120,8 @@ def test_of_a_table_out_of_balance():
     recover(fitter, device, "payload", Planted("mechanism:axis", {"share": 0.002, "lean": np.radians(40)}))
 
 
-SHARED = {  # of two axes: what each takes for the other's motion (position, speed, acceleration)
+# Of two axes: what each takes for the other's motion (position, speed, acceleration)
+SHARED = {
     "stiffness_coupling": ({"stiffness": 40.0}, 0),
     "damping_coupling": ({"damping": 2.0}, 1),
     "inertia_coupling": ({"inertia": -0.5}, 2),

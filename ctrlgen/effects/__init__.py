@@ -8,8 +8,9 @@ To add a law:
 2. Plant it in `tests/planted_axis.py`: a recording made by the law's definition, written independently of its expression,
    from which the diagnosis must recover the parameters. `tests/test_recovery.py` fails while a law has none.
 
-The theorems of `tests/test_effects.py` and `tests/test_effects_in_c.py` then hold the law to its claims: off means off, energy, units, C equal to Python. What
-the diagnosis believes of it beforehand has defaults; `ctrlgen/estimation/priors.py` takes a row where they are wrong.
+The theorems of `tests/test_effects.py` and `tests/test_effects_in_c.py` then hold the law to its claims: off means off, energy,
+units, C equal to Python. What the diagnosis believes of it beforehand has defaults; `ctrlgen/estimation/priors.py` takes a row
+where they are wrong.
 
 A law's file imports `Effect, Param, Place` (and `State`) from here. Files that begin with an underscore are no laws: the law's
 interface, the reader of [[effect]] tables, and expressions that several laws share.
