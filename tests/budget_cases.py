@@ -7,13 +7,7 @@ from pathlib import Path
 import numpy as np
 from conftest import SCENARIOS
 
-from ctrlgen import (
-    build_model,
-    load_scenario,
-    simulate,
-    solve,
-    user_device,
-)
+from ctrlgen import build_model, load_scenario, simulate, solve, user_device
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.trajectory.scenario import Scenario

@@ -7,15 +7,7 @@ import pytest
 from budget_cases import FILE, TRANSLATIONS, driven, largest_nm, number, pushed, stated, two_axes
 from conftest import DEVICES, SCENARIOS
 
-from ctrlgen import (
-    build_model,
-    error_budget,
-    load_device,
-    load_scenario,
-    simulate,
-    solve,
-    user_device,
-)
+from ctrlgen import build_model, error_budget, load_device, load_scenario, simulate, solve, user_device
 from ctrlgen.budget import monte_carlo
 from ctrlgen.budget.error_budget import budget_of
 from ctrlgen.budget.finer_model import load_finer

@@ -14,15 +14,7 @@ from command_line import ctrlgen
 from conftest import SCENARIOS
 from result_files import faults
 
-from ctrlgen import (
-    InputError,
-    build_model,
-    error_budget,
-    load_scenario,
-    simulate,
-    solve,
-    user_device,
-)
+from ctrlgen import InputError, build_model, error_budget, load_scenario, simulate, solve, user_device
 from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.budget.error_budget import budget_of
 from ctrlgen.budget.finer_model import load_finer

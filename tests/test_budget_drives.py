@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from budget_cases import TRANSLATIONS, driven, lagging, largest_nm, pushed, stated
 
-from ctrlgen import (
-    simulate,
-)
+from ctrlgen import simulate
 from ctrlgen.budget.error_budget import budget_of
 from ctrlgen.budget.linear import drive_deviations
 from ctrlgen.budget.uncertain_path import UncertainPath

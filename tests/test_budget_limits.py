@@ -9,13 +9,7 @@ import pytest
 from budget_cases import number, stated
 from conftest import SCENARIOS
 
-from ctrlgen import (
-    SolverError,
-    build_model,
-    load_scenario,
-    solve,
-    user_device,
-)
+from ctrlgen import SolverError, build_model, load_scenario, solve, user_device
 from ctrlgen.budget.error_budget import agreement, budget_of
 from ctrlgen.budget.limits import DrawnLimits, Margins, Slopes, critical_samples, slopes_of_limits
 from ctrlgen.budget.linear import propagate

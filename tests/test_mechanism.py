@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
-from mechanism_files import (
-    HEAD,
-    PARALLELOGRAM,
-    REST,
-    SILICON,
-    SPRING,
-    TWO_BODIES,
-    dm,
-    loaded,
-    vector,
-    with_values,
-)
+from mechanism_files import HEAD, PARALLELOGRAM, REST, SILICON, SPRING, TWO_BODIES, dm, loaded, vector, with_values
 
 from ctrlgen import InputError, build_model, load_scenario, solve
 from ctrlgen.devices.mechanism.condensed import Condensed
