@@ -167,9 +167,24 @@ def _measured(root: Path, path: Path, folder: Path) -> dict:
     data.unlink(missing_ok=True)  # of a run that was stopped
     for marked in ("not long", "long"):
         command = [
-            sys.executable, "-m", "pytest", "-q", "-m", marked, "-p", "mutants.timing", "-p", "no:cacheprovider", "-p", "no:xdist",
-            "--cov=ctrlgen", "--cov-append", "--cov-context=test", "--cov-report=", str(path),
-        ]  # fmt: skip
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-m",
+            marked,
+            "-p",
+            "mutants.timing",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:xdist",
+            "--cov=ctrlgen",
+            "--cov-append",
+            "--cov-context=test",
+            "--cov-report=",
+            str(path),
+        ]
         with contextlib.suppress(subprocess.TimeoutExpired):
             subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=LONGEST)
         if times.exists():

@@ -86,8 +86,14 @@ class Copy:
         ]
         environment = os.environ | {"PYTHONPATH": str(self.root), "MPLBACKEND": "Agg"}
         process = subprocess.Popen(
-            command, cwd=self.root, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-        )  # fmt: skip
+            command,
+            cwd=self.root,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
         try:
             text, _ = process.communicate(timeout=limit)
         except subprocess.TimeoutExpired:
