@@ -120,7 +120,7 @@ def fine_rise(drive: Array, linear: bool) -> Array:
 
 @dataclass(frozen=True)
 class Motion:
-    """On the fine grid: `time` [s, common clock], `position` [m], `speed` [m/s], `drive` [V] after the drive laws."""
+    """The motion on the fine grid: `time` [s, common clock], `position` [m], `speed` [m/s], `drive` [V] after the drive laws."""
 
     time: Array
     position: Array

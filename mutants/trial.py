@@ -45,7 +45,7 @@ class Copy:
             (self._folder / "shared").symlink_to(shared.resolve())
 
     def remove(self) -> None:
-        """From the disk."""
+        """Deletes the copy from the disk."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def tried(self, mutant: Mutant, tests: Sequence[str], seconds: dict[str, float], limit: float) -> Outcome:

@@ -17,7 +17,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 
 class DescribedSchema(GenerateJsonSchema):
-    """For `model_json_schema(schema_generator=DescribedSchema)`."""
+    """Generator of schemas for `model_json_schema(schema_generator=DescribedSchema)`."""
 
     def model_schema(self, schema: Any) -> dict[str, Any]:
         """The schema of a table, its keys described."""

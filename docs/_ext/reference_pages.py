@@ -35,7 +35,7 @@ def literal_docstring(app: Any, what: str, name: str, member: Any, options: Any,
 
 
 def write_all() -> None:
-    """Every generated page."""
+    """Writes every generated page."""
     OUT.mkdir(parents=True, exist_ok=True)
     pages = {
         "devices": device_page(),
@@ -266,21 +266,21 @@ def device_page() -> str:
 
 
 def scenario_page() -> str:
-    """scenario.toml."""
+    """The page of scenario.toml."""
     from ctrlgen.trajectory.scenario_file import ScenarioFile
 
     return "\n".join([GENERATED, *model_section(ScenarioFile, "scenario.toml", level=1)])
 
 
 def recording_page() -> str:
-    """recording.toml."""
+    """The page of recording.toml."""
     from ctrlgen.recordings.schema import RecordingFile
 
     return "\n".join([GENERATED, *model_section(RecordingFile, "recording.toml", level=1)])
 
 
 def uncertainty_page() -> str:
-    """uncertainty.toml."""
+    """The page of uncertainty.toml."""
     from ctrlgen.budget.uncertainty import UncertaintyFile
 
     return "\n".join([GENERATED, *model_section(UncertaintyFile, "uncertainty.toml", level=1)])
