@@ -14,8 +14,9 @@ import pytest
 import three_stacks
 from conftest import SCENARIOS, effect_device
 
-from ctrlgen import Controller, build_model, load_scenario
+from ctrlgen import build_model, load_scenario
 from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.c.elementary import elementary_text
@@ -91,10 +92,11 @@ def test_the_generated_c_breaks_no_rule(checks, tool):
 def test_the_list_of_deviations_is_what_is_reported_no_more_no_less(folder, checks):
     check = ran(checks[STATIC[0]])
     assert listed(folder) == reported(check)
+    # Required: stdio of the test
     assert {f.severity for f in check.findings if f.permitted} == {
         "advisory",
         "required",
-    }  # required: stdio of the test
+    }
 
 
 @pytest.mark.long
@@ -297,7 +299,7 @@ def test_from_a_state_of_garbage_c_and_python_answer_alike_and_admissibly(
         *map(str, folder.sources(Real.DOUBLE)),
     ]
     subprocess.run([*words, "-o", str(program)], check=True)
-    controller = Controller(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     x, z = controller.rest()
     (x if part == "x" else z)[0] = garbage
     target = scenario.bind(model).samples[:3]
