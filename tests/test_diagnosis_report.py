@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from axis_records import record as axis_record
 from conftest import AXIS_FILE, MESO_FILE, SCENARIOS
 from recording_folders import axis_recording, poses_recording
 from result_files import faults
@@ -20,17 +21,22 @@ import ctrlgen
 from ctrlgen.app.commands.cli import execute
 from ctrlgen.core.to_json import plain
 from ctrlgen.diagnosis.diagnosis_folder import diagnose_into, unfinished
-from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry, SmallestDetectableEntry
+from ctrlgen.diagnosis.evidence.experiment_design import CandidateExperimentEntry, Experiment
+from ctrlgen.diagnosis.evidence.residual_location import ResidualPartEntry
+from ctrlgen.diagnosis.evidence.unmodelled_dynamics import Coordinate, DependenceMap, UnmodelledForce
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.figures import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.selection.diagnosis_result import Estimate, Finding
-from ctrlgen.diagnosis.selection.verdict import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED
+from ctrlgen.diagnosis.selection.findings import Estimate, Finding
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.profile_likelihood import BOUNDED, Profile
 from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.reporting.result_file import json_text
 
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
 LAWS = (
@@ -76,12 +82,12 @@ def same_prediction(diagnosis, text: str, folder: Path) -> None:
 
 
 def test_the_json_is_the_contract(found):
-    result = json.loads(json.dumps(diagnosis_record(found, MADE_FROM), allow_nan=False))
+    result = json.loads(json_text(diagnosis_record(found, MADE_FROM)))
     assert (
         faults(result, "diagnosis") == [] and result["inputs"] == MADE_FROM.inputs and result["seed"] == MADE_FROM.seed
     )
     assert result["notes"] == list(found.notes)
-    assert result["verdict"] == EXPLAINED
+    assert result["verdict"] == Verdict.EXPLAINED
     (finding,) = result["findings"]
     assert set(finding) == {"effect", "location", "of", "parameters", "share", "worth", "alternatives", "source"}
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")
@@ -104,7 +110,7 @@ def test_the_json_is_the_contract(found):
 def test_the_json_lists_alternatives_by_name(found):
     others = (Hypothesis("thermal_lag", "actuator:axis", "axis"), Hypothesis("swapped", "actuator:a", "a", "b"))
     rival = replace(found.findings[0], alternatives=others)
-    result = diagnosis_record(replace(found, findings=(rival,)), MADE_FROM)
+    result = diagnosis_record(replace(found, findings=(rival,)), MADE_FROM).as_json()
     assert faults(result, "diagnosis") == [] and result["findings"][0]["alternatives"] == [
         {"effect": "thermal_lag", "location": "actuator:axis", "of": None},
         {"effect": "swapped", "location": "actuator:a", "of": "b"},
@@ -238,52 +244,60 @@ def test_a_title_cannot_write_html(found):
     assert "<script>" not in page(hostile, Provenance({}, 0))
 
 
+def proposal(settles: bool) -> Experiment:
+    """A proposed experiment that decides between two causes, or does not."""
+    drive = CandidateExperimentEntry(kind="slow multisine", description="odd lines", strength=0.5, separation=9.0)
+    series = axis_record(np.zeros(20), np.zeros(20), "fit")
+    return Experiment(("creep", "drift"), "alike", 1.0, 9.0 if settles else 1.0, (drive,), series)
+
+
 def test_the_page_shows_whatever_evidence_there_is(found):
-    part = {"label": "reading.axis", "excess": 4.0, "ci95": (3.0, 5.0)}
-    nominal = {
-        "by_reading": [part],
-        "by_direction": {"axis": [{**part, "label": "forward"}]},
-        "statements": ["more below 1 Hz"],
-    }
-    location = {"before": nominal, "after": {"statements": []}}
+    part = ResidualPartEntry(
+        label="reading.axis", excess=4.0, ci95=(3.0, 5.0), share=1.0, mean=0.0, mean_ci95=(-1.0, 1.0), unit="um", n=9
+    )
+    forward = part.model_copy(update={"label": "forward"})
+    nominal = found.residual_location.before.model_copy(
+        update={"by_reading": [part], "by_direction": {"axis": [forward]}, "statements": ["more below 1 Hz"]}
+    )
+    location = found.residual_location.model_copy(update={"before": nominal})
     profile = Profile(
         "effect[0].tau", "creep", "stage:axis", "tau", 0.2, (0.1, 0.3), "s", ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)), BOUNDED,
         True, None,
     )  # fmt: skip
-    experiment = {"drive": "multisine", "duration": {"value": 20.0, "unit": "s"}}
-    extra = {"unmodelled_force": {"statements": ["axis: position explains 80% of the unknown input's variance"]}}
+    position = DependenceMap(Coordinate.POSITION, "um", (0.0, 1.0), (1.0, 2.0), (0.5, 1.5), (1.5, 2.5), "N", 0.8)
+    force = UnmodelledForce("force", {"axis": 1.0}, "N", {"axis": (position,)}, ("axis",), ())
+    drift = SmallestDetectableEntry(
+        effect="drift", location="sensor:axis", amplitude="rate", detectable_from=float("nan"), identifiable_from=2.0,
+        unit="nm/s", confusable_with=[], by_location={},
+    )  # fmt: skip
     told = replace(
-        found, residual_location=location, next_experiment=experiment,
-        search_history=({"was": "before"},), extra=extra, profiles=(profile,),
-        detectability={"drift": {"value": float("nan"), "unit": "nm/s"}},
+        found, residual_location=location, next_experiment=proposal(settles=True), unmodelled_force=force,
+        profiles=(profile,), detectability=DetectabilityEntry(smallest={"drift": drift}, undetectable=[]),
     )  # fmt: skip
     text = page(told, Provenance({}, 0))
-    assert text.count("<figure>") == 9
-    for words in (
-        "more below 1 Hz",
-        "20 s",
-        "before",
-        "drift",
-        "position explains 80%",
-    ):
+    assert text.count("<figure>") == 10
+    for words in ("more below 1 Hz", "slow multisine", "added creep", "nm/s", "position explains 80%"):
         assert words in text
 
 
 def test_a_verdict_says_what_to_do(found):
     rival = replace(found.findings[0], alternatives=(Hypothesis("thermal_lag", "actuator:axis", "axis"),))
-    told = {v: replace(found, verdict=v, findings=(rival,)) for v in (EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED)}
-    told[CONSISTENT] = replace(found, verdict=CONSISTENT, findings=())
+    told = {
+        v: replace(found, verdict=v, findings=(rival,))
+        for v in (Verdict.EXPLAINED, Verdict.PARTLY, Verdict.AMBIGUOUS, Verdict.UNEXPLAINED)
+    }
+    told[Verdict.CONSISTENT] = replace(found, verdict=Verdict.CONSISTENT, findings=())
     first = {verdict: (sentence(d).split(":")[0], next_steps(d)[0]) for verdict, d in told.items()}
     assert len(set(first.values())) == 5
-    assert first[CONSISTENT][1].startswith("Nothing to correct") and first[EXPLAINED][1].startswith(
+    assert first[Verdict.CONSISTENT][1].startswith("Nothing to correct") and first[Verdict.EXPLAINED][1].startswith(
         "Use device.next.toml"
     )
-    assert "Check wiring, units and clocks" in next_steps(told[UNEXPLAINED])[1]
-    assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[AMBIGUOUS])
-    assert "thermal_lag" not in sentence(told[EXPLAINED])
+    assert "Check wiring, units and clocks" in next_steps(told[Verdict.UNEXPLAINED])[1]
+    assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[Verdict.AMBIGUOUS])
+    assert "thermal_lag" not in sentence(told[Verdict.EXPLAINED])
     for settles, said in ((True, "Run the next experiment"), (False, "None of the drives considered")):
-        assert next_steps(replace(told[AMBIGUOUS], next_experiment={"settles": settles}))[0].startswith(said)
-    assert "no known effect" in sentence(replace(found, verdict=UNEXPLAINED, findings=()))
+        assert next_steps(replace(told[Verdict.AMBIGUOUS], next_experiment=proposal(settles)))[0].startswith(said)
+    assert "no known effect" in sentence(replace(found, verdict=Verdict.UNEXPLAINED, findings=()))
 
 
 @pytest.mark.long
@@ -343,7 +357,7 @@ def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path
         command("diagnose", out / "device.next.toml", creeping, "--out", tmp_path / "next", "--laws", ",".join(LAWS))
         == 0
     )
-    assert json.loads((tmp_path / "next" / "diagnosis.json").read_text())["verdict"] == CONSISTENT
+    assert json.loads((tmp_path / "next" / "diagnosis.json").read_text())["verdict"] == Verdict.CONSISTENT
 
 
 def test_a_place_for_replicates_that_nobody_asked_for_is_refused(creeping, tmp_path, capsys):

@@ -12,8 +12,9 @@ from scipy.signal import lfilter
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, SPEAKS_FOR, Family, ranking
 from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares, predict_share
 from ctrlgen.diagnosis.shares.regressors import Kind, Signals
-from ctrlgen.diagnosis.shares.shares_table import as_json, as_text
+from ctrlgen.diagnosis.shares.shares_record import table_record
 from ctrlgen.effects import Effect
+from ctrlgen.reporting.result_file import json_text
 
 N, H = 6000, 0.002
 T = H * np.arange(N)
@@ -230,9 +231,9 @@ def test_the_family_of_what_was_planted_comes_first(kind, family, signals, rng):
 
 
 @pytest.mark.long
-def test_the_record_is_plain_and_the_text_names_what_was_selected(signals, rng):
+def test_the_record_is_plain_and_says_what_was_selected(signals, rng):
     table = model_free_shares([planted(FUNCTIONS[Kind.POSITION](signals), rng)[:, None]], [signals], ["x"])
-    record = json.loads(json.dumps(as_json(table), allow_nan=False))
+    record = json.loads(json_text(table_record(table, {"x": "um"}, {"x": 1.0})))
     first = record["channels"]["x"]["kinds"][0]
     assert first["kind"] == "position" and first["share"] == table.channels[0].kinds[0].alone.share
-    assert "selected 1" in next(line for line in as_text(table).splitlines() if line.strip().startswith("position"))
+    assert first["selected"] == 1 and record["channels"]["x"]["rms"] == pytest.approx(1e6 * table.channels[0].rms)

@@ -22,16 +22,17 @@ from threadpoolctl import threadpool_limits
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.selection.attribution import attribute
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
+from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import FAILURES
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, in_another_unit, verdict
+from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
@@ -100,7 +101,7 @@ def _diagnose(
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
-    enough = unit_is_wrong or answer in (CONSISTENT, EXPLAINED)
+    enough = unit_is_wrong or answer in (Verdict.CONSISTENT, Verdict.EXPLAINED)
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed, *failed)
@@ -119,7 +120,10 @@ def _diagnose(
         search=search,
         fitter=search.fitter,
         profiles=likelihoods,
-        **{name: value for name, value in vars(analyses).items() if name != "failed"},
+        residual_location=analyses.residual_location,
+        unmodelled_force=analyses.unmodelled_force,
+        detectability=analyses.detectability,
+        next_experiment=analyses.next_experiment,
     )
 
 

@@ -10,12 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.core.to_json import plain
-from ctrlgen.diagnosis.report.narrative import hypothesis_name, number
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.narrative import hypothesis_name
 from ctrlgen.diagnosis.selection.candidate_model import Round
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.profile_likelihood import Profile
 from ctrlgen.estimation.settings import STATISTICS
+from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6
@@ -136,7 +137,7 @@ def _percent(value: float) -> str:
 
 def draw_profiles(diagnosis: Diagnosis) -> Figure | None:
     """Profile likelihoods: the rise of the objective when one parameter is held and the others are refitted."""
-    profiles = [p for p in plain(diagnosis.profiles) if len(p["points"]) > 2][:PROFILES]
+    profiles = [p for p in diagnosis.profiles if len(p.points) > 2][:PROFILES]
     if not profiles:
         return None
     columns = min(3, len(profiles))
@@ -151,16 +152,16 @@ def draw_profiles(diagnosis: Diagnosis) -> Figure | None:
     return figure
 
 
-def _profile(panel: Axes, p: dict[str, Any]) -> None:
-    x, rise = np.array(p["points"], float).T
-    root = np.sqrt(np.maximum(rise, 0.0)) * np.sign(x - p["value"])
+def _profile(panel: Axes, p: Profile) -> None:
+    x, rise = np.array(p.points, float).T
+    root = np.sqrt(np.maximum(rise, 0.0)) * np.sign(x - p.value)
     fine = np.linspace(x[0], x[-1], 101)
     panel.plot(fine, np.interp(fine, x, root) ** 2, color=FOUND, lw=1.2)
     panel.plot(x, rise, "o", ms=3.5, color=FOUND)
     panel.axhline(STATISTICS.z_95**2, color="#666666", lw=1, ls=":")
-    panel.axvspan(*p["ci95"], color=FOUND, alpha=0.12, lw=0)
-    unit = "" if p["unit"] == "1" else f" [{p['unit']}]"
-    panel.set_xlabel(f"{p['parameter']}{unit}")
-    panel.set_title(textwrap.fill(f"{p['effect']} at {p['location']}", LABEL), fontsize=8)
+    panel.axvspan(*p.ci95, color=FOUND, alpha=0.12, lw=0)
+    unit = "" if p.unit == "1" else f" [{p.unit}]"
+    panel.set_xlabel(f"{p.parameter}{unit}")
+    panel.set_title(textwrap.fill(f"{p.effect} at {p.location}", LABEL), fontsize=8)
     panel.locator_params("x", nbins=4)
     panel.tick_params(labelsize=7.5)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from ctrlgen.diagnosis.report.narrative import empirical_sentences, number, short
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.narrative import empirical_sentences, short
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
 from ctrlgen.diagnosis.shares.regressors import Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, Share, SharesTable
+from ctrlgen.reporting.numbers import number
 
 NAMED = 3  # kinds that a sentence names
 FAMILIES = 2  # families of laws that a sentence names
@@ -31,7 +32,7 @@ def shares_sentences(diagnosis: Diagnosis) -> list[str]:
     """Of the channel with the largest residual, in noise units: what explains it and how much the accepted laws reach; then
     what is left. None where the device as described leaves noise alone, or the records are too short."""
     shares = diagnosis.shares
-    if shares is None or diagnosis.verdict == CONSISTENT:
+    if shares is None or diagnosis.verdict == Verdict.CONSISTENT:
         return []
     worst = worst_of(diagnosis, shares.before)
     said = ceiling_sentence(worst)

@@ -20,6 +20,7 @@ from ctrlgen.core.edited_toml import DIGITS, inline_table, replace_quantity, sd_
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.python_file import as_toml
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import (
     BETTER,
     HARD_SPACE,
@@ -30,8 +31,7 @@ from ctrlgen.diagnosis.report.narrative import (
     predicts_better,
     sentence,
 )
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.structure import FreeParameter
@@ -131,7 +131,7 @@ def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
         lines.append(f"Parameters changed above: {', '.join(changed)}.")
     if diagnosis.findings:
         lines.append(BETTER if predicts_better(diagnosis) else WORSE)
-    if diagnosis.verdict == UNEXPLAINED:
+    if diagnosis.verdict == Verdict.UNEXPLAINED:
         lines.append("This does NOT explain the recording: the values are the best fit, not physical parameters.")
     kept = (hard(" ".join(line.split())) for line in lines)
     wrapped = (part for line in kept for part in textwrap.wrap(line, WIDTH, break_long_words=False))

@@ -10,8 +10,8 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import difference, show
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.selection.diagnosis_result import Finding
 from ctrlgen.diagnosis.selection.direct_detection import unfitted_finding
+from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.estimation.hypothesis import nominal_physics, selected_laws
