@@ -39,12 +39,13 @@ from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.reporting.result_file import json_text
 
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
+# Four effects instead of all: the report is the same, and quick
 LAWS = (
     "creep",
     "drive_gain",
     "home_offset",
     "stiffening",
-)  # four effects instead of all: the report is the same, and quick
+)
 
 
 MADE_FROM = Provenance({"flexure_axis.toml": "0" * 64}, 3)

@@ -33,9 +33,24 @@ from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun
 pytestmark = pytest.mark.long
 
 KEYS = {
-    "scenario", "inputs", "passed", "failures", "not_run", "interface", "budgets", "errors_along_the_trajectory", "targets",
-    "stopped", "checks", "comparison", "compilers", "margins", "expected", "c", "program",
-}  # fmt: skip
+    "scenario",
+    "inputs",
+    "passed",
+    "failures",
+    "not_run",
+    "interface",
+    "budgets",
+    "errors_along_the_trajectory",
+    "targets",
+    "stopped",
+    "checks",
+    "comparison",
+    "compilers",
+    "margins",
+    "expected",
+    "c",
+    "program",
+}
 TOOLS = {
     "cppcheck --addon=misra",
     "clang-tidy",
