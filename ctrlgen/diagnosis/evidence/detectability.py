@@ -11,8 +11,9 @@ from pydantic import Field
 
 from ctrlgen.core.units import difference, written_unit
 from ctrlgen.diagnosis.selection.cause_entry import EffectAt
+from ctrlgen.diagnosis.selection.confusable import look_alike
 from ctrlgen.diagnosis.selection.screen import Screened
-from ctrlgen.diagnosis.settings import DETECTABILITY, MODEL_SELECTION
+from ctrlgen.diagnosis.settings import MODEL_SELECTION
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, numbers
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys
@@ -81,15 +82,8 @@ def _smallest(
     """The smallest detectable amplitude of one `kind` of effect, from (sd [unit], sd over its range, unit) by place."""
     best = min(places, key=lambda h: places[h][1])
     sd, _, unit = places[best]
-    own = next(s for s in screened.suspects if s.hypothesis == best)
-    others = sorted(
-        (s for s in screened.suspects if s.hypothesis != best), key=lambda s: -screened.confusability(own, s)
-    )
-    confusable_with = [
-        (s.hypothesis.effect, s.hypothesis.location)
-        for s in others[: DETECTABILITY.most_alike]
-        if screened.confusability(own, s) >= DETECTABILITY.alike
-    ]
+    suspect = next(s for s in screened.suspects if s.hypothesis == best)
+    confusable_with = [(s.hypothesis.effect, s.hypothesis.location) for s in look_alike(screened, suspect)]
     name = best.path.rpartition(".")[2] if kind == PARAMETER else best.law.amplitude().name
     by_location = {h.location: screened.threshold * value for h, (value, *_) in places.items()}
     return SmallestDetectableEntry(

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import hypothesis_name
 from ctrlgen.diagnosis.selection.candidate_model import Round
-from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.diagnosis.selection.confusable import likeness
+from ctrlgen.diagnosis.settings import CONFUSABLE
 from ctrlgen.estimation.profile_likelihood import Profile
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.reporting.numbers import number
@@ -47,23 +48,23 @@ def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
 
 def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
     best = round_.criteria[0]
-    far = max(10 * SEARCH.rival_difference, *(T - best for T in round_.criteria))
+    far = max(10 * CONFUSABLE.criterion, *(T - best for T in round_.criteria))
     labels = []
     for row, (candidate, criterion) in enumerate(zip(round_.candidates, round_.criteria, strict=True)):
         worse = criterion - best
         added = [c for c in candidate.causes if c not in round_.before.causes]  # several where a set is tried
         names = " + ".join(map(hypothesis_name, added)) or "fewer causes"
         labels.append(textwrap.fill(names, WIDE_LABEL, break_long_words=False))
-        colour = FOUND if added and kept.issuperset(added) else ALIKE if worse < SEARCH.rival_difference else WORSE
+        colour = FOUND if added and kept.issuperset(added) else ALIKE if worse < CONFUSABLE.criterion else WORSE
         panel.barh(row, worse, color=colour, height=0.6)
         panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)
         _beside(panel, worse, row, number(worse, 3) if row else "best")
     panel.set_yticks(range(len(labels)), labels, fontsize=8)
     panel.invert_yaxis()
-    panel.set_xscale("symlog", linthresh=SEARCH.rival_difference)
+    panel.set_xscale("symlog", linthresh=CONFUSABLE.criterion)
     panel.set_xlim(0, 30 * far)
     panel.set_xticks([0, *(10.0**k for k in range(1, int(np.log10(30 * far)) + 1))])
-    panel.axvline(SEARCH.rival_difference, color="#666666", lw=1, ls=":")
+    panel.axvline(CONFUSABLE.criterion, color="#666666", lw=1, ls=":")
 
 
 def _beside(panel: Axes, x: float, y: float, text: str) -> None:
@@ -78,7 +79,7 @@ def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
     top = screened.suspects[:SUSPECTS]
     if len(top) < 2:
         return None
-    values = np.array([[screened.confusability(a, b) for b in top] for a in top])
+    values = np.array([[likeness(screened, a, b) for b in top] for a in top])
     labels = [textwrap.fill(hypothesis_name(s.hypothesis), LABEL, break_long_words=False) for s in top]
     figure, panel = plt.subplots(figsize=(FIGURE_WIDTH, 1.9 + 0.42 * len(top)))
     panel.imshow(values, cmap="Blues", vmin=0, vmax=1, aspect="auto")

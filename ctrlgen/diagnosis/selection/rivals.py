@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
+from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
 from ctrlgen.diagnosis.selection.screen import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
@@ -21,8 +22,7 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
     causes = len(current.causes)
     for k in range(before if causes == before + 1 else causes):
         for rival in replacements(trials, current, k):
-            better = trials.selection.advantage(rival, current) > SEARCH.rival_difference
-            if better and not trials.objections(rival, current.causes):
+            if explains_better(trials.selection, rival, current) and not trials.objections(rival, current.causes):
                 current = trials.converged(rival)
                 break
     return current
@@ -35,8 +35,7 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
         special = None if current.errors.is_noise else current.fit.nested_case(k)
         found = replacements(trials, current, k) if special else []
         for t in (t for t in found if t.cause and t.cause.effect == special):
-            alike = trials.selection.advantage(current, t) < SEARCH.rival_difference
-            if alike and not trials.objections(t, current.causes):
+            if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
                 return simplified(trials, trials.converged(t))
     return current
 
@@ -51,10 +50,7 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
         t.cause: t
         for t in reversed(found)
         if not _same_name(t.cause, there[k])
-        and (
-            trials.selection.advantage(current, t) < SEARCH.rival_difference
-            or (special and t.cause and t.cause.effect == special)
-        )
+        and (explains_alike(trials.selection, t, current) or (special and t.cause and t.cause.effect == special))
     }
     return tuple(t for t in trials.selection.ranked(list(alike.values())) if not trials.objections(t, there))
 

@@ -16,6 +16,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
+from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
 from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
@@ -83,7 +84,7 @@ class Searcher:
                 return current
             current = without_needless(trials, swapped(trials, best, len(current.causes)))
             same = next((v for v in visited if frozenset(v.causes) == frozenset(current.causes)), None)
-            if same is not None and trials.selection.advantage(current, same) < SEARCH.rival_difference:
+            if same is not None and explains_alike(trials.selection, same, current):
                 return current  # no better than when it was there before
             current = trials.with_noise_update(trials.with_errors(trials.converged(current)))
             visited.append(current)

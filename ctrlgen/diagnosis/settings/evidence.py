@@ -82,16 +82,6 @@ class MapSettings:
 
 
 @dataclass(frozen=True)
-class DetectabilitySettings:
-    """The smallest effect of each kind that would have been seen."""
-
-    alike: float = 0.98
-    """|cos| of two scores from which on causes cannot be told apart."""
-    most_alike: int = 3
-    """Causes that are listed as alike at most."""
-
-
-@dataclass(frozen=True)
 class ExcitationSettings:
     """Drives of the next experiment."""
 
@@ -146,7 +136,6 @@ LOCALISATION = LocalisationSettings()
 SPECTRAL_LINES = SpectralLineSettings()
 UNKNOWN_INPUT = UnknownInputSettings()
 MAPS = MapSettings()
-DETECTABILITY = DetectabilitySettings()
 EXCITATION = ExcitationSettings()
 EXPERIMENT = ExperimentSettings()
 BOOTSTRAP = BootstrapSettings()
