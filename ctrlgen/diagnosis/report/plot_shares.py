@@ -120,7 +120,7 @@ def _abscissa(table: SharesTable, channel: ChannelShares, kind: Kind) -> tuple[n
     blocks = list(table.design.of_kind(stands_for.get(kind, kind), channel.own))
     blocks = blocks or [b for b in table.design.blocks if b.kind is Kind.TIME]
     best = max(blocks, key=lambda block: _explained(block, channel.predictions[kind]))
-    x, name = best.abscissa, best.signal.partition(" x ")[0]
+    x, name = best.abscissa, best.signal
     if kind is Kind.PITCH:
         period = channel.periods[kind]
         return (x / period) % 1.0, f"{name} in the pitch", "periods"

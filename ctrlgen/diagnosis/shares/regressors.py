@@ -367,7 +367,7 @@ class _Builder:
             moving = {one, other} - set(self.axes)
             if at and of and at != of and moving:  # of two axes the positions alone
                 continue
-            yield Columns(Kind.PRODUCT, f"{one} x {other}", "", at | of, x, (plain[one] * plain[other])[:, None])
+            yield Columns(Kind.PRODUCT, one, "", at | of, x, (plain[one] * plain[other])[:, None])
 
     @cached_property
     def ambient(self) -> np.ndarray | None:
