@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, SPEAKS_FOR, Family, ranking
-from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares, predict_share
+from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares
 from ctrlgen.diagnosis.shares.regressors import Kind, Signals
 from ctrlgen.diagnosis.shares.shares_record import table_record
 from ctrlgen.effects import Effect
@@ -183,19 +183,6 @@ def test_samples_that_are_not_valid_and_a_second_record_are_taken_as_they_are(si
     (found,) = model_free_shares([y[:, None], second[:, None]], [signals, signals], ["x"]).channels
     assert {row.kind for row in found.selected} == {Kind.DIRECTION, Kind.RECORD}
     assert np.isnan(found.residual).any()
-
-
-@pytest.mark.long
-def test_a_prediction_reaches_the_share_that_it_has_on_the_same_blocks(signals, rng):
-    law = FUNCTIONS[Kind.DIRECTION](signals)
-    y = planted(law, rng)
-    blocks = model_free_shares([y[:, None]], [signals], ["x"]).blocks
-    size = (y @ law) / (law @ law)
-    reached = predict_share([size * law], [y], blocks)
-    assert reached.share == pytest.approx(PART, abs=0.03) and reached.ci95[0] < reached.share < reached.ci95[1]
-    # The mean is free
-    assert predict_share([size * law + 1.0], [y], blocks).share == pytest.approx(reached.share, abs=1e-3)
-    assert predict_share([-size * law], [y], blocks).share < -1
 
 
 def test_a_drive_that_is_the_position_has_no_row(signals, rng):

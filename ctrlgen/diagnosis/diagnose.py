@@ -78,9 +78,14 @@ def diagnose_recording(
 
 
 def _diagnose(
-    device: Device, recording: Recording, seed: int, step: Progress, checkpoint: Checkpoint | None, laws: Sequence[str] | None,
+    device: Device,
+    recording: Recording,
+    seed: int,
+    step: Progress,
+    checkpoint: Checkpoint | None,
+    laws: Sequence[str] | None,
     jobs: int,
-) -> Diagnosis:  # fmt: skip
+) -> Diagnosis:
     effects = selected_laws(laws)
     recording = _relative_ambient(_with_both_roles(recording))
     step("noise")
@@ -168,9 +173,13 @@ def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
 
 
 def _notes(
-    search: SearchResult, live: Sequence[str], spikes: Sequence[Spikes], restless: Sequence[str], laws: Sequence[str] | None,
+    search: SearchResult,
+    live: Sequence[str],
+    spikes: Sequence[Spikes],
+    restless: Sequence[str],
+    laws: Sequence[str] | None,
     effects: Sequence[type[Effect]],
-) -> tuple[str, ...]:  # fmt: skip
+) -> tuple[str, ...]:
     """What was done to the recording, what is known of its noise, and what could not be tried."""
     failed = dict.fromkeys(text for round_ in search.rounds for text in round_.failed)
     return (

@@ -118,12 +118,7 @@ class _Maps:
         self.along_each = np.concatenate([c[2] for c in coordinates])
 
     def sizes(
-        self,
-        white: np.ndarray,
-        usable: np.ndarray,
-        cells: list[tuple[str, np.ndarray]],
-        values: np.ndarray,
-        unit: str,
+        self, white: np.ndarray, usable: np.ndarray, cells: list[tuple[str, np.ndarray]], values: np.ndarray, unit: str
     ) -> list[ResidualPartEntry]:
         """The residual in each cell (label, mask), with bootstrap intervals; cells of too few samples are left out."""
         parts = []
@@ -184,10 +179,14 @@ class _Maps:
         total = float(np.sum(w**2) - w.size)
         if total < LOCALISATION.least_excess * np.sqrt(2 * w.size):
             return CoordinatesEntry(participation_ratio={}, explained_by_one={}, located_in=LocatedIn.NO_EXCESS)
+
+        def explained(v: np.ndarray) -> np.ndarray:
+            return np.clip((np.sum(v**2, axis=0) - len(w)) / total, 0, 1)
+
         alone = {
-            kind: {name: float(x) for name, x in zip(names, np.clip((np.sum(v**2, axis=0) - len(w)) / total, 0, 1), strict=True)}
+            kind: dict(zip(names, explained(v), strict=True))
             for kind, names, v in (("reading", channels, w), ("actuator", self.models[0].axes, rows))
-        }  # fmt: skip
+        }
         ratios = {"reading": _participation(w), "actuator": _participation(a)}
         best = {kind: max(values.values()) for kind, values in alone.items()}
         gap = best["actuator"] - best["reading"]

@@ -15,12 +15,7 @@ from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import short
 from ctrlgen.diagnosis.report.plot_shares import draw_shares
-from ctrlgen.diagnosis.report.plot_uncertainty import (
-    draw_confusability,
-    draw_intervals,
-    draw_profiles,
-    draw_rivals,
-)
+from ctrlgen.diagnosis.report.plot_uncertainty import draw_confusability, draw_intervals, draw_profiles, draw_rivals
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 

@@ -12,15 +12,7 @@ from ctrlgen.devices.changed_numbers import written
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, location_record, shares_record
 from ctrlgen.diagnosis.report.figures import draw_all
-from ctrlgen.diagnosis.report.narrative import (
-    gathered,
-    hard,
-    interval,
-    next_steps,
-    plain_name,
-    sentence,
-    share_text,
-)
+from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, next_steps, plain_name, sentence, share_text
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, per_cent, shares_sentences
 from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.selection.search_history import search_history
@@ -119,11 +111,15 @@ def _families(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 def _row(f: Finding) -> dict[str, Any]:
     return {
-        "plain": plain_name(f.effect), "effect": f.effect, "location": f.location, "of": f.cause.of,
+        "plain": plain_name(f.effect),
+        "effect": f.effect,
+        "location": f.location,
+        "of": f.cause.of,
         "numbers": [(name, interval(e)) for name, e in f.parameters.items()],
         "alternatives": [{"effect": h.effect, "location": h.location} for h in f.alternatives],
-        "share": share_text(f.share), "source": f.source,
-    }  # fmt: skip
+        "share": share_text(f.share),
+        "source": f.source,
+    }
 
 
 def _tested(diagnosis: Diagnosis) -> str:

@@ -265,9 +265,10 @@ def empirical_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 FUNCTIONS = {
-    "empirical_position": "the position", "empirical_speed": "the speed and its direction",
+    "empirical_position": "the position",
+    "empirical_speed": "the speed and its direction",
     "empirical_history": "the last reversals",
-}  # fmt: skip
+}
 
 
 def hard(text: str) -> str:

@@ -75,9 +75,14 @@ class CandidateTerms:
     """
 
     def __init__(
-        self, laws: LawTerms, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
-        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], DataHints],
-    ) -> None:  # fmt: skip
+        self,
+        laws: LawTerms,
+        simulator: Simulator,
+        structure: Structure,
+        hypotheses: list[Hypothesis],
+        probes: dict[tuple[Place, int], int],
+        seen: Callable[[Place, int], DataHints],
+    ) -> None:
         self.laws, self.simulator = laws, simulator
         self.terms: list[LawTerm] = []
         self._places: dict[LawTerm, int] = {}  # in `terms`

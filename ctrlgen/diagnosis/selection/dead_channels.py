@@ -84,9 +84,11 @@ def _only(recording: Recording, kept: list[int]) -> Recording:
     place = {i: k for k, i in enumerate(kept)}
     records = tuple(
         replace(
-            r, observed=r.observed[:, kept], valid=r.valid[:, kept],
+            r,
+            observed=r.observed[:, kept],
+            valid=r.valid[:, kept],
             spikes=tuple((row, place[i], size) for row, i, size in r.spikes if i in place),
         )
         for r in recording.records
-    )  # fmt: skip
+    )
     return replace(recording, channels=channels, units=units, noise=noise, tolerance=tolerance, records=records)

@@ -163,11 +163,12 @@ def _onsets(record: Record) -> np.ndarray:
     moving = np.any(np.abs(np.diff(record.drive, axis=0)) > OBJECTIONS.standing * span, axis=1)
     edges = np.flatnonzero(np.diff(moving.astype(int)))
     long = int(OBJECTIONS.rest_samples)
-    return np.array([
-        record.time[a + 1]
-        for a in edges
-        if not (moving[max(a + 1 - long, 0) : a + 1] if moving[a + 1] else moving[a + 1 : a + 1 + long]).any()
-    ])  # fmt: skip
+
+    def after_rest_or_before(a: int) -> bool:
+        rest = moving[max(a + 1 - long, 0) : a + 1] if moving[a + 1] else moving[a + 1 : a + 1 + long]
+        return not rest.any()
+
+    return np.array([record.time[a + 1] for a in edges.tolist() if after_rest_or_before(a)])
 
 
 def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> str:

@@ -53,9 +53,8 @@ class Searcher:
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
         current = simplified(trials, self._settled(current))
-        nominal = scored(
-            trials.fitter, trials.fitter.described(device)[1]
-        )  # its numbers not bent by errors of a better model
+        # its numbers are not bent by the errors of a better model
+        nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         each = range(len(current.causes))
         bare = tuple(trials.each(lambda own, k: _without(own, current, k, nominal), each))
         alike = tuple(trials.each(lambda own, k: rivals(own, current, k, rounds), each))

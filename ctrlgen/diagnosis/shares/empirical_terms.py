@@ -110,10 +110,15 @@ def _position_and_speed(signals: Sequence[Signals], axis: str) -> tuple[list[np.
 
 
 _LAWS = {
-    Kind.PROPORTION: "empirical_position", Kind.POSITION: "empirical_position", Kind.OTHER_AXIS: "empirical_position",
-    Kind.DRIVE: "empirical_position", Kind.DIRECTION: "empirical_speed", Kind.SPEED: "empirical_speed",
-    Kind.TRAVEL_HISTORY: "empirical_history", Kind.DRIVE_HISTORY: "empirical_history",
-}  # fmt: skip
+    Kind.PROPORTION: "empirical_position",
+    Kind.POSITION: "empirical_position",
+    Kind.OTHER_AXIS: "empirical_position",
+    Kind.DRIVE: "empirical_position",
+    Kind.DIRECTION: "empirical_speed",
+    Kind.SPEED: "empirical_speed",
+    Kind.TRAVEL_HISTORY: "empirical_history",
+    Kind.DRIVE_HISTORY: "empirical_history",
+}
 
 
 def _axis(table: SharesTable, channel: ChannelShares, kind: Kind) -> str | None:

@@ -21,19 +21,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from ctrlgen.diagnosis.settings import SHARES
-from ctrlgen.diagnosis.shares.blocks import Blocks, make_blocks
+from ctrlgen.diagnosis.shares.blocks import make_blocks
 from ctrlgen.diagnosis.shares.channel import (
     ChannelSmoothers,
     as_good,
-    mean_or_zero,
     rates_of,
     select_kinds,
-    share_of,
     without_spikes,
 )
 from ctrlgen.diagnosis.shares.cross_validation import Folds
-from ctrlgen.diagnosis.shares.regressors import Design, Kind, Signals, build_design, own_axes
-from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share, SharesTable
+from ctrlgen.diagnosis.shares.regressors import Kind, Signals, build_design, own_axes
+from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, SharesTable
 
 
 class TooFewSamples(ValueError):
@@ -119,16 +117,3 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
         residual=np.where(usable, channel.y, np.nan),
         predictions={kind: np.where(usable, fit.prediction, np.nan) for kind, fit in alone.items()},
     )
-
-
-def predict_share(prediction: Sequence[np.ndarray], residuals: Sequence[np.ndarray], blocks: Blocks) -> Share:
-    """The share of one residual (n,) a record that a prediction (n,) of it reaches, such as a law's, on the same samples and
-    blocks and beside a constant as the kinds of `model_free_shares` do; it is negative where the prediction does harm."""
-    y, p = blocks.drawn(list(residuals)), blocks.drawn(list(prediction))
-    usable = np.isfinite(y) & np.isfinite(p)
-    nothing = np.empty((len(y), 0))
-    common = Folds(Design(nothing, (), (), {}), blocks, usable)
-    folds = common.with_columns([nothing] * common.count)
-    y, left = (np.where(usable, v, 0.0) for v in (y, y - p))
-    before, after = (mean_or_zero(folds, v, blocks.sums(v**2)).squares for v in (y, left))
-    return share_of(before - after, blocks.sums(y**2))
