@@ -199,8 +199,8 @@ def _hypotheses(device: Device, recording: Recording, effects: Sequence[type[Eff
     shortest = min(r.sample_time for r in recording.records)
     sample_time = shortest if np.isfinite(shortest) else None
     ambient = any(r.ambient is not None for r in recording.records)
-    found = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
-    return [h for h in found if h.effect != PARAMETER or h.path in acting]
+    offered = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
+    return [h for h in offered if h.effect != PARAMETER or h.path in acting]
 
 
 def _relative_ambient(recording: Recording) -> Recording:

@@ -92,21 +92,21 @@ def diagnose_into(
         checkpoint = _checkpoint(Path(out), device, recordings, seed, laws)
         if checkpoint.reused:
             step(f"continuing after {checkpoint.reused} fits")
-        found = diagnose(model.device, recording, seed, step, checkpoint, laws, jobs)
+        diagnosis = diagnose(model.device, recording, seed, step, checkpoint, laws, jobs)
         if replicates is not None:
-            found = replace(found, bootstrap=replicates.of(found.search, seed, step))
-        if found.bootstrap is not None:
-            write_text(draft / "bootstrap.json", json_text(found.bootstrap))
+            diagnosis = replace(diagnosis, bootstrap=replicates.of(diagnosis.search, seed, step))
+        if diagnosis.bootstrap is not None:
+            write_text(draft / "bootstrap.json", json_text(diagnosis.bootstrap))
         step("report")
-        write_next(found, Path(device), draft / "device.next.toml")
-        experiment = found.next_experiment
+        write_next(diagnosis, Path(device), draft / "device.next.toml")
+        experiment = diagnosis.next_experiment
         for name, content in experiment.files.items() if experiment is not None and experiment.settles else ():
             write_text(draft / "next_experiment" / name, content)
         provenance = Provenance(digests(Path(device), recordings), seed)
-        write_text(draft / "diagnosis.json", json_text(diagnosis_record(found, provenance)))
-        write_text(draft / "report.html", page(found, provenance))
+        write_text(draft / "diagnosis.json", json_text(diagnosis_record(diagnosis, provenance)))
+        write_text(draft / "report.html", page(diagnosis, provenance))
     checkpoint.done()  # only now: a diagnosis interrupted during its replicates need not repeat its fits
-    return found
+    return diagnosis
 
 
 def unfinished(out: Path) -> Path:

@@ -99,7 +99,7 @@ def next_experiment(search: SearchResult, explained: bool, seed: int = 0) -> Exp
     if not pairs:
         return None
     return max(
-        (found for a, b in pairs if (found := separate(fitter, a, b, reason, seed)) is not None),
+        (experiment for a, b in pairs if (experiment := separate(fitter, a, b, reason, seed)) is not None),
         key=lambda e: -e.before,
         default=None,
     )
@@ -178,7 +178,7 @@ class _Sums:
 
     @classmethod
     def present(cls, fitter: Fitter, truth: Fit, refitted: Fit) -> _Sums:
-        """Over the records to fit. Prior rows of the refitted model keep its parameters near their stated values."""
+        """The sums over the records to fit. Prior rows of the refitted model keep its parameters near their stated values."""
         n = sum(r.valid.size for r in fitter.fit_records)
         delta = np.zeros(len(refitted.residual))
         delta[:n] = refitted.residual[:n] - truth.residual[:n]

@@ -26,8 +26,8 @@ def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dic
     """
     record = chosen.proposed
     simulator = fit.structure.simulators(fitter.recording, fitter.cache)[record.timing]
-    found = {DRIVE: _drive(simulator, chosen), RECORDING: _recording(fitter, simulator, chosen)}
-    return found | (_scenario(simulator, fit, chosen, device_file) if _solved(simulator.model) else {})
+    texts = {DRIVE: _drive(simulator, chosen), RECORDING: _recording(fitter, simulator, chosen)}
+    return texts | (_scenario(simulator, fit, chosen, device_file) if _solved(simulator.model) else {})
 
 
 def _solved(m: Model) -> bool:

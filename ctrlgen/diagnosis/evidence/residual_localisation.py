@@ -279,7 +279,7 @@ def _bands(models: list[LtvModel]) -> list[FrequencyBandEntry]:
 
 
 def _coherence(a: LtvModel, edges: np.ndarray) -> tuple[list[float | None], float]:
-    """By band, the largest coherence of a reading's residual with a drive; and the coherence that chance exceeds with 5 %."""
+    """The largest coherence of a reading's residual with a drive, a value a band; and the coherence that chance exceeds with 5 %."""
     segment = max(len(a.white) // LOCALISATION.coherence_segments * 2, 8)
     averages = max(2 * len(a.white) // segment - 1, 2)
     best: list[float | None] = [None] * (len(edges) - 1)

@@ -83,7 +83,7 @@ class Residuals:
 
 
 def draw_residuals(residuals: Residuals) -> Figure:
-    """By channel: the residual before and after the correction, and after alone on its own scale with the noise; one panel
+    """The figure of the residual, a row a channel: before and after the correction, and after alone on its own scale with the noise; one panel
     where nothing was corrected."""
     channels, wide = residuals.recording.channels, 1 + residuals.changed
     size = (WIDTH, 0.9 + 1.55 * len(channels))

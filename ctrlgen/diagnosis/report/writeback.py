@@ -54,10 +54,10 @@ def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
 def next_text(diagnosis: Diagnosis, original: str) -> str:
     """The text of the device file `original` with the findings in it."""
     fit = diagnosis.search.chosen.fit
-    found = list(zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True))
+    estimates = list(zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True))
     document = tomlkit.parse(original)
-    changed = _change_numbers(document, diagnosis, found)
-    effects = _effects(diagnosis, found)
+    changed = _change_numbers(document, diagnosis, estimates)
+    effects = _effects(diagnosis, estimates)
     if effects and "effect" in document and not isinstance(document["effect"], AoT):
         for table in effects:  # effect = [{ ... }] in one line cannot be continued by [[effect]]
             document["effect"].append(inline_table(table))
@@ -69,12 +69,12 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
 
 
 def _change_numbers(
-    document: Any, diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]
+    document: Any, diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, float, float]]
 ) -> list[str]:
     """Writes the changed parameters of the device into the document; returns their paths."""
     known = {path: number for path, _, number in numbers(diagnosis.device)}
     causes, changed = diagnosis.search.chosen.fit.structure.causes, []
-    for unknown, value, sd in found:
+    for unknown, value, sd in estimates:
         cause = None if unknown.cause is None else causes[unknown.cause]
         own = cause is None or cause.effect == PARAMETER
         if not own or abs(value - unknown.nominal) <= MOVED * abs(unknown.nominal):
@@ -89,9 +89,9 @@ def _change_numbers(
     return changed
 
 
-def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
+def _effects(diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
     """One table for each effect found; parameters as {value, sd} where the recording determines them."""
-    fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in found}, []
+    fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in estimates}, []
     for k, effect in enumerate(diagnosis.corrected.effect):
         if k < len(diagnosis.device.effect):
             continue

@@ -77,7 +77,7 @@ class ChannelError:
 
 def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:
     """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known."""
-    found, fitter = {}, search.fitter
+    errors, fitter = {}, search.fitter
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
@@ -89,8 +89,8 @@ def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, Channe
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         noise = float(floor[i] * scale) if known[i] else None
         beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
-        found[channel] = ChannelError(rms[0], rms[1], noise, unit, beside)
-    return found
+        errors[channel] = ChannelError(rms[0], rms[1], noise, unit, beside)
+    return errors
 
 
 def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
@@ -99,7 +99,7 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
     An interval includes the model-form error of an amplitude's law, and is at least as wide as the parameter's profile
     likelihood gives.
     """
-    found, profiled = {}, {p.path: p for p in profiles}
+    estimates, profiled = {}, {p.path: p for p in profiles}
     for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
         if cause is not None and cause.effect != PARAMETER:
@@ -109,8 +109,8 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
         if unknown.path in profiled:
             below, above = profiled[unknown.path].ci95
             low, high = min(low, below), max(high, above)
-        found[unknown.path] = Estimate(value, (low, high), unknown.unit)
-    return found
+        estimates[unknown.path] = Estimate(value, (low, high), unknown.unit)
+    return estimates
 
 
 def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:

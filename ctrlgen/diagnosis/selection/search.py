@@ -118,5 +118,5 @@ class Searcher:
 
 def _without(trials: Trials, current: CandidateModel, k: int, nominal: CandidateModel) -> CandidateModel:
     """The model without cause k; the device as described where that cannot be simulated."""
-    found = trials.tried(current.fit.restarted.without(k), None, None)
-    return found[0] if found else nominal
+    fitted = trials.tried(current.fit.restarted.without(k), None, None)
+    return fitted[0] if fitted else nominal

@@ -42,11 +42,11 @@ def verdict(
     """
     if another_unit:
         return Verdict.UNEXPLAINED
-    fitter, found = search.fitter, detected or search.chosen.causes
+    fitter, named = search.fitter, detected or search.chosen.causes
     known = bool(fitter.noise.known.all())
     enough = (known and tests.passed) or within_tolerance(search)
     contradicted = bool(contradicts_datasheet(search.chosen.fit))
-    if not found:
+    if not named:
         return Verdict.UNEXPLAINED if contradicted or (known and not enough) else Verdict.CONSISTENT
     if main_rivals(search, shares):
         return Verdict.AMBIGUOUS
@@ -134,15 +134,15 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
 def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:
     """Causes that the held-out records do not confirm, except where the device's stated parameters alone require them."""
     compare = ModelSelection(search.fitter, lambda *_, **__: [search.chosen])
-    found = []
+    causes = []
     for cause, bare in zip(search.chosen.causes, search.without_cause, strict=True):
         errors = compare.reference((bare, search.chosen))
         confirmed = compare.held_out_loss(bare, errors) - compare.held_out_loss(search.chosen, errors)
         gain = compare.fit_loss(bare, errors) - compare.fit_loss(search.chosen, errors)
         hidden = bare.fit.penalty - search.chosen.fit.penalty >= 0.5 * gain
         if confirmed < MODEL_SELECTION.least_confirmed and not hidden:
-            found.append(cause)
-    return tuple(found)
+            causes.append(cause)
+    return tuple(causes)
 
 
 def poorly_determined(search: SearchResult) -> bool:

@@ -67,10 +67,10 @@ def empirical_terms(fitter: Fitter, fit: Fit, shares: ResidualShares | None) -> 
             if (smoother.cause.effect, smoother.cause.of) in tried:
                 continue
             tried.add((smoother.cause.effect, smoother.cause.of))
-            found = _fitted(fitter, fit, smoother)
-            if (term := _confirmed(fitter, fit, found, smoother.kind, channel.channel)) is not None:
+            smoothed = _fitted(fitter, fit, smoother)
+            if (term := _confirmed(fitter, fit, smoothed, smoother.kind, channel.channel)) is not None:
                 terms.append(term)
-                fit = found
+                fit = smoothed
     return tuple(terms)
 
 
@@ -165,9 +165,12 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
         c, left = ridge_regression(trust[seen, None] * X[seen], trust[seen] * whole[seen])
         if left < least:
             theta[weights] = np.clip(c, [free[k].low for k in weights], [free[k].high for k in weights])
-            found = fit.restarted.with_cause(smoother.cause, numbers | {free[k].name: float(theta[k]) for k in weights})
+            smooth = fit.restarted.with_cause(
+                smoother.cause, numbers | {free[k].name: float(theta[k]) for k in weights}
+            )
             empty = np.zeros(0)
-            best, least = replace(fit, structure=found, theta=theta, initial_states=(), residual=empty, J=empty), left
+            best = replace(fit, structure=smooth, theta=theta, initial_states=(), residual=empty, J=empty)
+            least = left
     return best
 
 
@@ -185,7 +188,7 @@ def ridge_regression(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
         c = V @ (b / (values + ridge))
         free = 1 - float(np.sum(values / (values + ridge))) / max(float(y @ y), 1e-300)
         left = float(np.sum((y - X @ c) ** 2)) / max(free, 1e-3) ** 2
-        best = min(best, (c, left), key=lambda found: found[1])
+        best = min(best, (c, left), key=lambda pair: pair[1])
     return best
 
 

@@ -148,5 +148,5 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
             own[Family.FRICTION] += channel.constant
         for family in Family:
             share[family] += weights[channel.channel] / whole * (own[family] or beside[family])
-    found = [(family, value) for family, value in share.items() if value > 0]
-    return sorted(found, key=lambda pair: (-round(pair[1], 3), place[pair[0]], list(Family).index(pair[0])))
+    shares = [(family, value) for family, value in share.items() if value > 0]
+    return sorted(shares, key=lambda pair: (-round(pair[1], 3), place[pair[0]], list(Family).index(pair[0])))

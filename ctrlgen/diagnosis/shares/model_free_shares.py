@@ -57,7 +57,7 @@ def model_free_shares(
     blocks = make_blocks(residuals, signals[0].settled, seed)
     design = build_design(signals, blocks.rows)
     folds: dict[bytes, Folds] = {}
-    found = []
+    rows = []
     for i, name in enumerate(channels):
         given = [np.asarray(part[:, i], float) for part in residuals]
         parts = given if signals[0].settled else without_spikes(given)
@@ -72,17 +72,17 @@ def model_free_shares(
         rates = rates_of(signals, name, blocks)
         smoothers = ChannelSmoothers(parts, design, folds[key], own, numbers, signals[0].sample_time, rates)
         spikes = 1 - np.isfinite(np.concatenate(parts)).sum() / np.isfinite(np.concatenate(given)).sum()
-        found.append(_shares(name, smoothers, float(spikes)))
-    if not found:
+        rows.append(_shares(name, smoothers, float(spikes)))
+    if not rows:
         raise TooFewSamples("no channel has enough valid samples")
-    return SharesTable(tuple(found), blocks, design)
+    return SharesTable(tuple(rows), blocks, design)
 
 
 def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShares:
     """Shares alone, forward selection and ceiling of one channel."""
     named = [kind for kind in channel.kinds if kind is not Kind.PAST]
-    found = select_kinds(channel, named)
-    channel, selected, joint = found.channel, found.kinds, found.joint
+    selection = select_kinds(channel, named)
+    channel, selected, joint = selection.channel, selection.kinds, selection.joint
     usable, total = channel.common.usable, max(float(channel.energy.sum()), 1e-300)
     alone = {kind: channel.fit([kind]) for kind in channel.kinds}
     rows, before = [], channel.base
@@ -101,7 +101,7 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
             rows.append(KindShare(kind, channel.share(channel.base, fit), gain, None, ()))
     rows.sort(key=lambda row: (row.kind is Kind.PAST, -row.alone.share))
     # all columns at once cost more than they tell where there are few blocks
-    whole = max((channel.whole_share(f) for f in (found.everything, joint)), key=lambda s: s.share)
+    whole = max((channel.whole_share(f) for f in (selection.everything, joint)), key=lambda s: s.share)
     return ChannelShares(
         channel=name,
         rms=float(np.sqrt(total / usable.sum())),

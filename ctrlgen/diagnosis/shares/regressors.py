@@ -152,11 +152,11 @@ class Design:
 
     def kinds(self, own: frozenset[str]) -> dict[Kind, np.ndarray]:
         """Columns of X by kind, for a channel that sees the axes `own`."""
-        found: dict[Kind, list[np.ndarray]] = {}
+        places_by_kind: dict[Kind, list[np.ndarray]] = {}
         for block, places in zip(self.blocks, self.places, strict=True):
             if (kind := kind_for(block, own)) is not None:
-                found.setdefault(kind, []).append(places)
-        return {kind: np.concatenate(found[kind]) for kind in Kind if kind in found}
+                places_by_kind.setdefault(kind, []).append(places)
+        return {kind: np.concatenate(places_by_kind[kind]) for kind in Kind if kind in places_by_kind}
 
     def of_kind(self, kind: Kind, own: frozenset[str]) -> Iterator[Columns]:
         """The blocks of one kind, for a channel that sees the axes `own`."""
