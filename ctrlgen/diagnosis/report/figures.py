@@ -83,8 +83,8 @@ class Residuals:
 
 
 def draw_residuals(residuals: Residuals) -> Figure:
-    """The figure of the residual, a row a channel: before and after the correction, and after alone on its own scale with the noise; one panel
-    where nothing was corrected."""
+    """The figure of the residual, a row a channel: before and after the correction and, on its own scale with the noise, after
+    alone; one panel where nothing was corrected."""
     channels, wide = residuals.recording.channels, 1 + residuals.changed
     size = (WIDTH, 0.9 + 1.55 * len(channels))
     figure, axes = plt.subplots(len(channels), wide, figsize=size, sharex=True, squeeze=False)
