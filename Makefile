@@ -10,7 +10,7 @@ run: $(VENV)/installed
 	$(BIN)/ctrlgen run scenarios/circle20 --out out/circle20
 
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not long and not exhaustive"
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not long"
 
 test-long: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto --dist worksteal

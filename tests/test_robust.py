@@ -212,7 +212,7 @@ def test_draws_break_limits_of_the_plain_path_and_not_of_the_robust_one(plain, r
     assert robust.scenario.home["delta_z"] < -5e-6  # lower is colder: the error is less
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_of_a_hundred_thousand_draws_as_few_break_limits_as_is_stated():
     scenario = load_scenario(EXAMPLE)
     model = model_of(scenario)
