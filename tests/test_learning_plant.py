@@ -55,12 +55,13 @@ def never_worse(learnt: Learnt) -> None:
     assert all(then < now + 2e-3 + 0.1 * now for now, then in pairwise(largest))
 
 
-@pytest.mark.long
+# test_learning has the same on a simulated bench
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("bench", "names"),
     [
         (Imperfect(reversed=(0,)), "drive.1X"),
-        pytest.param(Imperfect(exchanged=(2, 3)), "drive.2X, drive.2Y", marks=pytest.mark.exhaustive),
+        (Imperfect(exchanged=(2, 3)), "drive.2X, drive.2Y"),
     ],
     ids=["reversed", "exchanged"],
 )
