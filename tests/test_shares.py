@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, SPEAKS_FOR, Family, ranking
 from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares
-from ctrlgen.diagnosis.shares.regressors import Kind, Signals
 from ctrlgen.diagnosis.shares.shares_record import table_record
+from ctrlgen.diagnosis.shares.signals import Signals
 from ctrlgen.effects import Effect
 from ctrlgen.reporting.result_file import json_text
 

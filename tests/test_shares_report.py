@@ -20,9 +20,9 @@ from ctrlgen.diagnosis.report.shares_sentences import (
     with_interval,
 )
 from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.families import Family
 from ctrlgen.diagnosis.shares.gather import residual_shares
-from ctrlgen.diagnosis.shares.regressors import Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share
 from ctrlgen.recordings.recording import Recording
 

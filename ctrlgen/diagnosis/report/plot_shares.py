@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.shares.regressors import Columns, Kind
+from ctrlgen.diagnosis.shares.design import Columns, Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
 from ctrlgen.reporting.plots import COLOURS
 

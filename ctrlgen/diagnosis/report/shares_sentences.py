@@ -8,8 +8,8 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import empirical_sentences, short
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import SHARES
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
-from ctrlgen.diagnosis.shares.regressors import Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, Share, SharesTable
 from ctrlgen.reporting.numbers import number
 

@@ -20,9 +20,11 @@ from ctrlgen.diagnosis.shares.cross_validation import (
     standard_error,
     stands_out,
 )
+from ctrlgen.diagnosis.shares.design import Design, Kind
 from ctrlgen.diagnosis.shares.periodic import line_columns, pitch_columns, strongest_line, strongest_pitch
-from ctrlgen.diagnosis.shares.regressors import Design, Kind, Signals, standardised
+from ctrlgen.diagnosis.shares.regressors import standardised
 from ctrlgen.diagnosis.shares.shares_table import Share
+from ctrlgen.diagnosis.shares.signals import Signals
 
 
 class ChannelSmoothers:

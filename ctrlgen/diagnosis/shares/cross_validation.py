@@ -17,7 +17,7 @@ from scipy.linalg.lapack import dposv
 
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.blocks import Blocks
-from ctrlgen.diagnosis.shares.regressors import Design
+from ctrlgen.diagnosis.shares.design import Design
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,9 +20,10 @@ import numpy as np
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.cross_validation import stands_out
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.gather import ResidualShares, gather
-from ctrlgen.diagnosis.shares.regressors import Kind, Signals
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
+from ctrlgen.diagnosis.shares.signals import Signals
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics

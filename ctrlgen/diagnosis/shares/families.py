@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from ctrlgen.diagnosis.shares.regressors import Kind
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.shares_table import SharesTable
 
 

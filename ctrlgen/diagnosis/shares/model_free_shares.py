@@ -30,8 +30,10 @@ from ctrlgen.diagnosis.shares.channel import (
     without_spikes,
 )
 from ctrlgen.diagnosis.shares.cross_validation import Folds
-from ctrlgen.diagnosis.shares.regressors import Kind, Signals, build_design, own_axes
+from ctrlgen.diagnosis.shares.design import Kind
+from ctrlgen.diagnosis.shares.regressors import build_design, own_axes
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, SharesTable
+from ctrlgen.diagnosis.shares.signals import Signals
 
 
 class TooFewSamples(ValueError):

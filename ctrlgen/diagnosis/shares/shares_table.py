@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.diagnosis.shares.blocks import Blocks
-from ctrlgen.diagnosis.shares.regressors import Design, Kind
+from ctrlgen.diagnosis.shares.design import Design, Kind
 
 
 @dataclass(frozen=True)
