@@ -9,12 +9,7 @@ from recording_folders import axis_recording
 
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
 # Four effects instead of all: the report is the same, and quick
-LAWS = (
-    "creep",
-    "drive_gain",
-    "home_offset",
-    "stiffening",
-)
+LAWS = ("creep", "drive_gain", "home_offset", "stiffening")
 
 
 def creeping_recording(folder: Path) -> Path:
