@@ -127,7 +127,7 @@ def test_the_list_of_deviations_is_exact_with_a_player(circle, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["creep", "hysteresis"])
+@pytest.mark.parametrize("kind", ["creep", pytest.param("hysteresis", marks=pytest.mark.exhaustive)])
 def test_controllers_of_devices_with_effects_break_no_rule_and_survive_hostile_calls(kind, tmp_path):
     effects = {
         "creep": {"kind": "creep", "at": "1X", "tau": "0.03 s", "gain": 0.02, "slow": 0.3},
