@@ -110,6 +110,12 @@ def test_no_two_files_share_a_name():
     assert {name for name in stems if stems.count(name) > 1} == set()
 
 
+def test_paths_are_solved_through_the_one_door_that_knows_robust_limits():
+    """`ctrlgen.budget.robust.solve`; what moves a path for it solves it without limits."""
+    inner = {name_of(path) for path in MODULES if "trajectory.nominal" in our_imports(path)}
+    assert inner == {"budget.robust", "budget.moved_path"}
+
+
 @pytest.mark.parametrize(
     "path", [p for p in MODULES if p.parent.name == "effects" and not p.stem.startswith("_")], ids=lambda p: p.stem
 )

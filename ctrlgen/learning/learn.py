@@ -16,6 +16,7 @@ import numpy as np
 from ctrlgen.budget.contributors import Group, groups_of
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import Wanted, next_drives
 from ctrlgen.learning.repeatability import Repeated, Spectrum
@@ -27,17 +28,7 @@ from ctrlgen.trajectory.inverse.violations import Before, violations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, closest_margins
 
-FIRST_STEP = (
-    0.2  # of the largest drive, by which the first step may change any: what the device answers is not known yet
-)
-MISMATCH = 0.1  # share of a change by which the device may answer otherwise than described, until runs have shown it
-LEAST_MISMATCH = 0.01
-WORSE = 3.0  # standard errors by which a run must be worse than the best one for the step to be lowered
-FIRST_WORTH = 0.999  # the same of the first step, which is small on purpose and shows what the device answers
-WORTH = 0.9  # of the error: a next run that is not predicted to fall below is not worth running
-COVERAGE_FACTOR = 1.96
-MOST_STALLS = 3  # runs in a row without a better one
-MOST_HALVINGS = 6
+DEFAULT = LearningOptions()
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +81,11 @@ def learn(
     scenario: Scenario | Path | str,
     recordings: Path | str | Sequence[Path | str],
     *,
+    options: LearningOptions = DEFAULT,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Learning:
-    """The next drives of a scenario from recorded runs of it, all of them so far in their order.
+    """The next drives of a scenario from recorded runs of it, all of them so far in their order; `options`: how far a step goes, and when
+    there is nothing more to learn.
 
     Raises InputError for recordings that are not of this path, and where the device answers changes of its drives otherwise than described;
     Unreachable, SolverError. Sources: S. Gunnarsson, M. Norrloef, Automatica 37 (2001) 2011; J. van Zundert, T. Oomen,
@@ -109,14 +102,19 @@ def learn(
     source = str(paths[0]) if len(paths) == 1 else "recordings"
     check_belongs(runs, lifted, source)
     read = {name: sha256(path) for name, path in recording_files(paths)}
-    return learn_from(lifted, runs, source, {**scenario.digest, **read}, progress)
+    return learn_from(lifted, runs, source, {**scenario.digest, **read}, options, progress)
 
 
 def learn_from(
-    lifted: Lifted, runs: Runs, source: str, inputs: dict[str, str], progress: Callable[[str], None] = lambda _: None
+    lifted: Lifted,
+    runs: Runs,
+    source: str,
+    inputs: dict[str, str],
+    options: LearningOptions = DEFAULT,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Learning:
     """As `learn`, from runs that were read."""
-    job = _Job(lifted, runs)
+    job = _Job(lifted, runs, options)
     progress("answer of the device")
     answer = job.response(len(job.runs))
     if answer is not None and answer.reasons:
@@ -126,34 +124,48 @@ def learn_from(
     worse = [
         r
         for r in results[base + 1 :]
-        if r.cost - results[base].cost > WORSE * np.hypot(r.cost_se, results[base].cost_se)
+        if r.cost - results[base].cost > options.worse * np.hypot(r.cost_se, results[base].cost_se)
     ]
     step = 0.5 ** len(worse)
     progress("next drives")
     c, se = job.repeating(base)
     kept = job.spectrum.shrinkage(c, se, job.repeated[base].freedom)
     repeating = job.spectrum.samples(kept * c) * job.scale
-    stop = job.nothing_left(base) or (job.stalled(base) if len(results) - 1 - base >= MOST_STALLS else "")
+    stop = job.nothing_left(base) or (job.stalled(base) if len(results) - 1 - base >= options.most_stalls else "")
     now, u = results[base].drive, results[base].drive
     if not stop:
-        u = _step(lifted, Wanted(lifted.solution.command - repeating, job.weights, now), step, job.most(now))
+        u = _step(lifted, Wanted(lifted.solution.command - repeating, job.weights, now), step, job.most(now), options)
         stop = job.not_worth(base, u)
         u = now if stop else u
     predicted, error = job.predicted(base, u, job.mismatch(len(results)))
     notes = list(runs.notes) + job.notes()
     return Learning(
-        lifted.solution, job.groups, results, tuple(map(bool, runs.observed)), base, step, stop, answer, repeating, kept, job.spectrum,
-        as_solution(lifted, u), predicted, error, inputs, tuple(notes),
-    )  # fmt: skip
+        solution=lifted.solution,
+        groups=job.groups,
+        runs=results,
+        observed=tuple(map(bool, runs.observed)),
+        base=base,
+        step=step,
+        stop=stop,
+        response=answer,
+        repeating=repeating,
+        kept=kept,
+        spectrum=job.spectrum,
+        next=as_solution(lifted, u),
+        predicted=predicted,
+        predicted_error=error,
+        inputs=inputs,
+        notes=tuple(notes),
+    )
 
 
-def _step(lifted: Lifted, wanted: Wanted, share: float, most: np.ndarray) -> np.ndarray:
+def _step(lifted: Lifted, wanted: Wanted, share: float, most: np.ndarray, options: LearningOptions) -> np.ndarray:
     """`share` of the way to the next drives, less where a drive would move by more than `most` (n_u,), or a limit would be broken that the
     drives of now keep. Raises SolverError."""
     full = next_drives(lifted, wanted)
     share = min(share, float(np.min(most / np.maximum(np.abs(full - wanted.now).max(axis=0), 1e-300))))
     broken_now = {v.limit.name for v in _broken(lifted, wanted.now)}
-    for _ in range(MOST_HALVINGS):
+    for _ in range(options.most_halvings):
         u = wanted.now + share * (full - wanted.now)
         if {v.limit.name for v in _broken(lifted, u)} <= broken_now:
             return u
@@ -185,7 +197,8 @@ def as_solution(lifted: Lifted, u: np.ndarray) -> Solution:
 class _Job:
     """Errors of all runs over frequency, and what follows from them; scaled by the typical size of each channel."""
 
-    def __init__(self, lifted: Lifted, runs: Runs) -> None:
+    def __init__(self, lifted: Lifted, runs: Runs, options: LearningOptions) -> None:
+        self.options = options
         self.lifted, self.runs, self.observed = lifted, runs.runs, runs.observed
         self.scale = np.array(lifted.signal.scale)
         self.weights = 1 / self.scale
@@ -214,19 +227,27 @@ class _Job:
         cost, variance = r.energy(np.ones(len(self.scale)))
         bounds = {how: self._bounded(r, sign) for how, sign in (("repeating", 0), ("least", -1), ("most", 1))}
         return RunResult(
-            run.name, r.repeats, run.drive, self.spectrum.samples(r.mean) * self.scale, self._rms(r.mean**2), self._rms(r.se**2),
-            **bounds, predicted=predicted, cost=cost, cost_se=float(np.sqrt(variance)),
-        )  # fmt: skip
+            name=run.name,
+            repeats=r.repeats,
+            drive=run.drive,
+            error=self.spectrum.samples(r.mean) * self.scale,
+            rms=self._rms(r.mean**2),
+            noise=self._rms(r.se**2),
+            predicted=predicted,
+            cost=cost,
+            cost_se=float(np.sqrt(variance)),
+            **bounds,
+        )
 
     def _bounded(self, r: Repeated, sign: int) -> dict[str, float]:
         """Root mean square length [SI] by group of what repeats: the estimate, or an end of its 95 % interval."""
-        found = {}
+        bounds = {}
         for g in self.groups:
             si = np.where(np.isin(np.arange(len(self.scale)), g.channels), self.scale**2, 0.0)
             total, variance = r.energy(si)
-            total += sign * COVERAGE_FACTOR * float(np.sqrt(variance))
-            found[g.name] = float(np.sqrt(max(total, 0.0) / self.lifted.n))
-        return found
+            total += sign * self.options.coverage_factor * float(np.sqrt(variance))
+            bounds[g.name] = float(np.sqrt(max(total, 0.0) / self.lifted.n))
+        return bounds
 
     def _rms(self, squares: np.ndarray) -> dict[str, float]:
         """Root mean square length [SI] by group, from squares of scaled coefficients (n, n_y)."""
@@ -248,8 +269,10 @@ class _Job:
 
     def mismatch(self, count: int) -> float:
         """The share of a change by which the device answers otherwise, as far as the first `count` runs show it."""
-        found = self.response(count)
-        return MISMATCH if found is None else float(np.clip(np.sqrt(found.unexplained), LEAST_MISMATCH, 1.0))
+        answer, options = self.response(count), self.options
+        if answer is None:
+            return options.mismatch
+        return float(np.clip(np.sqrt(answer.unexplained), options.least_mismatch, 1.0))
 
     def response(self, count: int) -> Response | None:
         """What the changes among the first `count` runs say."""
@@ -274,8 +297,8 @@ class _Job:
 
     def most(self, now: np.ndarray) -> np.ndarray:
         """(n_u,) how far a drive may move: the first time, when it is not known what the device answers, a little."""
-        largest = np.abs(now).max(axis=0)
-        return (FIRST_STEP if len(self.runs) == 1 else 1.0) * np.maximum(largest, FIRST_STEP * largest.max())
+        largest, first_step = np.abs(now).max(axis=0), self.options.first_step
+        return (first_step if len(self.runs) == 1 else 1.0) * np.maximum(largest, first_step * largest.max())
 
     def nothing_left(self, base: int) -> str:
         """Why nothing is left to learn; empty where there is."""
@@ -284,14 +307,15 @@ class _Job:
 
     def stalled(self, base: int) -> str:
         """Why no further step is tried."""
-        return f"{MOST_STALLS} runs in a row were not better than {self.runs[base].name}, although the step was lowered"
+        most = self.options.most_stalls
+        return f"{most} runs in a row were not better than {self.runs[base].name}, although the step was lowered"
 
     def not_worth(self, base: int, u: np.ndarray) -> str:
         """Why a run under `u` is not worth running; empty where it is."""
         then, _ = self.predicted(base, u, self.mismatch(len(self.runs)))
         left, variance = self._left(base)
         now = self._rms(left**2 + variance)
-        worth = FIRST_WORTH if len(self.runs) == 1 else WORTH
+        worth = self.options.first_worth if len(self.runs) == 1 else self.options.worth
         if any(then[g] < worth * now[g] for g in now if now[g]):
             return ""
         return "no more improvement is predicted: the limits, or how well the device answers as described, leave none"

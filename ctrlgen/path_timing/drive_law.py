@@ -52,10 +52,8 @@ def sides_of(limits: tuple[Limit, ...], model: Model) -> list[Side]:
         given = [bound for bound in (limit.lower, limit.upper) if bound is not None]
         unit = (max(given) - min(given) if len(given) == 2 else abs(given[0])) or model.force_scale
         for i in range(len(limit.channels)):
-            found += [
-                Side(limit, i, upper, bound, unit)
-                for upper, bound in ((False, limit.lower), (True, limit.upper)) if bound is not None
-            ]  # fmt: skip
+            both = ((False, limit.lower), (True, limit.upper))
+            found += [Side(limit, i, upper, bound, unit) for upper, bound in both if bound is not None]
     return found
 
 
@@ -82,9 +80,12 @@ class BalancedLaw:
         v = ca.SX.sym("rate", m.n_states)
         self._sizes = (m.x.numel(), m.z.numel(), m.n_states)
         known = ExpansionPoint.of(
-            (m.x, m.rest, m.x_scale), (m.z, 0 * m.z_scale, m.z_scale), (u, 0 * m.u_scale, m.u_scale),
-            (m.heat, np.zeros(m.heat.numel()), np.ones(m.heat.numel())), (v, np.zeros(v.numel()), np.zeros(v.numel())),
-        )  # fmt: skip
+            (m.x, m.rest, m.x_scale),
+            (m.z, 0 * m.z_scale, m.z_scale),
+            (u, 0 * m.u_scale, m.u_scale),
+            (m.heat, np.zeros(m.heat.numel()), np.ones(m.heat.numel())),
+            (v, np.zeros(v.numel()), np.zeros(v.numel())),
+        )
         produced = ca.substitute(m.heat_of_drive, ca.vertcat(m.u, m.p), ca.vertcat(u, ca.DM(m.p_nominal)))
         rates, balance = (
             ca.substitute(e, ca.vertcat(m.u, m.p), ca.vertcat(u, ca.DM(m.p_nominal)))

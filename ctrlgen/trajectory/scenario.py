@@ -94,8 +94,8 @@ def check_tightened(scenario: Scenario, model: Model) -> None:
     InputError."""
     if scenario.file.robust is not None and model.probability is None:
         what = (
-            "asks for tightened limits, which ctrlgen run, solve, check and budget compute alone: leave it out of a copy of the "
-            "scenario (in Python take ctrlgen.solve, and the model of the solution)"
+            "asks for tightened limits, which solving the path computes: leave it out of a copy of the scenario (in Python take "
+            "ctrlgen.solve, and the model of the solution)"
         )
         raise InputError(scenario.path, [Fault("robust", what)])
 

@@ -46,6 +46,8 @@ COARSE = 100  # samples along a path that decide for most whether its rates can 
 SURE = 1e-4  # of a range, by which a path must break limits for the multipliers of another path to say so: they are rounded
 FOLLOWS = 1e-2  # share of a correction that a drive takes whose rate is limited, where others can
 
+Bounds = tuple[np.ndarray, np.ndarray]  # lower and upper, (n_u,) or (n_axes,)
+
 
 class Wanted(Enum):
     """Which drives are asked for."""
@@ -169,7 +171,7 @@ class RedundantInverse(PathInverse):
 
     def drives(
         self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other."""
         n, u, bounds, rates = len(f), self._closed_form(z, f), self._bounds(margin), self._rate_bounds(margin)
         out = _out(u, bounds, rates, _gaps(np.arange(n), n, closed))
@@ -228,10 +230,10 @@ class RedundantInverse(PathInverse):
             "B", [m.z], [ca.densify(ca.substitute(ca.jacobian(m.balance, m.u), m.p, ca.DM(m.p_nominal)))]
         )
 
-    def _bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    def _bounds(self, margin: float) -> Bounds:
         return _narrowed(self.model.u_bounds, margin)
 
-    def _rate_bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray] | None:
+    def _rate_bounds(self, margin: float) -> Bounds | None:
         """Of the change from one sample to the next; None where the samples do not act on one another so."""
         if isinstance(self.clock, Settled) or not self.model.rate_limits:
             return None
@@ -239,9 +241,15 @@ class RedundantInverse(PathInverse):
         return low * self.clock.sample_time, high * self.clock.sample_time
 
     def _solved(
-        self, B: np.ndarray, f: np.ndarray, begin: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
-        rates: tuple[np.ndarray, np.ndarray] | None, closed: bool, asked: Wanted,
-    ) -> np.ndarray:  # fmt: skip
+        self,
+        B: np.ndarray,
+        f: np.ndarray,
+        begin: np.ndarray,
+        bounds: Bounds,
+        rates: Bounds | None,
+        closed: bool,
+        asked: Wanted,
+    ) -> np.ndarray:
         """The programme of the module's text, begun at the closed form; where no drives keep the limits, or not those of least
         effort are `asked` for, those that break them least, or where the answer is no, perhaps the closed form."""
         m, n, n_u = self.model, len(f), self.model.u.numel()
@@ -267,8 +275,8 @@ class RedundantInverse(PathInverse):
         return polished(u, shares, f, (bounds[0] / span, bounds[1] / span), span)
 
     def _coarse(
-        self, B: np.ndarray, f: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], rates: tuple[np.ndarray, np.ndarray], gaps: np.ndarray
-    ) -> np.ndarray | None:  # fmt: skip
+        self, B: np.ndarray, f: np.ndarray, bounds: Bounds, rates: Bounds, gaps: np.ndarray
+    ) -> np.ndarray | None:
         """Drives of few samples, `gaps` apart, farthest inside of the limits; None where these show that none keep them."""
         span = 1 / np.sqrt(effort_weights(self.model) / self.model.drive_weights)
         shares = B * span
@@ -287,9 +295,15 @@ class RedundantInverse(PathInverse):
         return []
 
     def _joined(
-        self, k: np.ndarray, coarse: np.ndarray, B: np.ndarray, f: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
-        rates: tuple[np.ndarray, np.ndarray], closed: bool,
-    ) -> np.ndarray | None:  # fmt: skip
+        self,
+        k: np.ndarray,
+        coarse: np.ndarray,
+        B: np.ndarray,
+        f: np.ndarray,
+        bounds: Bounds,
+        rates: Bounds,
+        closed: bool,
+    ) -> np.ndarray | None:
         """The drives `coarse` of the samples `k` joined by lines in time and corrected to the forces `f`; None where they break limits."""
         n, span = len(f), 1 / np.sqrt(effort_weights(self.model) / self.model.drive_weights)
         at = np.arange(n)
@@ -307,9 +321,7 @@ def _gaps(k: np.ndarray, n: int, closed: bool) -> np.ndarray:
     return np.append(np.diff(k), n - k[-1] + k[0]) if closed else np.diff(k)
 
 
-def _out(
-    u: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], rates: tuple[np.ndarray, np.ndarray] | None, gaps: np.ndarray
-) -> np.ndarray:
+def _out(u: np.ndarray, bounds: Bounds, rates: Bounds | None, gaps: np.ndarray) -> np.ndarray:
     """(n,) whether drives break their bounds; where they, or the `rates` over their `gaps`, break any limit, all do: one acts on the
     others."""
     out = np.any((u < bounds[0]) | (u > bounds[1]), axis=1)
@@ -324,7 +336,7 @@ def _with_drives(needed: InverseTrajectory, u: np.ndarray) -> InverseTrajectory:
     return replace(needed, u=u, u_start=u[-1]) if needed.closed else replace(needed, u=u[1:], u_start=u[0])
 
 
-def _narrowed(bounds: tuple[np.ndarray, np.ndarray], margin: float) -> tuple[np.ndarray, np.ndarray]:
+def _narrowed(bounds: Bounds, margin: float) -> Bounds:
     """Bounds moved inward by a share of the range, or of the bound where there is one."""
     low, high = bounds
     both = np.isfinite(high - low)
