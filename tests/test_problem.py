@@ -30,7 +30,7 @@ def test_equilibria_have_no_sample_time():
 def test_samples_in_time_have_one():
     problem = bound("circle20")
     assert problem.clock == Sampled(1e-3) == in_time(problem.clock) and problem.closed
-    assert problem.clock.times(3) == pytest.approx([0, 1e-3, 2e-3]) and problem.clock.moment(3) == " at 3 ms"
+    assert problem.clock.times(3) == pytest.approx([0, 1e-3, 2e-3]) and problem.clock.moment(3) == " at 0.003 s"
 
 
 def test_a_motion_has_as_many_derivatives_as_the_drive_follows_none_in_balance():

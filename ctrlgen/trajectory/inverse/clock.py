@@ -33,7 +33,7 @@ class Sampled:
         return np.arange(n) * self.sample_time
 
     def moment(self, k: int) -> str:
-        """The time of a sample, for a message: ' at 3 ms'."""
+        """The time of a sample, for a message: ' at 0.003 s'."""
         return f" at {show(k * self.sample_time, 's')}"
 
 
