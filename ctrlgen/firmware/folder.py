@@ -75,7 +75,7 @@ def generate(
     played = solution if scenario.sample_time else None
     problem = scenario.bind(model)
     command = problem.samples if solution is None else solution.command
-    targets = problem.targets if model.inertial else command
+    targets = problem.targets
     names = {
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }

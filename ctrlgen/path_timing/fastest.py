@@ -111,10 +111,10 @@ def fastest(
         raise InputError(model.name, [Fault("effect", what)])
     if faults := count_faults(model, scenario.file.follow):
         raise InputError(scenario.path, faults)
-    if model.redundant and not model.inertial:
-        what = f"has {model.u.numel()} drives for {len(model.axes)} axes and no inertia, for which the fastest path is not computed"
-        raise InputError(model.name, [Fault("device", what)])
     if not model.inertial:
+        if model.redundant:
+            what = f"has {model.u.numel()} drives for {len(model.axes)} axes and no inertia, for which the fastest path is not computed"
+            raise InputError(model.name, [Fault("device", what)])
         _check_held(scenario, model)
     followed = Followed.of(curve, model, rate)
     optimiser = Optimiser(followed.inverse.without_memories.model, scenario.file.follow, followed.sample_time)

@@ -40,7 +40,7 @@ def solve_nominal(scenario: Scenario, model: Model, progress: Progress) -> Solut
     if scenario.file.feedforward == "static":
         return _led_statically(scenario, problem, progress)
     needed = check_feasible(problem)
-    if model.inertial:
+    if problem.order:
         return _held(scenario, problem, progress)
     if model.redundant:
         return _exact(scenario, problem, needed)
@@ -180,7 +180,7 @@ def unlimited(scenario: Scenario, model: Model) -> Solution:
     problem = scenario.bind(model)
     motion = problem.motion
     needed = problem.inverse.held(motion)
-    if model.inertial:
+    if motion.order:
         samples, u = _driven(problem, needed, needed.u), needed.u
         return Solution(scenario, model, motion.position, samples, u, (), needed.iterations, ())
     if not needed.exact:

@@ -64,13 +64,14 @@ class PathProblem:
     def in_balance(self) -> PathProblem:
         """The same samples for the device as if it stood in balance: what the path leaves open is written out as inertia has it. Raises
         InputError for a device without inertia, and one whose static drive depends on the motion."""
-        if not self.model.inertial or isinstance(self.clock, Settled):
+        if not self.order:
+            what = "is static, but the device has no inertia"
+        elif isinstance(self.clock, Settled):
             what = "is of motions: give sample_rate and duration"
-            if not self.model.inertial:
-                what = "is static, but the device has no inertia"
-            raise InputError(self.source, [Fault("feedforward", f"{what}; leave it out")])
-        given = {"path": self._path} | self._shaping_as_given()
-        return replace(self, file=self.file.model_copy(update=given), model=quasi_static(self.model))
+        else:
+            given = {"path": self._path} | self._shaping_as_given()
+            return replace(self, file=self.file.model_copy(update=given), model=quasi_static(self.model))
+        raise InputError(self.source, [Fault("feedforward", f"{what}; leave it out")])
 
     @cached_property
     def inverse(self) -> PathInverse:
@@ -99,7 +100,7 @@ class PathProblem:
 
     def motion_after(self, after: float) -> Motion:
         """The same so many samples `after` each sample; before it where negative."""
-        if not self.model.inertial:
+        if not self.order:
             return Motion.of_samples(self.positions(after) if after else self.samples, self.closed)
         if not isinstance(self.clock, Sampled):
             what = f'is missing: {self.model.name} has inertia, what it needs depends on time; write sample_rate = "1 kHz" and duration'
@@ -118,7 +119,7 @@ class PathProblem:
     def targets(self) -> np.ndarray:
         """(n, channels * (order + 1)) what the online controller is given: with inertia position, then derivatives, at the middle of the
         time for which each drive is held; in balance the samples."""
-        motion = self.motion_after(0.5) if self.model.inertial else self.motion
+        motion = self.motion_after(0.5) if self.order else self.motion
         return np.hstack([motion.position, *motion.derivatives])
 
     def positions(self, after: float) -> np.ndarray:
@@ -168,10 +169,10 @@ class PathProblem:
             ratio = 0.0 if given.damping_ratio is None else given.damping_ratio.si
             return make_shaper(given.kind, given.frequency.si, ratio)
         end = self._on_path(lambda path, frame, n: path.samples(frame, n))[-1]
-        mode = least_damped_mode(self.model, self.follow, tuple(end)) if self.model.inertial else None
+        mode = least_damped_mode(self.model, self.follow, tuple(end)) if self.order else None
         if mode is None:
             name = self.model.name
-            why = "no mode that vibrates" if self.model.inertial else "no inertia, so that no mode vibrates"
+            why = "no mode that vibrates" if self.order else "no inertia, so that no mode vibrates"
             what = f'is missing: the model of {name} has {why}; write that of the device, frequency = "100 Hz", or leave out shaping'
             raise InputError(self.source, [Fault("shaping.frequency", what)])
         ratio = mode[1] if given.damping_ratio is None else given.damping_ratio.si

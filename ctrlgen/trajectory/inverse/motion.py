@@ -21,6 +21,11 @@ class Motion:
         """The samples (n, channels) alone."""
         return cls(position, np.zeros((0, *position.shape)), closed)
 
+    @property
+    def order(self) -> int:
+        """How many derivatives it has."""
+        return len(self.derivatives)
+
     def __len__(self) -> int:
         return len(self.position)
 
