@@ -54,9 +54,9 @@ def _check_scenario(file: Path) -> None:
     try:
         if scenario.file.robust is not None:
             from ctrlgen.budget.robust import solve
-            from ctrlgen.verification.scenario_report import robust_sentence
+            from ctrlgen.verification.summary import robust_sentence
 
-            out.print(str(robust_sentence(solve(scenario, model))), markup=False, soft_wrap=True)
+            out.print(robust_sentence(solve(scenario, model)), markup=False, soft_wrap=True)
             return
         if scenario.file.feedforward == "static":
             _, needed = check_static(scenario, model)

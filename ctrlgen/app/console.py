@@ -43,7 +43,7 @@ def print_shaper(scenario: Scenario, model: Model) -> None:
 
 def print_solution(outcome: pipeline.Outcome) -> None:
     """Title, tracking error, margins and expectations."""
-    from ctrlgen.verification.scenario_report import robust_sentence
+    from ctrlgen.verification.summary import robust_sentence
 
     solution = outcome.solution
     scenario = solution.scenario
@@ -61,9 +61,9 @@ def print_solution(outcome: pipeline.Outcome) -> None:
             signal.channels, signal.units, error, solution.between_samples, strict=True
         ):
             out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
-    if (sentence := robust_sentence(solution)) is not None:
+    if sentence := robust_sentence(solution):
         out.print(sentence, markup=False, soft_wrap=True)
-    robust: tuple[Column, ...] = (("reserved", "right"),) if sentence is not None else ()
+    robust: tuple[Column, ...] = (("reserved", "right"),) if sentence else ()
     table = table_of(
         ("limit", "left"),
         ("closest at", "left"),
@@ -94,8 +94,6 @@ def print_solution(outcome: pipeline.Outcome) -> None:
 
 def print_comparison(outcome: pipeline.Outcome) -> None:
     """One line per arithmetic and comparison."""
-    from ctrlgen.verification.scenario_report import worst_rows
-
     if outcome.comparison is None or outcome.c is None:
         return
     comparison, c = outcome.comparison, outcome.c
@@ -105,20 +103,13 @@ def print_comparison(outcome: pipeline.Outcome) -> None:
     for missing in comparison.missing:
         out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
     table = table_of(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
-    for row in worst_rows(comparison):
-        if row["passed"] and row["what"].endswith("CasADi"):
+    for row in comparison.worst:
+        if row.passed and row.what.is_controller:
             continue
-        unit = "" if row["unit"] == "1" else f" {row['unit']}"
-        verdict = (
-            "[green]ok[/green]" if row["passed"] else f"[red]OUT from sample {row['first']} ({row['build']})[/red]"
-        )
-        table.add_row(
-            row["real"],
-            f"{row['what']}, {row['signal']}",
-            f"{row['worst']:.2g}{unit}",
-            f"{row['limit']:.2g}{unit}",
-            verdict,
-        )
+        unit = "" if row.unit == "1" else f" {row.unit}"
+        verdict = "[green]ok[/green]" if row.passed else f"[red]OUT from sample {row.first} ({row.build})[/red]"
+        numbers = (f"{value:.2g}{unit}" for value in (row.worst, row.limit))
+        table.add_row(row.build.real.value, f"{row.what}, {row.signal}", *numbers, verdict)
     show_table(table)
     good = sum(row.passed for row in comparison.rows)
     out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
@@ -143,15 +134,15 @@ def print_build(build: Build) -> None:
             counts = ("-" if most[kind] is None else str(most[kind]) for kind in SHOWN_COSTS)
             sizes = (f"{size} B" for size in (run.stack, run.code, run.tables))
             verdict = "[green]equal bits[/green]" if run.passed else "[red]FAILED[/red]"
-            table.add_row(f"{run.core} {run.real.value}, {run.compiler.split()[0]}", *counts, *sizes, verdict)
+            table.add_row(run.short_name, *counts, *sizes, verdict)
         show_table(table)
     colours = {"passed": "green", "failed": "red", "not run": "yellow"}
     table = table_of(("check", "left"), ("", "left"))
     for check in build.checks:
         table.add_row(escape(check.tool), f"[{colours[check.state]}]{check.state}[/{colours[check.state]}]")
     show_table(table)
-    for what, remedy in build.not_run:
-        out.print(f"not run: {what}: {remedy}", style="yellow", markup=False, soft_wrap=True)
+    for row in build.not_run:
+        out.print(f"not run: {row.what}: {row.remedy}", style="yellow", markup=False, soft_wrap=True)
     for line in build.failures:
         out.print(f"failed: {line}", style="red", markup=False, soft_wrap=True)
 

@@ -31,7 +31,6 @@ from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.solution_plots import draw_all, draw_workspace
 from ctrlgen.trajectory.workspace import Ball, Workspace
-from ctrlgen.verification import scenario_report as report
 from ctrlgen.verification.build_page import write_build
 from ctrlgen.verification.build_record import Build
 from ctrlgen.verification.comparison import Comparison, compare
@@ -40,6 +39,8 @@ from ctrlgen.verification.in_loop import run_in_loop
 from ctrlgen.verification.qemu import check_on_boards
 from ctrlgen.verification.reference import ReferenceAnswers
 from ctrlgen.verification.rules import check_rules
+from ctrlgen.verification.scenario_report import write_report
+from ctrlgen.verification.summary import passed
 from ctrlgen.verification.tracking import tracking_errors
 
 Progress = Callable[[str], None]
@@ -59,7 +60,7 @@ class Outcome:
     @property
     def passed(self) -> bool:
         """Whether every expectation and every comparison that was made is within tolerance."""
-        return report.passed(self.comparison, self.expected)
+        return passed(self.comparison, self.expected)
 
 
 def quiet(_: str) -> None:
@@ -93,7 +94,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
         c = generate(solution.scenario, solution.model, draft / "c", solution, drawn)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
         progress("report")
-        report.write_report(draft, solution, comparison, expected, c, drawn, budget_section(solution))
+        write_report(draft, solution, comparison, expected, c, drawn, budget_section(solution))
         return Outcome(solution, c, comparison, expected)
 
 
@@ -136,7 +137,7 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("report")
-        report.write_report(draft, solution, None, expected, None, draw_all(solution), budget_section(solution))
+        write_report(draft, solution, None, expected, None, draw_all(solution), budget_section(solution))
         return Outcome(solution, None, None, expected)
 
 

@@ -13,7 +13,8 @@ from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
 from ctrlgen.learning.learning_schema import LearningRecord
 from ctrlgen.path_timing.fastest_schema import FastestRecord
 from ctrlgen.reporting.result_file import SCHEMAS, schema_text
-from ctrlgen.verification.summary_schema import BuildRecord, Summary
+from ctrlgen.verification.build_record import BuildRecord
+from ctrlgen.verification.summary import Summary
 
 RESULTS: dict[str, type[BaseModel]] = {
     "budget": BudgetRecord,

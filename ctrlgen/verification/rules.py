@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ from ctrlgen.firmware.c.deviations import permits
 from ctrlgen.firmware.c.misra import CPPCHECK, rule_class
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
+from ctrlgen.verification.check import LEFT_OUT, Check, ToolFinding, finished, not_run, run_tool, version_of
 
 MISRA = "cppcheck --addon=misra"
 AT_ONCE = 2  # tools running side by side
@@ -97,7 +97,7 @@ def _misra(folder: CFolder) -> Check:
     version = version_of("cppcheck")
     if version is None:
         return not_run(tool, subjects, "cppcheck is missing; apt-get install cppcheck")
-    findings: list[CheckFinding] = []
+    findings: list[ToolFinding] = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:  # what one run has analysed the next takes over
         words = [
             "cppcheck", f"-j{AT_ONCE}", f"--cppcheck-build-dir={scratch}", "--addon=misra", "--std=c99", "-U__cplusplus", "--quiet",
@@ -124,12 +124,12 @@ def _misra(folder: CFolder) -> Check:
     return finished(tool, version, subjects, findings, note)
 
 
-def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> CheckFinding:
-    name = Path(file).name
-    if not rule.startswith("misra-c2012-"):
-        return CheckFinding(name, int(line), rule, severity, text)
-    number = rule.removeprefix("misra-c2012-")
-    return CheckFinding(name, int(line), rule, rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name))
+def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> ToolFinding:
+    name, permitted = Path(file).name, False
+    if rule.startswith("misra-c2012-"):
+        number = rule.removeprefix("misra-c2012-")
+        severity, text, permitted = rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name)
+    return ToolFinding(file=name, line=int(line), rule=rule, severity=severity, text=text, permitted=permitted)
 
 
 def run_analyzer(analyzer: Analyzer, folder: CFolder) -> Check:
@@ -139,12 +139,19 @@ def run_analyzer(analyzer: Analyzer, folder: CFolder) -> Check:
         return not_run(analyzer.tool, subjects, f"{analyzer.program} is missing; {analyzer.install}")
     files = [path for path, _ in _files(folder)]
 
-    def run(path: Path) -> tuple[list[CheckFinding], str]:
+    def run(path: Path) -> tuple[list[ToolFinding], str]:
         include = ("-I", str(folder.path))
         words = [analyzer.program, *analyzer.words, *(() if analyzer.after else include), str(path)]
         done = run_tool([*words, *((*analyzer.after, *include) if analyzer.after else ())], cwd=folder.path)
         found = [
-            CheckFinding(Path(m["file"]).name, int(m["line"]), m["rule"] or m["severity"], m["severity"], m["text"])
+            ToolFinding(
+                file=Path(m["file"]).name,
+                line=int(m["line"]),
+                rule=m["rule"] or m["severity"],
+                severity=m["severity"],
+                text=m["text"],
+                permitted=False,
+            )
             for m in REMARK.finditer(done.stdout + "\n" + done.stderr)
         ]
         return found, "" if done.returncode == 0 or found else (done.stderr or done.stdout).strip()[:500]
@@ -162,8 +169,4 @@ def run_analyzer(analyzer: Analyzer, folder: CFolder) -> Check:
     silent = [words for _, words in results if words]
     if silent:
         return not_run(analyzer.tool, subjects, f"{analyzer.program} stopped: {silent[0]}; {analyzer.install}", version)
-    return finished(analyzer.tool, version, subjects, _flat([found for found, _ in results]))
-
-
-def _flat(rows: Sequence[list[CheckFinding]]) -> list[CheckFinding]:
-    return [finding for row in rows for finding in row]
+    return finished(analyzer.tool, version, subjects, [finding for found, _ in results for finding in found])
