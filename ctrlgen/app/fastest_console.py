@@ -16,7 +16,8 @@ SHOWN = 12  # limits
 
 def print_fastest(found: FastestPath) -> None:
     """The motions compared, the limits that bind, and what a frequency allows."""
-    from ctrlgen.path_timing.fastest_page import between_text, bound_text, motions, repetition_sentence, runs_text
+    from ctrlgen.path_timing.fastest_page import between_text, motions, repetition_sentence, runs_text
+    from ctrlgen.path_timing.fastest_plots import bound_text
 
     out.print(f"[bold]fastest motion: {escape(found.scenario.file.title)}[/bold]", soft_wrap=True)
     closed = found.curve.closed

@@ -19,6 +19,7 @@ from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.comparison import Comparison
 from ctrlgen.verification.summary import summary
 
+CONTRIBUTORS = 8  # of the error budget, in the report
 CSV_SIGNALS = ("pose", "displacement", "force", "state", "power")
 
 
@@ -73,7 +74,8 @@ def write_report(
         rows=comparison.worst if comparison else (),
         source=solution.model.device.source,
         device_title=solution.model.device.title,
-        budget=None if budget is None else budget.shown(),
+        budget=budget,
+        contributors=CONTRIBUTORS,
         sourced=[(path, q.text, q.source or "") for path, q in solution.model.device.quantities()],
     )
     write_text(out / "report.html", page)
