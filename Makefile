@@ -1,5 +1,5 @@
 # make run    installs ctrlgen into .venv and solves, generates and compares the 20 um circle
-# make test   installs ctrlgen with its test tools and runs the tests (minutes); make test-long also the long ones
+# make test   installs ctrlgen with its test tools and runs the tests (minutes); make test-long runs them all (an hour)
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -10,10 +10,10 @@ run: $(VENV)/installed
 	$(BIN)/ctrlgen run scenarios/circle20 --out out/circle20
 
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not long"
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not long and not exhaustive"
 
 test-long: $(VENV)/installed-test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 # make bench    times ctrlgen against named peers in the same run (minutes); REPEAT=1 is one round
 REPEAT ?= 5

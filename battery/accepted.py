@@ -29,16 +29,18 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "stiffness": ("stiffness", "parameter@stiffness"),
     "finite_rotation": ("finite_rotation",),
 }
-FAMILIES = {  # of a memory: words in the names that are right
+# Of a memory: words in the names that are right
+FAMILIES = {
     "hysteresis": ("hysteresis", "bouc_wen", "preisach"),
     "backlash": ("backlash", "play"),
     "creep": ("creep", "thermal_lag", "second_pole"),
 }
+# Truth -> another name of the very same law and numbers
 SAME_LAW = {
     "step": "force_step",
     "frame_turn": "frame_rotation_z",
     "free_play": "backlash",
-}  # truth -> another name of the very same law and numbers
+}
 # Places that are right beside the law's own, for the same reason.
 ALSO_AT = {
     "thermal_lag": ("actuator", "stage"),
@@ -72,18 +74,44 @@ TRUTHS: dict[str, dict[tuple[str, ...], Value]] = {
     "temperature_sensitivity": {("sensitivity", "gain", "slope"): lambda t: t["amplitude"]},
     "quadratic_damping": {("c2", "coefficient", "drag", "damping"): lambda t: t["amplitude"]},
     "vibration": {("frequency",): lambda t: t["shape"]["frequency"]},
-    "step": {("amplitude", "size", "height", "force"): lambda t: t["amplitude"], ("moment", "time"): lambda t: _middle(t, ARRIVING)},
-    "lost_beams": {("share", "fraction", "lost"): lambda t: t["amplitude"], ("moment", "time"): lambda t: _middle(t, BREAKING)},
+    "step": {
+        ("amplitude", "size", "height", "force"): lambda t: t["amplitude"],
+        ("moment", "time"): lambda t: _middle(t, ARRIVING),
+    },
+    "lost_beams": {
+        ("share", "fraction", "lost"): lambda t: t["amplitude"],
+        ("moment", "time"): lambda t: _middle(t, BREAKING),
+    },
     "resonance": {("frequency",): lambda t: t["shape"]["frequency"]},
     "heat_crosstalk": {("share",): lambda t: t["amplitude"]},
     "frame_turn": {("angle",): lambda t: t["amplitude"]},
-}  # fmt: skip
-ROUGH_TRUTHS: dict[str, dict[tuple[str, ...], Value]] = TRUTHS | {  # in messy cases and with memory
+}
+# In messy cases and with memory
+ROUGH_TRUTHS: dict[str, dict[tuple[str, ...], Value]] = TRUTHS | {
     "backlash": {("gap",): lambda t: t["amplitude"]},
     "free_play": {("gap",): lambda t: t["amplitude"]},
 }
-BASE = {"": 1.0, "1": 1.0, "%": 1e-2, "m": 1.0, "s": 1.0, "Hz": 1.0, "N": 1.0, "V": 1.0, "A": 1.0, "W": 1.0, "K": 1.0, "kg": 1.0,
-        "g": 1e-3, "rad": 1.0, "deg": math.pi / 180, "degC": 1.0, "min": 60.0, "ohm": 1.0, "Pa": 1.0}  # fmt: skip
+BASE = {
+    "": 1.0,
+    "1": 1.0,
+    "%": 1e-2,
+    "m": 1.0,
+    "s": 1.0,
+    "Hz": 1.0,
+    "N": 1.0,
+    "V": 1.0,
+    "A": 1.0,
+    "W": 1.0,
+    "K": 1.0,
+    "kg": 1.0,
+    "g": 1e-3,
+    "rad": 1.0,
+    "deg": math.pi / 180,
+    "degC": 1.0,
+    "min": 60.0,
+    "ohm": 1.0,
+    "Pa": 1.0,
+}
 PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9, "p": 1e-12}
 
 

@@ -12,12 +12,13 @@ import numpy as np
 from battery.laws import simulate
 from battery.plant_axis import Array, Axis, Planted, Scene
 
+# Refitting takes these away altogether: they are a nominal number
 OWN = (
     "drive_gain",
     "sensor_gain",
     "stiffness",
     "home_offset",
-)  # refitting takes these away altogether: they are a nominal number
+)
 REFITTED = ("mass", "damping", "stiffness", "force_constant")
 
 
@@ -78,8 +79,9 @@ class Gauge(ABC):
 class Ruler(Gauge):
     """Measures laws on one record: `drive`, `start`, `ambient`, `noise` as in `simulate`."""
 
-    def __init__(self, axis: Axis, scene: Scene, drive: Array, start: float, ambient: Array | None, noise: Array,
-                 linear: bool) -> None:  # fmt: skip
+    def __init__(
+        self, axis: Axis, scene: Scene, drive: Array, start: float, ambient: Array | None, noise: Array, linear: bool
+    ) -> None:
         self.axis, self.scene = axis, scene
         self._run = lambda axis, planted=(): simulate(axis, drive, planted, scene, start, ambient, noise, linear)
         self.plain = self._run(axis)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-AREAS: dict[str, tuple[str, ...]] = {  # globs below the root of the tree
+# Globs below the root of the tree
+AREAS: dict[str, tuple[str, ...]] = {
     "model": (
         "ctrlgen/model/*.py",
         "ctrlgen/controller/*.py",

@@ -16,6 +16,8 @@ from ctrlgen.trajectory.solution_plots import draw_all
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
 DEVICES = SCENARIOS / "devices"
+# Measurements that may not be copied stand beside the repository, or nowhere: their tests are then skipped
+RECORDINGS = ROOT.parent / "shared" / "recordings"
 DEVICE, AXIS_FILE, MESO_FILE = (DEVICES / f"{name}.toml" for name in ("mems_hexapod", "flexure_axis", "meso_hexapod"))
 
 

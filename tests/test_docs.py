@@ -27,7 +27,8 @@ from ctrlgen.recordings.schema import RecordingFile
 from ctrlgen.trajectory.scenario_file import ScenarioFile
 
 DOCS = ROOT / "docs"
-IN_ORDER = {  # pages that build on files of the pages before them; the first diagnosis has a test of its own
+# Pages that build on files of the pages before them; the first diagnosis has a test of its own
+IN_ORDER = {
     "device": ["tutorial/first_device.md"],
     "mechanism": ["howto/own_mechanism.md"],
 }
@@ -138,8 +139,9 @@ def test_the_documentation_builds_without_a_warning(tmp_path):
     pytest.importorskip("sphinx", reason="the documentation's generator is not installed: pip install '.[docs]'")
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(DOCS), str(tmp_path)],
-        capture_output=True, text=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -23,9 +23,11 @@ H, N = 1e-3, 300
 AXIS = AXIS_FILE.read_text()
 LOOP = '\n[loop]\nposition_gain = "60 1/s"\nvelocity_gain = "20 V/(m/s)"\nintegral_gain = "5e4 V/(m*s)"\n'
 SHAPES = {
-    "creep": {"gain": 0.05, "tau": 0.1, "slow": 0.2}, "bouc_wen": {"stiffness": 1e4, "reach": 3e-5, "loop": 0.9},
-    "resonance": {"stiffness": 2e4, "frequency": 160.0, "damping": 0.1}, "coulomb": {"force": 0.5, "reach": 1e-6, "smoothing": 1e-3},
-}  # fmt: skip
+    "creep": {"gain": 0.05, "tau": 0.1, "slow": 0.2},
+    "bouc_wen": {"stiffness": 1e4, "reach": 3e-5, "loop": 0.9},
+    "resonance": {"stiffness": 2e4, "frequency": 160.0, "damping": 0.1},
+    "coulomb": {"force": 0.5, "reach": 1e-6, "smoothing": 1e-3},
+}
 
 
 def simulator(text, effects, linear, folder) -> tuple[Simulator, np.ndarray]:
@@ -92,9 +94,8 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
 @pytest.mark.parametrize("effects", [("creep", "bouc_wen", "resonance", "coulomb"), ("creep", "bouc_wen", "resonance")])
 def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, effects, text, size, steps, linear, worth):
     monkeypatch.setattr(integrators, "substeps", lambda *_: steps)
-    monkeypatch.setattr(
-        integrators, "VELOCITY_NEWTON_STEPS", 14
-    )  # to the end: where N is solved for, slopes of steps on the way are others
+    # To the end: where N is solved for, slopes of steps on the way are others
+    monkeypatch.setattr(integrators, "VELOCITY_NEWTON_STEPS", 14)
     monkeypatch.setattr(sample_equations, "SIMULATION", replace(SIMULATION, parametric_operations=worth))
     r, p = simulator(text, effects, linear, tmp_path)
     assert isinstance(r.equations.integrator, integrators.ImplicitRadau) == ("coulomb" in effects)

@@ -16,9 +16,8 @@ from ctrlgen.model.simulation import simulate
 TILT = '[[reading]]\nname = "tilt"\nbody = "stage"\nabout = [0, 0, 1]\n'
 EDGE = '[[reading]]\nname = "edge"\nbody = "stage"\nat = ["0 mm", "15 mm", "0 mm"]\nalong = [2, 0, 0]\n'
 
-TURNING = PARALLELOGRAM.replace(
-    'at = ["0 mm", "-10 mm", "0 mm"]', 'at = ["0 mm", "0 mm", "0 mm"]'
-)  # pushed 10 mm too high
+# Pushed 10 mm too high
+TURNING = PARALLELOGRAM.replace('at = ["0 mm", "-10 mm", "0 mm"]', 'at = ["0 mm", "0 mm", "0 mm"]')
 
 
 def read(model, drive: float) -> dict[str, float]:
@@ -118,7 +117,7 @@ def test_a_sensor_may_stand_on_a_reading_and_c_is_generated_beside_it(tmp_path):
         (EDGE + "about = [0, 0, 1]\n", "give either along"),
         (EDGE + 'pattern = "leg"\n', "reading[0].pattern: 'leg' is no pattern"),
     ],
-)  # fmt: skip
+)
 def test_a_reading_that_cannot_be_is_refused(tmp_path, reading, says):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, PARALLELOGRAM + reading)

@@ -12,7 +12,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import RECORDINGS, ROOT
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
@@ -21,15 +21,14 @@ from ctrlgen.recordings.pose_errors import PoseErrors
 from ctrlgen.recordings.reader import load_recordings
 
 SCENARIOS = ROOT / "scenarios"
-DATA = ROOT.parent / "shared" / "recordings"
 
 
 def diagnosed(folder: str, name: str = "recording.toml", device: str = "device.toml"):
     """The diagnosis of one scenario; skips where its data are not on this machine."""
     model = ctrlgen.load_device(SCENARIOS / folder / device)
     path = SCENARIOS / folder / name
-    if "shared/recordings" in path.read_text() and not (DATA / folder).is_dir():
-        pytest.skip(f"{DATA / folder} is not here: its data may not be copied into this repository")
+    if "shared/recordings" in path.read_text() and not (RECORDINGS / folder).is_dir():
+        pytest.skip(f"{RECORDINGS / folder} is not here: its data may not be copied into this repository")
     return ctrlgen.diagnose(model, load_recordings([path], build_model(model)))
 
 

@@ -29,9 +29,8 @@ def slopes(sensor: chain.Sensor, distance: float, speed: float, seeds: range) ->
     return [calibrate_sensor(run, LASER.wavelength) for run in runs]
 
 
-@pytest.mark.parametrize(
-    ("name", "nm"), [("3316", 3.13), ("3317", 3.08), ("3338", 3.11), ("fibre", 3.59)]
-)  # S2 prints 3.10 for 3338
+# S2 prints 3.10 for 3338
+@pytest.mark.parametrize(("name", "nm"), [("3316", 3.13), ("3317", 3.08), ("3338", 3.11), ("fibre", 3.59)])
 def test_adc_resolution(name, nm):
     assert SENSORS[name].resolution_adc() / NM == pytest.approx(nm, abs=0.005)
 

@@ -37,8 +37,14 @@ def solved(folder, *given, **words):
 def driven(drive, more=0, start=(0.0, 0.0)):
     """(n + more + 1, 2) position and speed of the stage, the last drive held: exact for held drives."""
     A, B, *_ = cont2discrete(
-        (np.array([[0, 1], [-STIFFNESS / MASS, -DAMPING / MASS]]), np.array([[0], [FORCE / MASS]]), np.eye(2), np.zeros((2, 1))), H
-    )  # fmt: skip
+        (
+            np.array([[0, 1], [-STIFFNESS / MASS, -DAMPING / MASS]]),
+            np.array([[0], [FORCE / MASS]]),
+            np.eye(2),
+            np.zeros((2, 1)),
+        ),
+        H,
+    )
     u, y = np.append(drive, np.full(more, drive[-1])), [np.array(start)]
     for each in u:
         y.append(A @ y[-1] + B[:, 0] * each)
@@ -65,9 +71,10 @@ def impulses(kind, frequency, ratio):
     """Times and amplitudes as the paper prints them."""
     K = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2))
     amplitudes = {
-        "ZV": np.array([1, K]) / (1 + K), "ZVD": np.array([1, 2 * K, K**2]) / (1 + 2 * K + K**2),
+        "ZV": np.array([1, K]) / (1 + K),
+        "ZVD": np.array([1, 2 * K, K**2]) / (1 + 2 * K + K**2),
         "ZVDD": np.array([1, 3 * K, 3 * K**2, K**3]) / (1 + 3 * K + 3 * K**2 + K**3),
-    }[kind]  # fmt: skip
+    }[kind]
     return np.arange(len(amplitudes)) / (2 * frequency * np.sqrt(1 - ratio**2)), amplitudes
 
 
@@ -76,9 +83,8 @@ def test_a_shaped_line_leaves_no_vibration_without_inertia_feedforward(tmp_path,
     plain = vibration(solved(tmp_path), 0.0)
     assert plain > 0.3 * TRAVEL  # 4 ms are less than half a period
     shaped = solved(tmp_path, f'shaping = {{ kind = "{kind}" }}')
-    assert (
-        vibration(shaped, 0.0) < 1e-7 * plain
-    )  # what sampling the set-point at 20 kHz leaves of the smooth path's own
+    # What sampling the set-point at 20 kHz leaves of the smooth path's own
+    assert vibration(shaped, 0.0) < 1e-7 * plain
     last = impulses(kind, MODE, RATIO)[0][-1]
     assert len(shaped.drive) == 80 + np.ceil(last / H)
     assert shaped.command[-1, 0] == pytest.approx(TRAVEL, abs=1e-18)
@@ -101,9 +107,8 @@ def test_the_trace_is_what_scipy_says_of_the_drives(tmp_path):
     y = driven(solution.drive[:, 0])
     assert np.abs(solution.trace.z[:, 0] - y[: len(solution.drive), 0]).max() < 1e-15
     middle = (solution.command[1:, 0] + solution.command[:-1, 0]) / 2  # each drive fits the middle of its sample
-    assert np.allclose(
-        solution.drive[:-1, 0], STIFFNESS / FORCE * middle, rtol=0, atol=2e-4
-    )  # V, of 1: the path's bend within a sample
+    # V, of 1: the path's bend within a sample
+    assert np.allclose(solution.drive[:-1, 0], STIFFNESS / FORCE * middle, rtol=0, atol=2e-4)
 
 
 def test_a_periodic_motion_without_inertia_feedforward_is_that_of_the_transfer_function(tmp_path):
@@ -140,21 +145,42 @@ def tilting(model):
 
 def test_with_inertia_feedforward_a_shaped_path_is_followed_exactly(tmp_path):
     solution = solved(tmp_path, 'shaping = { kind = "ZVD" }', "inertia")
-    assert (
-        np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 100e-6
-    )  # the goal for devices with inertia
+    # The goal for devices with inertia
+    assert np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 100e-6
     assert vibration(solution, 0.0) < 1e-6 * TRAVEL
 
 
 @pytest.mark.parametrize(
     ("words", "what"),
     [
-        ({"shaping": 'shaping = { kind = "ZV" }', "path": 'kind = "circle"\ndiameter = "8 mrad"\nplane = ["theta_x", "theta_y"]\n',
-          "device": AXIS.parent / "tripod.toml"}, "periodic: write from_rest"),
-        ({"shaping": 'shaping = { kind = "ZV" }', "feedforward": "inertia", "path": 'kind = "line"\nend = { delta_z = "10 um" }\n',
-          "device": AXIS.parent / "mems_hexapod.toml", "rate": "1 kHz", "duration": "0.5 s"}, "no inertia, so that no mode vibrates"),
-        ({"path": 'kind = "line"\nend = { delta_z = "10 um" }\n', "device": AXIS.parent / "mems_hexapod.toml", "rate": "1 kHz",
-          "duration": "0.5 s"}, "the device has no inertia; leave it out"),
+        (
+            {
+                "shaping": 'shaping = { kind = "ZV" }',
+                "path": 'kind = "circle"\ndiameter = "8 mrad"\nplane = ["theta_x", "theta_y"]\n',
+                "device": AXIS.parent / "tripod.toml",
+            },
+            "periodic: write from_rest",
+        ),
+        (
+            {
+                "shaping": 'shaping = { kind = "ZV" }',
+                "feedforward": "inertia",
+                "path": 'kind = "line"\nend = { delta_z = "10 um" }\n',
+                "device": AXIS.parent / "mems_hexapod.toml",
+                "rate": "1 kHz",
+                "duration": "0.5 s",
+            },
+            "no inertia, so that no mode vibrates",
+        ),
+        (
+            {
+                "path": 'kind = "line"\nend = { delta_z = "10 um" }\n',
+                "device": AXIS.parent / "mems_hexapod.toml",
+                "rate": "1 kHz",
+                "duration": "0.5 s",
+            },
+            "the device has no inertia; leave it out",
+        ),
         ({"shaping": 'shaping = { kind = "zv" }'}, "ZVD"),
         ({"shaping": 'shaping = { kind = "ZV", frequency = "-3 Hz" }'}, "frequency"),
         ({"shaping": 'shaping = { kind = "ZV", damping_ratio = "120 %" }'}, "damping_ratio"),
@@ -162,7 +188,7 @@ def test_with_inertia_feedforward_a_shaped_path_is_followed_exactly(tmp_path):
         ({"shaping": 'shaping = { kind = "ZV", frequency = "1 mHz" }'}, "1e\\+07 samples longer, but at most 1000000"),
         ({"shaping": 'shaping = { kind = "ZV", frequency = "11 kHz" }'}, "above half the sample_rate, 10000 Hz"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_shaped_is_a_fault(tmp_path, words, what):
     with pytest.raises(InputError, match=what):
         solved(tmp_path, **words)
@@ -171,11 +197,20 @@ def test_what_cannot_be_shaped_is_a_fault(tmp_path, words, what):
 @pytest.mark.parametrize(
     ("more", "what"),
     [
-        ('[[effect]]\nkind = "thermal_lag"\nat = "axis"\nshare = "0.2"\ntau = "0.01 s"\nsecond = "0.3"\n', "effects with memories,"),
-        ('[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\n', "a feedback loop"),
-        ('[[effect]]\nkind = "coulomb"\nat = "axis"\nforce = "1 N"\nreach = "0.1 um"\nsmoothing = "1 um/s"\n', "and dry friction"),
+        (
+            '[[effect]]\nkind = "thermal_lag"\nat = "axis"\nshare = "0.2"\ntau = "0.01 s"\nsecond = "0.3"\n',
+            "effects with memories,",
+        ),
+        (
+            '[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\n',
+            "a feedback loop",
+        ),
+        (
+            '[[effect]]\nkind = "coulomb"\nat = "axis"\nforce = "1 N"\nreach = "0.1 um"\nsmoothing = "1 um/s"\n',
+            "and dry friction",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_drive_that_depends_on_the_motion_is_not_static(tmp_path, more, what):
     (tmp_path / "device.toml").write_text(AXIS.read_text() + more)
     with pytest.raises(InputError, match=f"feedforward: is static, but .*{what}"):

@@ -37,9 +37,24 @@ from ctrlgen.verification.tracking import Piece
 pytestmark = pytest.mark.long
 
 KEYS = {
-    "scenario", "inputs", "passed", "failures", "not_run", "interface", "budgets", "errors_along_the_trajectory", "targets",
-    "stopped", "checks", "comparison", "compilers", "margins", "expected", "c", "program",
-}  # fmt: skip
+    "scenario",
+    "inputs",
+    "passed",
+    "failures",
+    "not_run",
+    "interface",
+    "budgets",
+    "errors_along_the_trajectory",
+    "targets",
+    "stopped",
+    "checks",
+    "comparison",
+    "compilers",
+    "margins",
+    "expected",
+    "c",
+    "program",
+}
 TOOLS = {
     "cppcheck --addon=misra",
     "clang-tidy",
