@@ -72,8 +72,8 @@ def _check_scenario(file: Path) -> None:
     unsettled = "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
     if model.inertial:
         unsettled = "no drive was found in the first place: solve it to know why"
-    found = "the path can be followed within every limit" if needed.exact else unsettled
-    out.print(found, markup=False, soft_wrap=True)
+    verdict = "the path can be followed within every limit" if needed.exact else unsettled
+    out.print(verdict, markup=False, soft_wrap=True)
 
 
 def _check_device(file: Path, figure: Path | None) -> None:

@@ -223,33 +223,33 @@ def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSumma
     ranges = [workspace.ranges(base) for base in bases]
     middle = bases[len(bases) // 2]
     balls = workspace.ball(middle, workspace.translations), workspace.ball(middle, tuple(range(len(signal.channels))))
-    found = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
+    summary = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
     with whole_folder(out) as draft:
         with plt.rc_context(STYLE):
             write_text(draft / "workspace.svg", svg(draw_workspace(workspace, bases, balls[0])))
-        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(found), indent=1) + "\n")
-    return found
+        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(summary), indent=1) + "\n")
+    return summary
 
 
-def _workspace_numbers(found: WorkspaceSummary) -> dict[str, Any]:
+def _workspace_numbers(summary: WorkspaceSummary) -> dict[str, Any]:
     """The numbers of workspace.json, in the reader's units."""
-    signal = found.workspace.model.signals["pose"]
+    signal = summary.workspace.model.signals["pose"]
     named = list(zip(signal.channels, signal.units, strict=True))
 
     def row(values: np.ndarray) -> dict[str, Any]:
         return {f"{c} [{u}]": np.asarray(from_si(values[i], u)).tolist() for i, (c, u) in enumerate(named)}
 
     return {
-        "device": found.workspace.model.name,
-        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(found.bases, found.ranges, strict=True)],
-        "anywhere": row(found.extent),
+        "device": summary.workspace.model.name,
+        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(summary.bases, summary.ranges, strict=True)],
+        "anywhere": row(summary.extent),
         "largest_ball": [
             {
                 "channels": [signal.channels[i] for i in ball.channels],
                 "centre": row(ball.centre),
                 "radius_in_typical_sizes": ball.radius,
             }
-            for ball in (found.translations, found.everything)
+            for ball in (summary.translations, summary.everything)
         ],
         "typical_sizes": row(np.array(signal.scale)),
     }

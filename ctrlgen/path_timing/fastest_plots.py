@@ -31,25 +31,25 @@ def _name_of(binding: Binding) -> str:
     return label if channel in label.split() else f"{label} {channel}"
 
 
-def draw_fastest(found: FastestPath) -> dict[str, str]:
+def draw_fastest(motion: FastestPath) -> dict[str, str]:
     """Path and speed, the limits that bind, the drives: name -> SVG text."""
     with plt.rc_context(STYLE):
         return {
-            "path": svg(_draw_path(found)),
-            **({"binding": svg(_draw_binding(found))} if found.bindings else {}),
-            "drives": svg(_draw_drives(found)),
+            "path": svg(_draw_path(motion)),
+            **({"binding": svg(_draw_binding(motion))} if motion.bindings else {}),
+            "drives": svg(_draw_drives(motion)),
         }
 
 
-def _colours(found: FastestPath) -> list[tuple[Binding, str]]:
+def _colours(motion: FastestPath) -> list[tuple[Binding, str]]:
     """A colour for each limit that binds."""
-    return [(b, COLOURS[k % len(COLOURS)]) for k, b in enumerate(found.bindings[:SHOWN])]
+    return [(b, COLOURS[k % len(COLOURS)]) for k, b in enumerate(motion.bindings[:SHOWN])]
 
 
-def _draw_path(found: FastestPath) -> Figure:
+def _draw_path(motion: FastestPath) -> Figure:
     """Left the path with its set-points, right the speed along it; coloured by the limit that binds."""
-    signal = found.solution.model.signals[found.scenario.file.follow]
-    spread = np.ptp(found.solution.command, axis=0) / np.array(signal.scale)
+    signal = motion.solution.model.signals[motion.scenario.file.follow]
+    spread = np.ptp(motion.solution.command, axis=0) / np.array(signal.scale)
     main = int(spread.argmax())
     alike = [i for i, u in enumerate(signal.units) if same_dimension(u, signal.units[main])]
     columns = sorted(sorted(alike, key=lambda i: -spread[i])[:2])
@@ -58,15 +58,15 @@ def _draw_path(found: FastestPath) -> Figure:
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.9), width_ratios=(1, 1.25))
 
     def at(share: np.ndarray) -> list[np.ndarray]:
-        values = found.curve.samples(share)
+        values = motion.curve.samples(share)
         shown = [np.asarray(from_si(values[:, i], signal.units[i])) for i in columns]
         return [100 * share, *shown] if len(shown) == 1 else shown
 
     left.plot(*at(np.linspace(0, 1, 2001)), color=UNBOUND, lw=1)
-    for binding, colour in reversed(_colours(found)):
+    for binding, colour in reversed(_colours(motion)):
         for a, b in binding.runs:
             left.plot(*at(np.linspace(a, b, 200)), color=colour, lw=2.2, solid_capstyle="butt")
-    left.plot(*at(found.share), ".", ms=3 if len(found.share) <= MARKED else 0.8, color="#333333")
+    left.plot(*at(motion.share), ".", ms=3 if len(motion.share) <= MARKED else 0.8, color="#333333")
     names = [f"{signal.channels[i]} [{signal.units[i]}]" for i in columns]
     if len(names) == 1:
         names = ["share of the path [%]", *names]
@@ -75,19 +75,19 @@ def _draw_path(found: FastestPath) -> Figure:
     left.set_xlabel(names[0])
     left.set_ylabel(names[1])
     left.set_title("set-points, and which limit binds", fontsize=8)
-    _draw_speed(right, found, alike, signal.units[main])
+    _draw_speed(right, motion, alike, signal.units[main])
     return figure
 
 
-def _draw_speed(axes: Axes, found: FastestPath, alike: list[int], unit: str) -> None:
+def _draw_speed(axes: Axes, motion: FastestPath, alike: list[int], unit: str) -> None:
     """Over the share of the path, in the channels `alike`: the fastest law, the bound of each place, even speed."""
-    top, even = 0.0, None if found.even is None else found.curve.evenly(EVEN)
+    top, even = 0.0, None if motion.even is None else motion.curve.evenly(EVEN)
 
     def shown(at: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        slope = np.linalg.norm(found.curve.derivatives(at, 1, ends)[1][:, alike], axis=1)
+        slope = np.linalg.norm(motion.curve.derivatives(at, 1, ends)[1][:, alike], axis=1)
         return np.asarray(difference(np.where(np.isfinite(rate), rate, np.nan) * slope, unit))
 
-    for k, (ends, piece) in enumerate(zip(found.curve.pieces, found.optimum.pieces, strict=True)):
+    for k, (ends, piece) in enumerate(zip(motion.curve.pieces, motion.optimum.pieces, strict=True)):
         share, speed, bound = piece.share, piece.speed, piece.bound
 
         def labelled(text: str, first: bool = k == 0) -> str:
@@ -98,24 +98,30 @@ def _draw_speed(axes: Axes, found: FastestPath, alike: list[int], unit: str) -> 
             axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls="--", label=label)
         axes.plot(100 * share, shown(share, speed), color="#333333", lw=1, label=labelled("fastest law of time"))
         top = max(top, float(np.nanmax(shown(share, speed))))
-        for binding, colour in reversed(_colours(found)):
+        for binding, colour in reversed(_colours(motion)):
             for a, b in binding.runs:
-                own = (share >= a) & (share <= b)
-                axes.plot(100 * share[own], shown(share[own], speed[own]), color=colour, lw=2.2, solid_capstyle="butt")
-        if even is not None and found.even is not None:
-            own = (even >= ends[0]) & (even <= ends[1])
-            rate = np.gradient(even[own], found.even / (len(even) - 1))
+                inside = (share >= a) & (share <= b)
+                axes.plot(
+                    100 * share[inside],
+                    shown(share[inside], speed[inside]),
+                    color=colour,
+                    lw=2.2,
+                    solid_capstyle="butt",
+                )
+        if even is not None and motion.even is not None:
+            inside = (even >= ends[0]) & (even <= ends[1])
+            rate = np.gradient(even[inside], motion.even / (len(even) - 1))
             label = labelled("even speed, no faster")
-            axes.plot(100 * even[own], shown(even[own], rate), color="#888888", lw=1, ls=":", label=label)
+            axes.plot(100 * even[inside], shown(even[inside], rate), color="#888888", lw=1, ls=":", label=label)
     axes.set_xlabel("share of the path [%]")
     axes.set_ylabel(f"speed along the path [{unit}/s]")
     axes.set_ylim(0, ROOM * top)
     axes.legend(fontsize=8)
 
 
-def _draw_binding(found: FastestPath) -> Figure:
+def _draw_binding(motion: FastestPath) -> Figure:
     """Where along the path each limit binds."""
-    coloured = _colours(found)
+    coloured = _colours(motion)
     figure, axes = plt.subplots(figsize=(8.2, 0.7 + 0.24 * len(coloured)))
     for row, (binding, colour) in enumerate(coloured):
         axes.broken_barh([(100 * a, 100 * (b - a)) for a, b in binding.runs], (row - 0.35, 0.7), color=colour)
@@ -126,12 +132,12 @@ def _draw_binding(found: FastestPath) -> Figure:
     return figure
 
 
-def _draw_drives(found: FastestPath) -> Figure:
+def _draw_drives(motion: FastestPath) -> Figure:
     """The drives, held from sample to sample."""
-    solution = found.solution
+    solution = motion.solution
     signal = solution.model.signals["drive"]
     figure, axes = plt.subplots(figsize=(8.2, 2.8))
-    edges = np.append(solution.trace.time, solution.trace.time[-1] + found.sample_time) * 1e3
+    edges = np.append(solution.trace.time, solution.trace.time[-1] + motion.sample_time) * 1e3
     for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
         axes.stairs(
             from_si(solution.drive[:, i], unit),

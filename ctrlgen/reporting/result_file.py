@@ -88,6 +88,9 @@ class ChannelGroup(Keys):
 
 def schema_text(model: type[BaseModel], name: str) -> str:
     """The JSON Schema (draft 2020-12) of a result file as text."""
-    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema(mode="serialization")}
-    found["title"] = name
-    return json.dumps(found, indent=1) + "\n"
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **model.model_json_schema(mode="serialization"),
+    }
+    schema["title"] = name
+    return json.dumps(schema, indent=1) + "\n"

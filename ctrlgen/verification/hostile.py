@@ -84,16 +84,28 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
     bits |= ControllerStatus.RATE if controller.rate else bits
     samples = len(scenario.command(model))
     return {
-        "real": real, "online": folder.online[real], "player": folder.player.get(real) if folder.player else None,
-        "n": len(nominal.axes), "nu": nominal.u.numel(), "nx": nominal.x.numel(), "n_s": nominal.n_states,
+        "real": real,
+        "online": folder.online[real],
+        "player": folder.player.get(real) if folder.player else None,
+        "n": len(nominal.axes),
+        "nu": nominal.u.numel(),
+        "nx": nominal.x.numel(),
+        "n_s": nominal.n_states,
         "m": len(controller.input_limits),
-        "rate": scenario.sample_time is not None, "bits": int(bits),
-        "input_limits": controller.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
+        "rate": scenario.sample_time is not None,
+        "bits": int(bits),
+        "input_limits": controller.input_limits,
+        "u_low": nominal.u_bounds[0],
+        "u_high": nominal.u_bounds[1],
         # limits that follow from constants of the start are computed by the C, to a few of its roundings
         "drive_room": 4 * real.epsilon if controller.given else 0.0,
-        "u_safe": controller.safe_drive, "z_typical": nominal.z_scale, "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
-        "samples": samples, "duration": samples * (scenario.sample_time or 0.0), **rates_in_c(controller),
-    }  # fmt: skip
+        "u_safe": controller.safe_drive,
+        "z_typical": nominal.z_scale,
+        "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
+        "samples": samples,
+        "duration": samples * (scenario.sample_time or 0.0),
+        **rates_in_c(controller),
+    }
 
 
 def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
@@ -177,11 +189,11 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
             "-rss_limit_mb=0",
         ]
         done = run_tool([str(program), *words, f"-artifact_prefix={scratch}/", str(corpus)], cwd=scratch)
-        found = _findings_in(done.stderr, sources[0].name, done.returncode, judge=True)
-        findings += found
+        remarks = _findings_in(done.stderr, sources[0].name, done.returncode, judge=True)
+        findings += remarks
         ran = re.findall(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
         # what writes beyond its arrays may hang where no sanitizer stops it
-        reached = "coverage not counted" if found else _coverage(sources, folder.path, corpus)
+        reached = "coverage not counted" if remarks else _coverage(sources, folder.path, corpus)
         notes.append(f"{real.value}: {ran[-1] if ran else 'unknown'} runs, {reached}")
     return finished(tool, version or "", subjects, findings, "; ".join(notes))
 
@@ -202,7 +214,7 @@ def _coverage(sources: Sequence[Path], include: Path, corpus: Path) -> str:
 
 def _findings_in(words: str, harness: str, status: int, *, judge: bool) -> list[ToolFinding]:
     """The findings in the output of a sanitized program; one that fails without a message is a finding too."""
-    found = [
+    remarks = [
         ToolFinding(
             file=Path(m["file"]).name,
             line=int(m["line"]),
@@ -213,11 +225,11 @@ def _findings_in(words: str, harness: str, status: int, *, judge: bool) -> list[
         )
         for m in RUNTIME_ERROR.finditer(words)
     ]
-    found += [error_in(harness, 0, "promise", m["text"]) for m in PROMISE.finditer(words)]
-    if not found and (error := ADDRESS.search(words)):
+    remarks += [error_in(harness, 0, "promise", m["text"]) for m in PROMISE.finditer(words)]
+    if not remarks and (error := ADDRESS.search(words)):
         place = PLACE.search(words, error.end())
         file, line = (Path(place["file"]).name, int(place["line"])) if place else (harness, 0)
-        found.append(error_in(file, line, error["rule"], error["text"][:200]))
-    if not found and status != 0:
-        found.append(error_in(harness, 0, "stopped", f"status {status}: {words.strip()[-200:]}"))
-    return found
+        remarks.append(error_in(file, line, error["rule"], error["text"][:200]))
+    if not remarks and status != 0:
+        remarks.append(error_in(harness, 0, "stopped", f"status {status}: {words.strip()[-200:]}"))
+    return remarks

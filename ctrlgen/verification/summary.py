@@ -11,6 +11,7 @@ from pydantic import Field
 from ctrlgen.core.units import difference, from_si, show
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.player.compression import PlayerCandidate
 from ctrlgen.reporting.result_file import Keys, Number, Origin, origin
 from ctrlgen.trajectory.metrics import ExpectationResult, in_unit
 from ctrlgen.trajectory.solution import Margin, Solution
@@ -59,27 +60,12 @@ class ExpectedRow(Keys):
     source: str = Field(description="Where the expected value comes from.")
 
 
-class PlayerCandidate(Keys):
-    """One way in which the player's drives could be stored."""
-
-    kind: str = Field(description="Form: table, spline or Fourier series.")
-    size: str = Field(description="Its size in words.")
-    bytes: int | None = Field(description="Bytes of constant data.")
-    operations: int | None = Field(description="Operations of one call.")
-    instructions: int | None = Field(description="Instructions of one call, estimated.")
-    length: Number = Field(description="Largest position error that it causes [m].")
-    angle: Number = Field(description="Largest rotation error that it causes [rad].")
-    drive: Number = Field(description="Largest drive error, as a share of the drive's range.")
-    chosen: bool = Field(description="Whether it was generated.")
-    remark: str = Field(description="Why not, where it was not.")
-
-
 class GeneratedC(Keys):
     """Size of the generated C."""
 
     operations_per_sample: int = Field(description="Operations of one sample where no limit is active.")
     operations_worst: int = Field(description="Most operations that one sample can take.")
-    player: dict[str, list[PlayerCandidate]] = Field(description="Candidates for the player, by arithmetic.")
+    player: dict[str, tuple[PlayerCandidate, ...]] = Field(description="Candidates for the player, by arithmetic.")
 
 
 class Summary(Origin):
@@ -205,8 +191,5 @@ def _expected(e: ExpectationResult) -> ExpectedRow:
 
 
 def _generated(c: CFolder) -> GeneratedC:
-    player = {
-        real.value: [PlayerCandidate(**vars(candidate)) for candidate in held.candidates]
-        for real, held in c.compression.items()
-    }
+    player = {real.value: held.candidates for real, held in c.compression.items()}
     return GeneratedC(operations_per_sample=c.operations, operations_worst=c.worst_operations, player=player)
