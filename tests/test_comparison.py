@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import pytest
@@ -10,9 +11,27 @@ from ctrlgen import ToolError
 from ctrlgen.firmware.c import toolchains
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import generate
-from ctrlgen.verification.comparison import compare
+from ctrlgen.reporting.result_file import json_text
+from ctrlgen.verification.comparison import Comparison, compare
+from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind
+from ctrlgen.verification.host import HostBuild
 
 pytestmark = pytest.mark.long
+
+
+def entry(compiler: str, real: Real, worst: float, first: int | None = None) -> ComparisonEntry:
+    numbers = {"worst": worst, "rms": 0.0, "limit": 1.0, "samples": 9, "first": first}
+    return ComparisonEntry(
+        build=HostBuild(compiler, real), what=ComparisonKind.CURVE, signal="drive", unit="W", **numbers
+    )
+
+
+def test_the_worst_build_of_each_arithmetic_is_shown_first_one_out_of_tolerance():
+    rows = entry("gcc", Real.DOUBLE, 0.1), entry("clang", Real.DOUBLE, 0.2), entry("gcc", Real.FLOAT, 0.5)
+    failed = entry("clang", Real.FLOAT, float("nan"), 0)
+    assert Comparison(rows, {}, ()).worst == (rows[1], rows[2])
+    assert Comparison((*rows, failed), {}, ()).worst == (rows[1], failed)
+    assert json.loads(json_text(failed))["worst"] is None and not failed.passed
 
 
 @pytest.fixture

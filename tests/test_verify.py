@@ -136,14 +136,14 @@ def example(circle, tmp_path_factory) -> Build:
     """A build of six drives in which all is well."""
     c = generate(circle.scenario, circle.model, tmp_path_factory.mktemp("c"), circle)
     cost = CallCost(what=CallKind.STEP_SCENARIO, calls=10, mean=500.0, worst=601, worst_within=601)
-    run = Target(
-        core="Cortex-M4F", compiler="zig 0.13", real=Real.FLOAT, costs=(cost,), stack=256, code=1000, tables=100, writable=0,
-        numbers=500, differing=0, ulp=0, where="",
-    )  # fmt: skip
-    row = ComparisonEntry(
-        build=HostBuild("gcc", Real.DOUBLE), what=ComparisonKind.FOLLOWED, signal="drive", unit="W", worst=0.0, rms=0.0, limit=1.0,
-        samples=10, first=None,
-    )  # fmt: skip
+    sizes = {"stack": 256, "code": 1000, "tables": 100, "writable": 0}
+    same = {"numbers": 500, "differing": 0, "ulp": 0, "where": ""}
+    run = Target(core="Cortex-M4F", compiler="zig 0.13", real=Real.FLOAT, costs=(cost,), **sizes, **same)
+    build, numbers = (
+        HostBuild("gcc", Real.DOUBLE),
+        {"worst": 0.0, "rms": 0.0, "limit": 1.0, "samples": 10, "first": None},
+    )
+    row = ComparisonEntry(build=build, what=ComparisonKind.FOLLOWED, signal="drive", unit="W", **numbers)
     errors = {Piece.ONLINE: {real: np.full((5, 6), 1e-12) for real in Real}}
     check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), "passed")
     return Build(circle, c, (), Comparison((row,), {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors)

@@ -26,9 +26,8 @@ from ctrlgen.trajectory.inverse.violations import Before, violations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution, closest_margins, solve
 
-FIRST_STEP = (
-    0.2  # of the largest drive, by which the first step may change any: what the device answers is not known yet
-)
+# of the largest drive, by which the first step may change any: what the device answers is not known yet
+FIRST_STEP = 0.2
 MISMATCH = 0.1  # share of a change by which the device may answer otherwise than described, until runs have shown it
 LEAST_MISMATCH = 0.01
 WORSE = 3.0  # standard errors by which a run must be worse than the best one for the step to be lowered
