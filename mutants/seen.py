@@ -168,7 +168,7 @@ def _measured(root: Path, path: Path, folder: Path) -> dict:
     environment = os.environ | {"COVERAGE_FILE": str(data), "MUTANTS_TIMES": str(times), "PYTHONPATH": str(root)}
     rows: dict[str, dict] = {}
     data.unlink(missing_ok=True)  # of a run that was stopped
-    for marked in ("not long", "long"):
+    for marked in ("not long", "long and not exhaustive"):
         command = [
             sys.executable,
             "-m",

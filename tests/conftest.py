@@ -29,6 +29,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write codegen/golden anew instead of comparing")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What is exhaustive is long too: `-m "not long"` leaves out both."""
+    for item in items:
+        if item.get_closest_marker("exhaustive"):
+            item.add_marker("long")
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(7)
@@ -55,6 +63,12 @@ def circle():
     """The solved circle scenario."""
     scenario = load_scenario(SCENARIOS / "circle20")
     return solve(scenario, build_model(scenario.device))
+
+
+@pytest.fixture(scope="session")
+def circle_c(circle, tmp_path_factory) -> CFolder:
+    """The C of the circle; who changes a file changes one of a copy."""
+    return generate(circle.scenario, circle.model, tmp_path_factory.mktemp("circle_c"), circle)
 
 
 @pytest.fixture(scope="session")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+from dataclasses import replace
 
 import pytest
 
 from ctrlgen import ToolError
 from ctrlgen.firmware.c import toolchains
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.folder import generate
 from ctrlgen.reporting.result_file import json_text
 from ctrlgen.verification.comparison import Comparison, compare
 from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind
@@ -35,8 +36,10 @@ def test_the_worst_build_of_each_arithmetic_is_shown_first_one_out_of_tolerance(
 
 
 @pytest.fixture
-def folder(tmp_path, circle, compiler):
-    return generate(circle.scenario, circle.model, tmp_path, circle)
+def folder(tmp_path, circle_c, compiler):
+    """The circle's C, to be spoilt."""
+    shutil.copytree(circle_c.path, tmp_path, dirs_exist_ok=True)
+    return replace(circle_c, path=tmp_path)
 
 
 def spoil(folder, real: Real, kind: str, pattern: str, replacement: str) -> None:

@@ -135,7 +135,8 @@ def test_the_pages_of_settings_and_priors_hold_every_entry(monkeypatch):
     assert set(Effect.library) == set(re.findall(r"^\| `(\w+)` ", pages.priors_page(), re.MULTILINE))
 
 
-@pytest.mark.long
+# `make docs`, which .ci/run runs, does the same
+@pytest.mark.exhaustive
 def test_the_documentation_builds_without_a_warning(tmp_path):
     """Links between pages, to files and to functions included."""
     pytest.importorskip("sphinx", reason="the documentation's generator is not installed: pip install '.[docs]'")

@@ -18,7 +18,7 @@ from markupsafe import escape
 from result_files import faults
 from typer.testing import CliRunner
 
-from ctrlgen import ToolError, generate
+from ctrlgen import ToolError
 from ctrlgen.app import scenario_pipeline as pipeline
 from ctrlgen.app.commands import controllers  # noqa: F401, it registers the command
 from ctrlgen.app.commands.app import app
@@ -132,21 +132,20 @@ def test_the_same_input_gives_the_same_numbers_on_a_page_twice(example, tmp_path
 
 
 @pytest.fixture(scope="module")
-def example(circle, tmp_path_factory) -> Build:
+def example(circle, circle_c) -> Build:
     """A build of six drives in which all is well."""
-    c = generate(circle.scenario, circle.model, tmp_path_factory.mktemp("c"), circle)
     cost = CallCost(what=CallKind.STEP_SCENARIO, calls=10, mean=500.0, worst=601, worst_within=601)
     sizes = {"stack": 256, "code": 1000, "tables": 100, "writable": 0}
     same = {"numbers": 500, "differing": 0, "ulp": 0, "where": ""}
     run = Target(core="Cortex-M4F", compiler="zig 0.13", real=Real.FLOAT, costs=(cost,), **sizes, **same)
-    build, numbers = (
-        HostBuild("gcc", Real.DOUBLE),
-        {"worst": 0.0, "rms": 0.0, "limit": 1.0, "samples": 10, "first": None},
-    )
-    row = ComparisonEntry(build=build, what=ComparisonKind.FOLLOWED, signal="drive", unit="W", **numbers)
+    numbers = {"worst": 0.0, "rms": 0.0, "limit": 1.0, "samples": 10, "first": None}
+    host = HostBuild("gcc", Real.DOUBLE)
+    row = ComparisonEntry(build=host, what=ComparisonKind.FOLLOWED, signal="drive", unit="W", **numbers)
     errors = {Piece.ONLINE: {real: np.full((5, 6), 1e-12) for real in Real}}
     check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), "passed")
-    return Build(circle, c, (), Comparison((row,), {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors)
+    return Build(
+        circle, circle_c, (), Comparison((row,), {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors
+    )
 
 
 def shown(build: Build, out: Path) -> str:
@@ -251,7 +250,8 @@ def test_c_that_a_compiler_refuses_leaves_nothing_behind(stubbed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.long
+# .ci/run does this at the command line
+@pytest.mark.exhaustive
 def test_the_circle_passes_everything_that_is_there(compiler, tmp_path):
     build = pipeline.verify(SCENARIOS / "circle20", tmp_path / "out")
     assert build.passed, build.failures

@@ -64,17 +64,17 @@ def interface(solution: Solution, c: CFolder) -> Interface:
     """The arguments and results of the C, in SI, and the values that its status can have."""
     model, scenario = solution.model, solution.scenario
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
-    m = controller.nominal
+    kernels, m = controller.kernels, controller.kernels.nominal
     state, drive, rated = m.signals.get("state"), _channels(m.signals["drive"]), controller.rate is not None
     can = {
-        ControllerStatus.COMPOSITE: bool(controller.guarded_limits),
+        ControllerStatus.COMPOSITE: bool(kernels.guarded_limits),
         ControllerStatus.STATE: controller.state_can_be_limited,
         ControllerStatus.RATE: rated,
     }
     memory = [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)]
     return Interface(
         functions={real.value: _functions(c.online[real], c.player.get(real)) for real in c.online},
-        target=_channels(controller.target),
+        target=_channels(kernels.target),
         drive=drive,
         actuator_state=None if state is None else _channels(state),
         memory=[

@@ -85,7 +85,7 @@ def _status_difference(ref: ReferenceAnswers, real: Real, answer: np.ndarray, ex
     """(n, 1) of the status. In float the slack is wider: what is within it is RATE in double alone."""
     status, wanted = answer[:, 0].astype(int), expected[:, 0].astype(int)
     if real is Real.FLOAT and ref.controller.rate is not None:
-        slack, drive = ref.controller.slacks_of(FLOAT_SLACK)[2], ref.columns["drive"]
+        slack, drive = ref.controller.kernels.slacks(FLOAT_SLACK)[2], ref.columns["drive"]
         same = np.all(np.abs(answer[:, drive] - expected[:, drive]) <= slack, axis=1)
         status, wanted = (np.where(same, s & ~ControllerStatus.RATE, s) for s in (status, wanted))
     return (status - wanted)[:, None]

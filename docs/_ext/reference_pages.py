@@ -315,7 +315,7 @@ def commands_page() -> str:
     """The `--help` of every command."""
     from typer.testing import CliRunner
 
-    from ctrlgen.app import cli
+    from ctrlgen.app.commands import cli
 
     runner, environment = CliRunner(), {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
     lines = [GENERATED, "# Commands", "", *_help(runner, cli.app, [], environment)]
