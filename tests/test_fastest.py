@@ -18,6 +18,7 @@ from ctrlgen import InputError, SolverError, build_model, load_scenario, solve
 from ctrlgen.path_timing.binding import AT_BOUND, EXACTLY, bindings
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
+from ctrlgen.path_timing.fastest_plots import draw_fastest
 from ctrlgen.path_timing.optimum import Optimum, Piece
 from ctrlgen.path_timing.repetition import crossing, largest
 from ctrlgen.trajectory.frame import Frame
@@ -221,11 +222,22 @@ def test_the_set_points_are_a_scenario_that_says_the_same(circle20, tmp_path):
     )
 
 
+@pytest.fixture(scope="module")
+def raster():
+    """The fastest motion along a path with corners."""
+    return ctrlgen.fastest(SCENARIOS / "raster", sample_rate="4 kHz")
+
+
 @pytest.mark.long
-def test_corners_are_set_points():
-    found = ctrlgen.fastest(SCENARIOS / "raster", sample_rate="4 kHz")
-    corners = found.curve.samples(np.unique(np.concatenate(found.curve.pieces)))
-    off = np.abs(found.solution.command[:, None] - corners).max(axis=2).min(axis=0)
+def test_limits_that_bind_on_some_pieces_alone_are_drawn(raster):
+    assert len(raster.curve.pieces) > 1
+    assert set(draw_fastest(raster)) == {"path", "binding", "drives"}
+
+
+@pytest.mark.long
+def test_corners_are_set_points(raster):
+    corners = raster.curve.samples(np.unique(np.concatenate(raster.curve.pieces)))
+    off = np.abs(raster.solution.command[:, None] - corners).max(axis=2).min(axis=0)
     assert len(corners) == 22 and off.max() < 1e-15
 
 

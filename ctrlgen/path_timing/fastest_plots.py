@@ -101,13 +101,9 @@ def _draw_speed(axes: Axes, motion: FastestPath, alike: list[int], unit: str) ->
         for binding, colour in reversed(_colours(motion)):
             for a, b in binding.runs:
                 inside = (share >= a) & (share <= b)
-                axes.plot(
-                    100 * share[inside],
-                    shown(share[inside], speed[inside]),
-                    color=colour,
-                    lw=2.2,
-                    solid_capstyle="butt",
-                )
+                if inside.any():  # a limit may bind along another piece alone
+                    there, fast = share[inside], speed[inside]
+                    axes.plot(100 * there, shown(there, fast), color=colour, lw=2.2, solid_capstyle="butt")
         if even is not None and motion.even is not None:
             inside = (even >= ends[0]) & (even <= ends[1])
             rate = np.gradient(even[inside], motion.even / (len(even) - 1))
