@@ -26,7 +26,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.package import verify_package
 from ctrlgen.verification.build_page import write_build
 from ctrlgen.verification.build_record import BUDGETS, Build, record
-from ctrlgen.verification.check import Check, ToolFinding, not_run
+from ctrlgen.verification.check import Check, CheckState, ToolFinding, not_run
 from ctrlgen.verification.comparison import Comparison
 from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind
 from ctrlgen.verification.emulated_target import CallCost, CallKind, NotRun, StoppedTarget, Target
@@ -142,7 +142,7 @@ def example(circle, circle_c) -> Build:
     host = HostBuild("gcc", Real.DOUBLE)
     row = ComparisonEntry(build=host, what=ComparisonKind.FOLLOWED, signal="drive", unit="W", **numbers)
     errors = {Piece.ONLINE: {real: np.full((5, 6), 1e-12) for real in Real}}
-    check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), "passed")
+    check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), CheckState.PASSED)
     return Build(
         circle, circle_c, (), Comparison((row,), {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors
     )
@@ -185,7 +185,7 @@ def broken(build: Build) -> dict[str, tuple[Build, str]]:
             "gcc double: scenario, online C - CasADi, drive, is out of tolerance",
         ),
         "rule": (
-            replace(build, checks=(replace(check, state="failed", findings=(finding,)),)),
+            replace(build, checks=(replace(check, state=CheckState.FAILED, findings=(finding,)),)),
             "clang-tidy: 1 finding, first x.c:7: mandatory: MISRA C:2012 rule 13.6",
         ),
     }
@@ -231,7 +231,7 @@ def stubbed(monkeypatch, compiler):
 @pytest.mark.long
 def test_a_failing_check_gives_status_1_and_the_page_is_written(stubbed, tmp_path):
     finding = refused("a.c", 3, "advisory", "15.1")
-    failing = Check("cppcheck --addon=misra", "2.10", (), "failed", (finding,))
+    failing = Check("cppcheck --addon=misra", "2.10", (), CheckState.FAILED, (finding,))
     stubbed.setattr(pipeline, "check_rules", lambda *_, **__: (failing,))
     out = tmp_path / "out"
     done = CliRunner().invoke(app, ["verify", str(SCENARIOS / "rrr_circle"), "--out", str(out)])

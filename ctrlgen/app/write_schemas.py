@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from ctrlgen.budget.budget_record import BudgetRecord
 from ctrlgen.calibration.calibration_record import CalibrationRecord
 from ctrlgen.core.files import write_text
-from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
+from ctrlgen.diagnosis.report.diagnosis_record import DiagnosisRecord
 from ctrlgen.learning.learning_record import LearningRecord
 from ctrlgen.path_timing.fastest_record import FastestRecord
 from ctrlgen.reporting.result_file import SCHEMAS, schema_text

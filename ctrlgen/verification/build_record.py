@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PlainSerializer
 
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
@@ -16,7 +16,7 @@ from ctrlgen.reporting.result_file import Keys
 from ctrlgen.trajectory.metrics import ExpectationResult
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.c_interface import Interface, interface
-from ctrlgen.verification.check import Check, ToolFinding
+from ctrlgen.verification.check import Check, CheckState, ToolFinding
 from ctrlgen.verification.comparison import Comparison
 from ctrlgen.verification.emulated_target import NotRun, StoppedTarget, Target
 from ctrlgen.verification.hostile import SEED
@@ -43,7 +43,9 @@ class ToolCheck(Keys):
 
     tool: str = Field(description="Name of the tool.")
     version: str = Field(description="Its version; empty where it is not known.")
-    state: Literal["passed", "failed", "not run"] = Field(description="Its outcome.")
+    state: Annotated[CheckState, PlainSerializer(str, return_type=Literal["passed", "failed", "not run"])] = Field(
+        title="State", description="Its outcome."
+    )
     note: str = Field(description="Remark, or the remedy where it did not run.")
     files: list[str] = Field(description="Files that it was given.")
     permitted: int = Field(description="Findings that DEVIATIONS.md permits.")
@@ -92,14 +94,14 @@ class Build:
         ]
         rows += [f"{run.name}: {run.fault}" for run in self.in_loop.runs if run.fault]
         rows += [f"{run.name}: {run.words}" for run in self.in_loop.stopped]
-        rows += [f"{c.tool}: {_first_finding(c)}" for c in self.checks if c.state == "failed"]
+        rows += [f"{c.tool}: {_first_finding(c)}" for c in self.checks if c.state is CheckState.FAILED]
         return tuple(rows)
 
     @property
     def not_run(self) -> tuple[NotRun, ...]:
         """Everything that did not run, with why or how to make it run."""
         compilers = (NotRun(what=c, remedy=f"missing; apt-get install {c}") for c in self.comparison.missing)
-        checks = (NotRun(what=c.tool, remedy=c.note) for c in self.checks if c.state == "not run")
+        checks = (NotRun(what=c.tool, remedy=c.note) for c in self.checks if c.state is CheckState.NOT_RUN)
         return (*compilers, *self.in_loop.not_run, *checks)
 
     @property

@@ -6,7 +6,8 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from enum import StrEnum
+from typing import Any
 
 from pydantic import Field
 
@@ -16,7 +17,13 @@ from ctrlgen.reporting.result_file import Keys
 PATIENCE = 900.0  # s; a tool that takes longer is stopped
 LEFT_OUT = "not run because of --quick; run without it"
 
-State = Literal["passed", "failed", "not run"]
+
+class CheckState(StrEnum):
+    """The outcome of a check."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_RUN = "not run"
 
 
 class ToolFinding(Keys):
@@ -45,14 +52,14 @@ class Check:
     tool: str
     version: str
     subjects: tuple[tuple[str, Real], ...]
-    state: State
+    state: CheckState
     findings: tuple[ToolFinding, ...] = ()
     note: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether the tool ran and every finding is permitted."""
-        return self.state == "passed"
+        return self.state is CheckState.PASSED
 
     @property
     def refused(self) -> tuple[ToolFinding, ...]:
@@ -65,13 +72,13 @@ def finished(
 ) -> Check:
     """The check of a tool that ran; it failed where a finding is not permitted."""
     ordered = tuple(sorted(set(findings), key=lambda f: (f.file, f.line, f.rule, f.text)))
-    state: State = "passed" if all(f.permitted for f in ordered) else "failed"
+    state = CheckState.PASSED if all(f.permitted for f in ordered) else CheckState.FAILED
     return Check(tool, version, tuple(subjects), state, ordered, note)
 
 
 def not_run(tool: str, subjects: Sequence[tuple[str, Real]], reason: str, version: str = "") -> Check:
     """A check that did not run; `reason` also says what to do about it."""
-    return Check(tool, version, tuple(subjects), "not run", (), reason)
+    return Check(tool, version, tuple(subjects), CheckState.NOT_RUN, (), reason)
 
 
 def run_tool(words: Sequence[str], **options: Any) -> subprocess.CompletedProcess[str]:

@@ -44,7 +44,7 @@ class CandidateTerm:
 
 def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
     """How far the signals at every place go in the records to fit."""
-    found: Peaks = {}
+    peaks: Peaks = {}
     physics = nominal_physics(fit.structure.device)
     simulators = fit.structure.simulators(fitter.recording, fitter.cache)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
@@ -63,9 +63,9 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
         )
         most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
         for where, row in zip(places, most, strict=True):
-            old = found.get(where, {})
-            found[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
-    return found
+            old = peaks.get(where, {})
+            peaks[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
+    return peaks
 
 
 class CandidateTerms:
@@ -75,9 +75,14 @@ class CandidateTerms:
     """
 
     def __init__(
-        self, laws: LawTerms, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
-        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], DataHints],
-    ) -> None:  # fmt: skip
+        self,
+        laws: LawTerms,
+        simulator: Simulator,
+        structure: Structure,
+        hypotheses: list[Hypothesis],
+        probes: dict[tuple[Place, int], int],
+        seen: Callable[[Place, int], DataHints],
+    ) -> None:
         self.laws, self.simulator = laws, simulator
         self.terms: list[LawTerm] = []
         self._places: dict[LawTerm, int] = {}  # in `terms`
@@ -166,12 +171,12 @@ class CandidateTerms:
         A pose is read with the memories at the end of its dwell.
         """
         n = len(motion[0])
-        found, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
+        slopes, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
         read, at_end = self.signals.along(p, *motion)
         after = []
         for (own, group), memory in zip(self.groups, memories, strict=True):
             rows = self.signals.columns(group.reads)
-            states, found[:, own], jumped = group.along(memory, read[:, rows], at_end[:, rows])
+            states, slopes[:, own], jumped = group.along(memory, read[:, rows], at_end[:, rows])
             ends[:, [k for k in own if k in self.driven]] = jumped
             after.append(states)
-        return after, found, ends[:, self.driven]
+        return after, slopes, ends[:, self.driven]

@@ -96,14 +96,14 @@ class LtvPropagation:
 
 
 def _entries(columns: Sequence[CandidateTerm], chosen: np.ndarray) -> dict[int, tuple[list[int], list[int]]]:
-    """By probe: the places among the `chosen` columns of those that enter there, and the terms that do."""
-    found: dict[int, tuple[list[int], list[int]]] = {}
+    """The entries by probe: the places among the `chosen` columns of those that enter there, and the terms that do."""
+    entries: dict[int, tuple[list[int], list[int]]] = {}
     for place, j in enumerate(chosen):
         for probe, term in zip(columns[j].probes, columns[j].terms, strict=True):
-            places, terms = found.setdefault(probe, ([], []))
+            places, terms = entries.setdefault(probe, ([], []))
             places.append(place)
             terms.append(term)
-    return found
+    return entries
 
 
 def _runs(first: Sequence[int] | np.ndarray, second: Sequence[int] | np.ndarray) -> list[Run]:

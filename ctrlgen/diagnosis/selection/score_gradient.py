@@ -34,11 +34,11 @@ class Sums:
 
     @classmethod
     def none(cls, k: int, m: int) -> Sums:
-        """Of no sample."""
+        """The sums over no sample."""
         return cls(np.zeros((k, m)), np.zeros(m), np.zeros((m, m)))
 
     def plus(self, other: Sums) -> Sums:
-        """Of the samples of both."""
+        """The sums over the samples of both."""
         return Sums(self.US + other.US, self.Sr + other.Sr, self.SS + other.SS)
 
 
@@ -127,14 +127,15 @@ class ScoreGradient:
         for a in range(0, n, size):
             here = np.minimum(np.arange(a, a + size + 1), n - 1)  # the last block is filled up
             k = min(size, n - a)
-            memories, found, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
+            memories, slopes, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
             memory = [states[size - 1] for states in memories]
             if a + k == n:
-                found[k:] = found[k - 1]
-            found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])
-            lost |= ~np.all(np.abs(found) < CANDIDATE_TERMS.diverged, axis=0)
-            found[:, lost] = 0.0  # memories that have left the numbers say nothing
-            f, following = found[:k], found[1 : k + 1].copy() if series else found[:k]
+                slopes[k:] = slopes[k - 1]
+            slopes = np.hstack([slopes, np.repeat(self.sizes[None, :], size + 1, axis=0)])
+            lost |= ~np.all(np.abs(slopes) < CANDIDATE_TERMS.diverged, axis=0)
+            # memories that have diverged say nothing
+            slopes[:, lost] = 0.0
+            f, following = slopes[:k], slopes[1 : k + 1].copy() if series else slopes[:k]
             following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])
             linear = self.linear.evaluate_along(*(x[here[:size]] for x in inputs))
             yield a, a + k, self.spread.readings([block[:k] for block in linear], f, following)
