@@ -9,12 +9,12 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 
+from ctrlgen.budget.robust import solve
 from ctrlgen.core.files import write_text
 from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import STYLE, svg
 from ctrlgen.trajectory.scenario import load_scenario
-from ctrlgen.trajectory.solution import solve
 from ctrlgen.trajectory.solution_plots import draw_path, draw_signal, draw_stage_force
 
 from . import s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges

@@ -217,7 +217,7 @@ def test_the_set_points_are_a_scenario_that_says_the_same(circle20, tmp_path):
     write_inputs(tmp_path, circle20.solution.scenario)
     scenario = load_scenario(tmp_path / "circle20_fastest.toml")
     assert scenario.closed and scenario.name == "circle20_fastest"
-    assert scenario.command(build_model(scenario.device)) == pytest.approx(
+    assert scenario.bind(build_model(scenario.device)).samples == pytest.approx(
         circle20.solution.command, rel=1e-14, abs=1e-20
     )
 

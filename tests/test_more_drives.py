@@ -12,8 +12,9 @@ from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forc
 from ctrlgen import InputError, Unreachable, build_model, solve, user_device
 from ctrlgen.controller.feedforward import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.trajectory.inverse.choice import choose_inverse
+from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.inverse.drive_programmes import diagonal, least_worst, limited_rows
-from ctrlgen.trajectory.inverse.redundant import motion_inverse, path_inverse
 
 NEAR = 1e-5  # ranges: where IPOPT leaves what is at a limit
 
@@ -50,7 +51,7 @@ def test_what_can_be_followed_is_what_a_linear_programme_says(tmp_path):
     said, wanted = [], []
     for path in sizes:
         scenario, model = loaded(tmp_path, stage(), path)
-        samples = scenario.command(model)
+        samples = scenario.bind(model).samples
         wanted.append(all(can_push(f) for f in forces(samples)) and np.abs(samples).max() <= 50e-6)
         try:
             solve(scenario, model)
@@ -66,9 +67,9 @@ def test_with_a_margin_the_drives_stay_as_far_inside_of_their_ranges(tmp_path):
     said, wanted = [], []
     for size, x, y in [(d, x, y) for d in (10, 20, 30, 46) for x in (0, 10) for y in (-10, 0, 10)]:
         scenario, model = loaded(tmp_path, stage(), circle(size, x, y))
-        samples = scenario.command(model)
-        inverse = path_inverse(model, "pose", scenario.sample_time)
-        said.append([inverse.keeps_limits(samples, True, margin=margin) for margin in (0.0, 0.1)])
+        problem = scenario.bind(model)
+        samples = problem.samples
+        said.append([problem.inverse.keeps_limits(problem.motion, margin=margin) for margin in (0.0, 0.1)])
         box = [list(zip(LOW + m * RANGE, HIGH - m * RANGE, strict=True)) for m in (0.0, 0.1)]
         wanted.append(
             [all(linprog(np.zeros(3), A_eq=B, b_eq=f, bounds=b).status == 0 for f in forces(samples)) for b in box]
@@ -164,7 +165,8 @@ def test_what_few_samples_show_of_a_rate_is_what_a_linear_programme_over_all_say
     timing = 'sample_rate = "1 kHz"\nduration = "0.3 s"\n'
     n, h = 300, 1e-3
     scenario, model = loaded(tmp_path, stage(), path, timing)
-    command, closed = scenario.command(model), scenario.closed
+    motion, closed = scenario.bind(model).motion, scenario.closed
+    command = motion.position
     begin = [] if closed else [command[:1]]  # the drive that holds the start comes before the first
     wanted = forces(np.vstack([*begin, command[1:], command[:1] if closed else command[-1:]]))
     n = len(wanted)
@@ -177,12 +179,12 @@ def test_what_few_samples_show_of_a_rate_is_what_a_linear_programme_over_all_say
         bounds=[*list(zip(LOW, HIGH, strict=True)) * n, (0, None)],
     ).fun / h  # fmt: skip
     inverse = [
-        path_inverse(build_model(stage(drive_rate={"a": f"{share * slowest} V/s"})), "pose", h)
+        choose_inverse(build_model(stage(drive_rate={"a": f"{share * slowest} V/s"})), "pose", Sampled(h))
         for share in (0.5, 0.99, 0.9999, 1.0001, 1.002, 1.5)
     ]
     every = np.arange(len(command))
-    assert [i.keeps_limits(command, closed) for i in inverse] == [False] * 3 + [True] * 3
-    searched = [i.keeps_limits(command, closed, every) for i in inverse]
+    assert [i.keeps_limits(motion) for i in inverse] == [False] * 3 + [True] * 3
+    searched = [i.keeps_limits(motion, every) for i in inverse]
     assert searched[:3] + searched[4:] == [False] * 3 + [True] * 2
 
 
@@ -216,12 +218,11 @@ def test_what_refutes_one_path_bounds_what_every_other_breaks():
 @pytest.mark.parametrize("path", [circle(20, 4, 0), 'kind = "line"\nend = { x = "12 um", y = "4 um" }\n'])
 def test_forces_at_few_samples_are_those_of_the_whole_path(tmp_path, device, path):
     scenario, model = loaded(tmp_path, device, path)
-    motion = model.inertial
-    inverse = (motion_inverse if motion else path_inverse)(model, "pose", 1e-3).inner
-    command = scenario.motion(model) if motion else scenario.command(model)
-    every, few = inverse.trajectory(command, scenario.closed), np.array([0, 3, 41, 99])
+    problem = scenario.bind(model)
+    inverse, motion = problem.inverse.inner, problem.motion
+    every, few = inverse.trajectory(motion), np.array([0, 3, 41, 99])
     leads = np.roll(every.z, -1, axis=0) if scenario.closed else np.vstack([every.z[1:], every.z[-1:]])
-    z, f = inverse.forces_at(command, scenario.closed, few)
+    z, f = inverse.leads_to(motion, few)
     assert np.array_equal(z, leads[few]) and np.array_equal(f, every.u[few])
 
 
@@ -231,7 +232,7 @@ def test_a_rate_is_kept_where_the_closed_form_breaks_only_another_limit(tmp_path
     path = circle(10)
     R = np.diag(RANGE)
     scenario, model = loaded(tmp_path, stage(), path, timing)
-    wanted = forces(np.roll(scenario.command(model), -1, axis=0))
+    wanted = forces(np.roll(scenario.bind(model).samples, -1, axis=0))
     steps = [
         np.abs(u - np.roll(u, 1, axis=0))[:, 0].max()
         for u in (wanted @ (R @ np.linalg.pinv(B @ R)).T, solve(scenario, model).drive)

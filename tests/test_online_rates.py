@@ -148,7 +148,7 @@ def test_a_motion_that_is_too_fast_for_its_drive_is_left_and_found_again():
 @pytest.mark.parametrize("device", [stage, heated])
 def test_the_shipped_vectors_meet_the_rate_and_what_it_leads_beyond(device, tmp_path):
     scenario, model = loaded(tmp_path, device())
-    command = scenario.command(model)
+    command = scenario.bind(model).samples
     controller = controller_of(model, "pose", T)
     for real in Real:
         rows = vectors(controller, command, real)["rows"]

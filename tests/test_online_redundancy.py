@@ -114,7 +114,7 @@ def test_the_shipped_vectors_of_the_platform_meet_range_and_rate():
     scenario = load_scenario(SCENARIOS / "tilt_platform")
     model = build_model(scenario.device)
     controller = controller_of(model, "pose", scenario.sample_time)
-    rows = vectors(controller, scenario.command(model), Real.FLOAT)["rows"]
+    rows = vectors(controller, scenario.bind(model).samples, Real.FLOAT)["rows"]
     seen = {int(row["status"]) for row in rows}
     assert {0, 1, 8, 16, 128} <= {bit for status in seen for bit in (0, 1, 8, 16, 128) if status & bit or status == bit}
     assert {row["how"] & 1 for row in rows if row["status"] & 128} == {0, 1}

@@ -302,7 +302,7 @@ def test_from_a_state_of_garbage_c_and_python_answer_alike_and_admissibly(
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     x, z = controller.rest()
     (x if part == "x" else z)[0] = garbage
-    target = scenario.command(model)[:3]
+    target = scenario.bind(model).samples[:3]
     n, state, steps = len(model.axes), (x, z), []
     with np.errstate(all="ignore"):
         for row in target:

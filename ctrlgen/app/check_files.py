@@ -15,8 +15,8 @@ from ctrlgen.devices.sensor import describe
 from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.schema import FILE as RECORDING
+from ctrlgen.trajectory.infeasibility import check_feasible
 from ctrlgen.trajectory.scenario import load_scenario, model_of
-from ctrlgen.trajectory.solution import check_feasibility, check_motion, check_static
 
 
 def check(file: Path, device: Path | None = None, figure: Path | None = None) -> None:
@@ -48,9 +48,9 @@ def _check_scenario(file: Path) -> None:
     """Whether the path can be followed; not where the scenario expects that it cannot, when the reason is printed."""
     scenario = load_scenario(file)
     model = model_of(scenario)
-    command = scenario.command(model)
-    out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
-    print_shaper(scenario, model)
+    problem = scenario.bind(model)
+    out.print(f"{scenario.file.title}: {len(problem.samples)} samples, device {scenario.device.name}", markup=False)
+    print_shaper(problem)
     try:
         if scenario.file.robust is not None:
             from ctrlgen.budget.robust import solve
@@ -58,12 +58,7 @@ def _check_scenario(file: Path) -> None:
 
             out.print(robust_sentence(solve(scenario, model)), markup=False, soft_wrap=True)
             return
-        if scenario.file.feedforward == "static":
-            _, needed = check_static(scenario, model)
-        elif model.inertial:
-            *_, needed = check_motion(scenario, model)
-        else:
-            _, needed = check_feasibility(scenario, model, command)
+        needed = check_feasible(problem)
     except Unreachable as error:
         if scenario.file.outcome == "solved":
             raise

@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from ctrlgen.app.batch import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
     from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
-    from ctrlgen.model.model import Model
     from ctrlgen.recordings.recording import Recording
-    from ctrlgen.trajectory.scenario import Scenario
+    from ctrlgen.trajectory.problem import PathProblem
     from ctrlgen.verification.build_record import Build
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
@@ -34,9 +33,9 @@ SHOWN_COSTS = ("scenario", "worst", "player")
 CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
 
 
-def print_shaper(scenario: Scenario, model: Model) -> None:
+def print_shaper(problem: PathProblem) -> None:
     """The mode that a shaped path leaves at rest, and by how much longer it lasts; nothing where it is not shaped."""
-    if (used := scenario.shaper(model)) is not None:
+    if (used := problem.shaper) is not None:
         mode = f"{show(used.frequency, 'Hz')}, damping ratio {used.damping_ratio:.3g}"
         out.print(f"shaped by {used.kind} for a mode of {mode}: {show(used.times[-1], 's')} longer", soft_wrap=True)
 
@@ -53,7 +52,7 @@ def print_solution(outcome: pipeline.Outcome) -> None:
     out.print(
         f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, {solved}", soft_wrap=True
     )
-    print_shaper(scenario, solution.model)
+    print_shaper(scenario.bind(solution.model))
     if solution.between_samples is not None:
         signal = solution.model.signals[scenario.file.follow]
         error = abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.budget.contributors import Group, groups_of
+from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import Wanted, next_drives
@@ -24,7 +25,7 @@ from ctrlgen.model.simulation import trace
 from ctrlgen.recordings.recorded_files import recording_files, sha256
 from ctrlgen.trajectory.inverse.violations import Before, violations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
-from ctrlgen.trajectory.solution import Solution, closest_margins, solve
+from ctrlgen.trajectory.solution import Solution, closest_margins
 
 # of the largest drive, by which the first step may change any: what the device answers is not known yet
 FIRST_STEP = 0.2

@@ -10,6 +10,7 @@ from ctrlgen.core.units import same_dimension
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.trajectory import playback
+from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.verification.build_record import BUDGET_CORE, BUDGETS, Build
 from ctrlgen.verification.tolerances import ANGLE_LIMIT, LENGTH_LIMIT
 from ctrlgen.verification.tracking import Piece
@@ -37,14 +38,15 @@ def draw_errors(build: Build, unit: str) -> Figure:
     shown, online, player = SHOWN[unit]
     channels, signal = _channels(build, unit), build.solution.model.signals[build.solution.scenario.file.follow]
     panels = [(what, real) for what, by_real in build.errors.items() for real in by_real]
-    static = build.solution.scenario.sample_time is None
+    clock = build.solution.scenario.clock
+    static = isinstance(clock, Settled)
     figure, axes = plt.subplots(
         1, len(panels), figsize=(2.3 * len(panels) + 0.6, 3.4), sharey=True, squeeze=False, sharex=True
     )
     for panel, (what, real) in zip(axes[0], panels, strict=True):
         limit = (online[real] if what is Piece.ONLINE else player) * SCALES[shown]
         error = np.abs(build.errors[what][real]) * SCALES[shown]
-        time = np.arange(len(error)) * (1.0 if static else build.solution.scenario.sample_time or 1.0)
+        time = np.arange(len(error)) if isinstance(clock, Settled) else clock.times(len(error))
         for k, i in enumerate(channels):
             # exactly zero has no place on this axis
             values, style = np.where(error[:, i] > 0, error[:, i], np.nan), "o" if static else "-"

@@ -23,6 +23,7 @@ from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.online.online import rates_in_c
 from ctrlgen.model.model import Model
+from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.verification.check import LEFT_OUT, Check, ToolFinding, error_in, finished, not_run, run_tool, version_of
 
@@ -82,7 +83,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         ControllerStatus.COMPOSITE if kernels.guarded_limits else bits
     )
     bits |= ControllerStatus.RATE if controller.rate else bits
-    samples = len(scenario.command(model))
+    samples, clock = len(scenario.bind(model).samples), scenario.clock
     return {
         "real": real,
         "online": folder.online[real],
@@ -92,7 +93,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "nx": nominal.x.numel(),
         "n_s": nominal.n_states,
         "m": len(kernels.input_limits),
-        "rate": scenario.sample_time is not None,
+        "rate": isinstance(clock, Sampled),
         "bits": int(bits),
         "input_limits": kernels.input_limits,
         "u_low": nominal.u_bounds[0],
@@ -103,7 +104,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "z_typical": nominal.z_scale,
         "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
         "samples": samples,
-        "duration": samples * (scenario.sample_time or 0.0),
+        "duration": samples * clock.sample_time if isinstance(clock, Sampled) else None,
         **rates_in_c(controller),
     }
 

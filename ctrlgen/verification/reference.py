@@ -10,7 +10,6 @@ import numpy as np
 from ctrlgen.controller.controller_step import State
 from ctrlgen.controller.motion_feedforward import MotionKernels, controller_of
 from ctrlgen.model.simulation import simulate, trace
-from ctrlgen.trajectory.scenario import motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
@@ -36,7 +35,7 @@ class ReferenceAnswers:
         self.start = (solution.trace.x[0], solution.trace.z[0], *self._last_drive(solution))
         last = solution.command[:1] if self.scenario.closed else solution.command[-1:]
         self.path = np.vstack([solution.command, last])
-        self.command = motion_targets(self.scenario, self.model) if self.model.inertial else self.path[1:]
+        self.command = self.scenario.bind(self.model).targets if self.model.inertial else self.path[1:]
         self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets()
         self.chased = self._answers(self.hostile, self.controller.rest())

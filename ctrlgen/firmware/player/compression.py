@@ -20,6 +20,7 @@ from ctrlgen.firmware.player.spline import Spline, fit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 from ctrlgen.reporting.result_file import Keys, Number
+from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ctrlgen.trajectory.solution import Solution
 
@@ -210,7 +211,7 @@ def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
     else:
         wanted = np.vstack([command, command[-1:]])
     try:
-        reached = simulate(m, drives, scenario.sample_time or 1.0, start.x[0], start.z[0]).signals[role]
+        reached = simulate(m, drives, in_time(scenario.clock).sample_time, start.x[0], start.z[0]).signals[role]
     except SolverError:
         return np.inf, np.inf
     worst = np.abs(reached - wanted).max(axis=0)
@@ -224,7 +225,7 @@ def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
 
 def _keeps_rates(solution: Solution, compression: Compression) -> bool:
     """Whether the drives, looked at between samples too, change no faster than they may; where those of the solution do not either."""
-    m, n, h = solution.model, len(solution.drive), solution.scenario.sample_time or 1.0
+    m, n, h = solution.model, len(solution.drive), in_time(solution.scenario.clock).sample_time
     if not m.rate_limits:
         return True
     k = np.repeat(np.arange(n), BETWEEN)
