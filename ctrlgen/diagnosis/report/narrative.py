@@ -7,8 +7,8 @@ import re
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.selection.attribution import Share
-from ctrlgen.diagnosis.selection.findings import ChannelError, Estimate, Finding
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict, contradicts_datasheet, within_tolerance
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
@@ -72,7 +72,7 @@ def _to_width(value: float, width: float) -> str:
     return number(value, max(2, min(digits, 9)))
 
 
-def channel_sentence(channel: str, error: ChannelError) -> str:
+def channel_sentence(channel: str, error: ChannelErrorEntry) -> str:
     """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm.'"""
     noise = "not known" if error.noise_floor is None else f"{number(error.noise_floor, 3)} {error.unit}"
     shown = [f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after)]
@@ -91,7 +91,7 @@ def worst_channel(diagnosis: Diagnosis) -> str:
     """The channel with the largest held-out error before the correction, relative to its noise; where the noise is not known,
     relative to the error after the correction."""
 
-    def size(item: tuple[str, ChannelError]) -> float:
+    def size(item: tuple[str, ChannelErrorEntry]) -> float:
         e = item[1]
         ratio = e.rms_before / (e.noise_floor or e.rms_after or 1.0)
         return ratio if math.isfinite(ratio) else -1.0
@@ -141,7 +141,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     return f"{text} {channel_sentence(channel, diagnosis.held_out[channel])}"
 
 
-def share_text(share: Share | None) -> str:
+def share_text(share: ShareEntry | None) -> str:
     """'82 % (75 ... 88 %)'; a dash for a cause that was read from the data."""
     if share is None:
         return "-"

@@ -17,6 +17,7 @@ from itertools import combinations
 from math import comb
 
 import numpy as np
+from pydantic import Field
 
 from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
@@ -30,14 +31,14 @@ from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.estimation.structure import FreeParameter, Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys
 
 
-@dataclass(frozen=True)
-class Share:
-    """A share of the mismatch, of its energy, with its 95 % interval."""
+class ShareEntry(Keys):
+    """A share of the mismatch."""
 
-    value: float
-    ci95: tuple[float, float]
+    value: FiniteOrNull = Field(description="Of the energy beyond the noise that the device as described leaves.")
+    ci95: tuple[FiniteOrNull, FiniteOrNull] = Field(description="95 % interval, by a bootstrap over blocks.")
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,8 @@ class Attribution:
     `held_out`: whether they are of the held-out records; of the records to fit where the held-out ones show no mismatch.
     """
 
-    shares: tuple[Share | None, ...]
-    rest: Share | None
+    shares: tuple[ShareEntry | None, ...]
+    rest: ShareEntry | None
     held_out: bool
 
     @property
@@ -92,7 +93,7 @@ def attribute(
     sampled = _shares(*(v[..., drawn].sum(axis=-1) for v in (parts, before, after)))
     low, high = np.quantile(sampled, (0.025, 0.975), axis=1)
     value = _shares(parts.sum(axis=-1), before.sum(), after.sum())
-    shares = [Share(float(v), (float(a), float(b))) for v, a, b in zip(value, low, high, strict=True)]
+    shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in zip(value, low, high, strict=True)]
     return Attribution(tuple(shares[:n]), shares[n], held)
 
 
