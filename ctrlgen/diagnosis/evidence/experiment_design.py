@@ -114,7 +114,8 @@ def _open(search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]],
     if explained or not search.rounds or search.rounds[-1].before.fit is not chosen:
         return [], ""
     tried: dict[str, Fit] = {}
-    for trial in search.rounds[-1].candidates:  # none was accepted
+    # the last round accepted none of its candidates
+    for trial in search.rounds[-1].candidates:
         tried.setdefault(trial.cause.effect if trial.cause else "", trial.fit)
     closest = [*list(tried.values())[: EXPERIMENT.suspects], chosen][: EXPERIMENT.suspects]
     pairs = [(closest[0], closest[1])] if len(closest) == EXPERIMENT.suspects else []

@@ -42,8 +42,10 @@ CAPTIONS = {
     "off the device's uncertain parameters. At 1 they cannot be told apart, at 0 they cannot be confused. Each has fixed "
     "shape parameters; fitting those can make two more similar. |z|: score in standard deviations.",
 }
-TINY = 1e-4  # a p-value below is shown as "< 0.0001"
-NEGLIGIBLE = 1e-3  # standard deviations: parameters that moved by less are left out of the table
+# a p-value below is shown as "< 0.0001"
+TINY = 1e-4
+# standard deviations: parameters that moved by less are left out of the table
+NEGLIGIBLE = 1e-3
 
 
 def page(diagnosis: Diagnosis, provenance: Provenance) -> str:

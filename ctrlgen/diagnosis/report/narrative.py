@@ -14,10 +14,13 @@ from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.reporting.numbers import number
 
-NAMED = 3  # findings that the first sentence names
-WIDE = 1.0  # a dimensionless number whose interval lies within this is shown in per cent
+# findings that the first sentence names
+NAMED = 3
+# a dimensionless number whose interval lies within this is shown in per cent
+WIDE = 1.0
 HARD_SPACE = "\u00a0"
-EDGE = 1e-6  # share of its interval within which an estimate counts as on the interval's end
+# share of its interval within which an estimate counts as on the interval's end
+EDGE = 1e-6
 HEADLINE = {
     Verdict.EXPLAINED: "Explained",
     Verdict.PARTLY: "Partly explained",
@@ -56,7 +59,8 @@ def interval(e: Estimate) -> str:
     value, low, high = (v * (100 if percent else 1) for v in ends)
     if not math.isfinite(high - low):
         return f"{number(value)}{unit} (this recording does not determine it)"
-    if high == low:  # detected directly, or fixed by its definition
+    # detected directly, or fixed by its definition
+    if high == low:
         return f"{number(value)}{unit}"
     shown = [_to_width(v, high - low) for v in (value, low, high)]
     edge = EDGE * (high - low)

@@ -38,7 +38,8 @@ from ctrlgen.estimation.structure import FreeParameter
 from ctrlgen.version import program
 
 WIDTH = 110
-MOVED = 1e-12  # relative change below which a parameter is left as it is
+# relative change below which a parameter is left as it is
+MOVED = 1e-12
 
 
 def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
@@ -59,7 +60,8 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
     changed = _change_numbers(document, diagnosis, estimates)
     effects = _effects(diagnosis, estimates)
     if effects and "effect" in document and not isinstance(document["effect"], AoT):
-        for table in effects:  # effect = [{ ... }] in one line cannot be continued by [[effect]]
+        # effect = [{ ... }] in one line cannot be continued by [[effect]]
+        for table in effects:
             document["effect"].append(inline_table(table))
         effects = []
     text = document.as_string().rstrip("\n") + "\n"

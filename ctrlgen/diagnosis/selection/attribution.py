@@ -78,13 +78,15 @@ def attribute(
     records = fitter.held_out_records if held else fitter.fit_records
     before, after = _by_block(nominal), _by_block(chosen)
     left = {frozenset(range(n)): after}
-    rough = fitter.with_errors_of(described.fit)  # initial states of incomplete models, which leave much
+    # for the initial states of incomplete models, which leave much
+    rough = fitter.with_errors_of(described.fit)
     subsets = _subsets(n)
     energies = in_forks(lambda present: _left_or_all(rough, fit, present, records, before), subsets, jobs)
     left |= dict(zip(subsets, energies, strict=True))
     bare = left[frozenset()]
     if after.sum() > ATTRIBUTION.hidden * before.sum() and before.sum() < ATTRIBUTION.hidden * bare.sum():
-        before = bare  # the device's own numbers, as they were fitted to it as described, hide the mismatch
+        # the device's own numbers, as they were fitted to it as described, hide the mismatch
+        before = bare
     most = ATTRIBUTION.diverged * np.maximum(np.maximum(before, bare), 1.0)
     left = {S: np.minimum(E, most) for S, E in left.items()}
     parts = np.array([_shapley(left, k, n) for k in range(n)])
@@ -99,7 +101,8 @@ def attribute(
 
 def _shares(parts: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Shares (n + 1, ...) of n causes and of the rest, from their `parts` (n, ...) and the energies `before` and `after` (...)."""
-    rest = np.maximum(after, 0.0) / np.maximum(before, 1e-300)  # by chance less may be left than noise
+    # by chance less may be left than noise
+    rest = np.maximum(after, 0.0) / np.maximum(before, 1e-300)
     taken = parts.sum(axis=0)
     scale = np.where(taken > 0, (1 - rest) / np.maximum(taken, 1e-300), 1 / np.maximum(before, 1e-300))
     return np.concatenate([parts * scale, np.asarray(rest)[None]])

@@ -148,9 +148,8 @@ class ModelSelection:
         n, n_held = (self.samples(m, errors) for m in (after.fitted, after.held_out))
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
         needed = MODEL_SELECTION.least_gain + added * np.log(max(n, 2))
-        if (
-            before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain
-        ):  # parameters of the device masked it, so the readings hardly show it
+        # parameters of the device masked it, so the readings hardly show it
+        if before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain:
             return gain > needed and confirmed > -MODEL_SELECTION.largest_contradiction
         if (
             self.unseen_in_held_out(before)

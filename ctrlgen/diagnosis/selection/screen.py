@@ -71,7 +71,8 @@ class Screen:
         ):
             laws = self.laws.setdefault(record.timing, LawTerms(record.timing))
             slopes = ScoreGradient(self.fitter, fit, record, open_, seen, laws)
-            if slopes.laws.unusable:  # the columns must be the same on every record
+            # the columns must be the same on every record
+            if slopes.laws.unusable:
                 return self.run(fit, dropped | slopes.laws.unusable)
             columns = slopes.columns
             n = record.valid.size

@@ -84,7 +84,8 @@ class Searcher:
             current = without_needless(trials, swapped(trials, best, len(current.causes)))
             same = next((v for v in visited if frozenset(v.causes) == frozenset(current.causes)), None)
             if same is not None and explains_alike(trials.selection, same, current):
-                return current  # no better than when it was there before
+                # no better than when it was there before
+                return current
             current = trials.with_noise_update(trials.with_errors(trials.converged(current)))
             visited.append(current)
 

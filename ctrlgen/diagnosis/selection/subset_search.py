@@ -72,7 +72,8 @@ class SubsetSearch:
             places += [(member, int(j)) for j in best]
         grown: dict[frozenset, tuple[float, tuple[int, ...]]] = {}
         joined = np.concatenate([np.zeros(0), *gains])
-        for i in np.argsort(-joined, kind="stable"):  # the best with each group first
+        # the best with each group first
+        for i in np.argsort(-joined, kind="stable"):
             member, j = places[i]
             members = (*beam[member][1], j)
             grown.setdefault(frozenset(self.group[list(members)]), (float(joined[i]), members))

@@ -144,7 +144,8 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
                 else:
                     beside[family] = max(beside[family], row.additional)
         own[Family.GAIN] += channel.constant + channel.numbers
-        if table.design.one_way(channel.own):  # friction without a change of direction is an offset
+        # friction without a change of direction is an offset
+        if table.design.one_way(channel.own):
             own[Family.FRICTION] += channel.constant
         for family in Family:
             share[family] += weights[channel.channel] / whole * (own[family] or beside[family])

@@ -114,7 +114,8 @@ class _Builder:
         full = {a: [s.speed_of(a) for s in signals] for a in self.axes}
         self.speed = {a: self.drawn(full[a]) for a in self.axes}
         fastest = {a: max(float(np.abs(v).max(initial=0.0)) for v in full[a]) for a in self.axes}
-        if self.settled:  # a step counts over the range
+        # a step counts over the range
+        if self.settled:
             fastest = {a: float(np.ptp(np.concatenate([s.position[a] for s in signals]))) for a in self.axes}
         self.direction = {a: direction(self.speed[a], fastest[a]) for a in self.axes}
         self.acceleration = {
@@ -186,7 +187,8 @@ class _Builder:
             kind = Kind.TRAVEL_HISTORY if what == "position" else Kind.DRIVE_HISTORY
             axes = frozenset([name] if what == "position" else [])
             values = left[:, i]
-            if not self.settled and len(names) <= 2 * FEW:  # butterflies and loops that differ by side
+            # butterflies and loops that differ by side
+            if not self.settled and len(names) <= 2 * FEW:
                 values = np.column_stack([values, values * standardised(x)[:, None], values**2])
             yield Columns(kind, name, unit, axes, x, values)
             if what == "drive":
@@ -210,14 +212,16 @@ class _Builder:
             signals.append((f"direction of {a}", own, self.direction[a]))
             if not self.settled:
                 signals.append((f"speed of {a}", own, self.speed[a]))
-        if len(self.drive) <= FEW:  # their number grows with the square
+        # their number grows with the square
+        if len(self.drive) <= FEW:
             signals += [(u, frozenset(), x) for u, x in self.drive.items()]
         if self.ambient is not None:
             signals.append(("temperature", frozenset(), self.ambient))
         plain = {name: standardised(x) for name, _, x in signals}
         for (one, at, x), (other, of, _) in combinations(signals, 2):
             moving = {one, other} - set(self.axes)
-            if at and of and at != of and moving:  # of two axes the positions alone
+            # of two axes the positions alone
+            if at and of and at != of and moving:
                 continue
             yield Columns(Kind.PRODUCT, one, "", at | of, x, (plain[one] * plain[other])[:, None])
 
