@@ -129,5 +129,5 @@ def _checkpoint(
 
 def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:
     """SHA-256 of every file that a diagnosis reads, by name."""
-    own = [(file.name, file) for file in files_of(device)]
-    return {name: sha256(path) for name, path in (*own, *recording_files(recordings))}
+    device_files = [(file.name, file) for file in files_of(device)]
+    return {name: sha256(path) for name, path in (*device_files, *recording_files(recordings))}

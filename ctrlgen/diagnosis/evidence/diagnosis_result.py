@@ -75,11 +75,11 @@ class Diagnosis:
     def corrected(self) -> Device:
         """The device with all findings, then what was detected directly, then empirical terms: as device.next.toml describes it."""
         fit = self.search.chosen.fit
-        own = {
+        refitted = {
             u.path: float(v) for u, v in zip(fit.structure.free_parameters, fit.theta, strict=True) if u.cause is None
         }
         starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
-        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).device_with_causes, own)
+        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).device_with_causes, refitted)
         beside = [f for f in self.findings if f.cause not in fit.structure.causes]
         read = [
             f.cause.law(

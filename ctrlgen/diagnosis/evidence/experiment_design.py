@@ -156,8 +156,8 @@ def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Expe
 
 def _named(fit: Fit, other: Fit) -> str:
     """The causes that `other` does not have."""
-    own = [c for c in fit.structure.causes if c not in other.structure.causes]
-    return " and ".join(f"{c.effect} at {c.location}" for c in own) or "the device without it"
+    causes = [c for c in fit.structure.causes if c not in other.structure.causes]
+    return " and ".join(f"{c.effect} at {c.location}" for c in causes) or "the device without it"
 
 
 @dataclass(frozen=True, eq=False)

@@ -143,8 +143,8 @@ def _changed(diagnosis: Diagnosis) -> list[dict[str, str]]:
     rows = []
     for unknown, value, sd in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
-        own = cause is None or cause.effect == PARAMETER
-        if own and abs(value - unknown.nominal) > NEGLIGIBLE * sd:
+        of_device = cause is None or cause.effect == PARAMETER
+        if of_device and abs(value - unknown.nominal) > NEGLIGIBLE * sd:
             spread = show(sd, unknown.unit, 2) if np.isfinite(sd) and unknown.unit not in ("degC", "degF") else ""
             now = written(value, unknown.unit).text
             rows.append({"path": unknown.path, "was": known[unknown.path].text, "now": now, "sd": spread})

@@ -78,8 +78,8 @@ def _change_numbers(
     causes, changed = diagnosis.search.chosen.fit.structure.causes, []
     for unknown, value, sd in estimates:
         cause = None if unknown.cause is None else causes[unknown.cause]
-        own = cause is None or cause.effect == PARAMETER
-        if not own or abs(value - unknown.nominal) <= MOVED * abs(unknown.nominal):
+        of_device = cause is None or cause.effect == PARAMETER
+        if not of_device or abs(value - unknown.nominal) <= MOVED * abs(unknown.nominal):
             continue
         word = "refitted to" if cause is None else "diagnosed from"
         old = known[unknown.path]

@@ -105,8 +105,8 @@ class ScoreGradient:
                 SS[i] += S.T @ S
                 total.US[:, seen[i]] += U[a:b, i].T @ S
                 total.Sr[seen[i]] += white[a:b, i] @ S
-        for own, columns in zip(SS, seen, strict=True):
-            total.SS[np.ix_(columns, columns)] += own
+        for products, columns in zip(SS, seen, strict=True):
+            total.SS[np.ix_(columns, columns)] += products
         gone = [j for j, column in enumerate(self.columns) if lost[list(column.terms)].any()]
         total.US[:, gone], total.Sr[gone], total.SS[gone], total.SS[:, gone] = 0.0, 0.0, 0.0, 0.0
         return total

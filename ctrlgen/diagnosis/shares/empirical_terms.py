@@ -103,7 +103,7 @@ def _smoothers(fit: Fit, table: SharesTable, channel: ChannelShares, signals: Se
             "empirical_history": [{"reach": share * float(np.ptp(d))} for share in SHARES.reaches],
         }
         rest = {p.name: 0.0 for p in law.params} | {law.amplitude().name: channel.rms}
-        trials = tuple(rest | own for own in ranges[law.kind])
+        trials = tuple(rest | numbers for numbers in ranges[law.kind])
         yield _Smoother(row.kind, Hypothesis(law.kind, f"mechanism:{at}", at, axis), trials)
 
 

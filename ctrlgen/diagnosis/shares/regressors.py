@@ -33,12 +33,13 @@ def own_axes(signals: Sequence[Signals], channel: str) -> frozenset[str]:
     parts, columns = [], []
     for axis in axes:
         d = np.concatenate([s.position[axis] for s in signals])
-        own = [d]
+        signals_of_axis = [d]
         if not signals[0].settled:
             v = [s.speed_of(axis) for s in signals]
-            own += [np.concatenate(v), np.concatenate([s.derivative(x) for s, x in zip(signals, v, strict=True)])]
-        columns += own
-        parts.append(len(own))
+            acceleration = [s.derivative(x) for s, x in zip(signals, v, strict=True)]
+            signals_of_axis += [np.concatenate(v), np.concatenate(acceleration)]
+        columns += signals_of_axis
+        parts.append(len(signals_of_axis))
     X = np.column_stack([standardised(c) for c in columns])
     slopes = np.linalg.lstsq(X, y - y.mean(), rcond=1e-8)[0]
     ends = np.cumsum([0, *parts])
@@ -156,16 +157,16 @@ class _Builder:
         """The blocks of columns, not yet standardised."""
         nothing: frozenset[str] = frozenset()
         for a in self.axes:
-            d, v, own = self.position[a], self.speed[a], frozenset([a])
+            d, v, axis = self.position[a], self.speed[a], frozenset([a])
             unit, speed_unit = self._unit("position", a), self._unit("speed", a)
-            yield Columns(Kind.PROPORTION, a, unit, own, d, d[:, None])
-            yield Columns(Kind.POSITION, a, unit, own, d, splines(d, self.count(len(self.axes))))
-            yield Columns(Kind.DIRECTION, f"speed of {a}", speed_unit, own, v, self.direction[a][:, None])
+            yield Columns(Kind.PROPORTION, a, unit, axis, d, d[:, None])
+            yield Columns(Kind.POSITION, a, unit, axis, d, splines(d, self.count(len(self.axes))))
+            yield Columns(Kind.DIRECTION, f"speed of {a}", speed_unit, axis, v, self.direction[a][:, None])
             if not self.settled:
-                yield Columns(Kind.SPEED, f"speed of {a}", speed_unit, own, v, splines(v, self.count(len(self.axes))))
+                yield Columns(Kind.SPEED, f"speed of {a}", speed_unit, axis, v, splines(v, self.count(len(self.axes))))
                 acc = self.acceleration[a]
                 values = splines(acc, SHARES.spline_columns_many)
-                yield Columns(Kind.ACCELERATION, f"acceleration of {a}", "", own, acc, values)
+                yield Columns(Kind.ACCELERATION, f"acceleration of {a}", "", axis, acc, values)
         for name, u in self.drive.items():
             unit = self._unit("drive", name)
             yield Columns(Kind.DRIVE, name, unit, nothing, u, splines(u, self.count(len(self.drive))))
@@ -207,11 +208,11 @@ class _Builder:
         """Products of two signals of zero mean and unit variance."""
         signals: list[tuple[str, frozenset[str], np.ndarray]] = []
         for a in self.axes:
-            own = frozenset([a])
-            signals.append((a, own, self.position[a]))
-            signals.append((f"direction of {a}", own, self.direction[a]))
+            axis = frozenset([a])
+            signals.append((a, axis, self.position[a]))
+            signals.append((f"direction of {a}", axis, self.direction[a]))
             if not self.settled:
-                signals.append((f"speed of {a}", own, self.speed[a]))
+                signals.append((f"speed of {a}", axis, self.speed[a]))
         # their number grows with the square
         if len(self.drive) <= FEW:
             signals += [(u, frozenset(), x) for u, x in self.drive.items()]
