@@ -24,7 +24,7 @@ from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.scenario import Scenario, load_scenario
 from ctrlgen.trajectory.solution import Solution
-from ctrlgen.verification.comparison import EXCESS_LIMIT
+from ctrlgen.verification.tolerances import EXCESS_LIMIT
 
 SCENARIO = Path(__file__).resolve().parent.parent / "scenarios" / "circle20"
 NEAR = 1e-11  # m: 0.01 nm, what two answers may differ by

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ctrlgen.app.console import out, print_recording, print_shaper
+from ctrlgen.app.console import out
+from ctrlgen.app.diagnosis_console import print_recording
+from ctrlgen.app.scenario_console import print_shaper
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show
@@ -54,9 +56,9 @@ def _check_scenario(file: Path) -> None:
     try:
         if scenario.file.robust is not None:
             from ctrlgen.budget.robust import solve
-            from ctrlgen.verification.scenario_report import robust_sentence
+            from ctrlgen.verification.summary import robust_sentence
 
-            out.print(str(robust_sentence(solve(scenario, model))), markup=False, soft_wrap=True)
+            out.print(robust_sentence(solve(scenario, model)), markup=False, soft_wrap=True)
             return
         needed = check_feasible(problem)
     except Unreachable as error:
@@ -67,8 +69,8 @@ def _check_scenario(file: Path) -> None:
     unsettled = "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
     if model.inertial:
         unsettled = "no drive was found in the first place: solve it to know why"
-    found = "the path can be followed within every limit" if needed.exact else unsettled
-    out.print(found, markup=False, soft_wrap=True)
+    verdict = "the path can be followed within every limit" if needed.exact else unsettled
+    out.print(verdict, markup=False, soft_wrap=True)
 
 
 def _check_device(file: Path, figure: Path | None) -> None:

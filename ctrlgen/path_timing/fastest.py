@@ -16,7 +16,7 @@ import numpy as np
 
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.units import Quantity, read_quantity, show
+from ctrlgen.core.units import ExampleGiven, Quantity, read_quantity, show
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.binding import Binding, bindings
 from ctrlgen.path_timing.curve import Curve
@@ -152,16 +152,16 @@ def _rate(scenario: Scenario, given: str | None) -> Quantity:
 
 def _quantity(option: str, text: str) -> Quantity:
     """A frequency above zero. Raises InputError."""
+    example = f'write for example "{EXAMPLES[option]}"'
     try:
-        found = read_quantity("Hz", text)
+        frequency = read_quantity("Hz", text)
+    except ExampleGiven as error:
+        raise InputError(option, [Fault("value", str(error))]) from None
     except ValueError as error:
-        example = "" if "for example" in str(error) else f'; write for example "{EXAMPLES[option]}"'
-        raise InputError(option, [Fault("value", f"{error}{example}")]) from None
-    if found.si <= 0:
-        raise InputError(
-            option, [Fault("value", f'{text!r} is not above zero; write for example "{EXAMPLES[option]}"')]
-        )
-    return found
+        raise InputError(option, [Fault("value", f"{error}; {example}")]) from None
+    if frequency.si <= 0:
+        raise InputError(option, [Fault("value", f"{text!r} is not above zero; {example}")])
+    return frequency
 
 
 def _check_held(scenario: Scenario, model: Model) -> None:

@@ -24,7 +24,8 @@ from ctrlgen.model.effect_terms import channels
 UNUSABLE = (CtrlgenError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
 """What a law that cannot be written down at a place may end with."""
 
-Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
+# by unit, SI
+Peaks = dict[tuple[Place, int], dict[str, float]]
 REACHED = ("channel", "travel", "travel/s")
 
 
@@ -39,7 +40,8 @@ class CandidateTerm:
     terms: tuple[int, ...]
     size: float
     one_sided: int
-    range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
+    # of the amplitude's change, in sizes
+    range: tuple[float, float] = (-np.inf, np.inf)
 
 
 def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
@@ -85,7 +87,8 @@ class CandidateTerms:
     ) -> None:
         self.laws, self.simulator = laws, simulator
         self.terms: list[LawTerm] = []
-        self._places: dict[LawTerm, int] = {}  # in `terms`
+        # in `terms`
+        self._places: dict[LawTerm, int] = {}
         self.columns: list[CandidateTerm] = []
         self.unusable: dict[Hypothesis, str] = {}
         for h in hypotheses:
@@ -139,8 +142,8 @@ class CandidateTerms:
         for k, term in enumerate(self.terms):
             kinds.setdefault(term.kind, []).append(k)
         return [
-            (own, self.laws.compiled([self.terms[k] for k in own], [k in self.driven for k in own]))
-            for own in kinds.values()
+            (places, self.laws.compiled([self.terms[k] for k in places], [k in self.driven for k in places]))
+            for places in kinds.values()
         ]
 
     @cached_property
@@ -159,7 +162,7 @@ class CandidateTerms:
     def start(self, time: float) -> list[np.ndarray]:
         """The laws' states before the first sample, group by group, at `time` [s]: zero, but for clocks."""
         begin = time if np.isfinite(self.simulator.sample_time) else 0.0
-        clocks = ([clock for k in own for clock in self.terms[k].clocks] for own, _ in self.groups)
+        clocks = ([clock for k in places for clock in self.terms[k].clocks] for places, _ in self.groups)
         return [np.where(np.array(each, bool), begin, 0.0) for each in clocks]
 
     def along(
@@ -174,9 +177,9 @@ class CandidateTerms:
         slopes, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
         read, at_end = self.signals.along(p, *motion)
         after = []
-        for (own, group), memory in zip(self.groups, memories, strict=True):
+        for (places, group), memory in zip(self.groups, memories, strict=True):
             rows = self.signals.columns(group.reads)
-            states, slopes[:, own], jumped = group.along(memory, read[:, rows], at_end[:, rows])
-            ends[:, [k for k in own if k in self.driven]] = jumped
+            states, slopes[:, places], jumped = group.along(memory, read[:, rows], at_end[:, rows])
+            ends[:, [k for k in places if k in self.driven]] = jumped
             after.append(states)
         return after, slopes, ends[:, self.driven]

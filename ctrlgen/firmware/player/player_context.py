@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.firmware.c.templates import comment
-from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, Candidate, Compression, SampleTable
+from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, Compression, PlayerCandidate, SampleTable
 from ctrlgen.firmware.player.spline import Spline
 from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.solution import Solution
@@ -42,7 +42,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
     }
 
 
-def _line(c: Candidate) -> str:
+def _line(c: PlayerCandidate) -> str:
     """One candidate, as the header's comment lists it."""
     verdict = f"chosen: {c.remark}" if c.chosen else c.remark
     if c.bytes is None or c.length is None:
