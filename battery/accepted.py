@@ -29,16 +29,18 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "stiffness": ("stiffness", "parameter@stiffness"),
     "finite_rotation": ("finite_rotation",),
 }
-FAMILIES = {  # of a memory: words in the names that are right
+# Of a memory: words in the names that are right
+FAMILIES = {
     "hysteresis": ("hysteresis", "bouc_wen", "preisach"),
     "backlash": ("backlash", "play"),
     "creep": ("creep", "thermal_lag", "second_pole"),
 }
+# Truth -> another name of the very same law and numbers
 SAME_LAW = {
     "step": "force_step",
     "frame_turn": "frame_rotation_z",
     "free_play": "backlash",
-}  # truth -> another name of the very same law and numbers
+}
 # Places that are right beside the law's own, for the same reason.
 ALSO_AT = {
     "thermal_lag": ("actuator", "stage"),
@@ -78,7 +80,8 @@ TRUTHS: dict[str, dict[tuple[str, ...], Value]] = {
     "heat_crosstalk": {("share",): lambda t: t["amplitude"]},
     "frame_turn": {("angle",): lambda t: t["amplitude"]},
 }  # fmt: skip
-ROUGH_TRUTHS: dict[str, dict[tuple[str, ...], Value]] = TRUTHS | {  # in messy cases and with memory
+# In messy cases and with memory
+ROUGH_TRUTHS: dict[str, dict[tuple[str, ...], Value]] = TRUTHS | {
     "backlash": {("gap",): lambda t: t["amplitude"]},
     "free_play": {("gap",): lambda t: t["amplitude"]},
 }

@@ -28,7 +28,8 @@ SINGLE = (
 )  # fmt: skip
 FIXED = ("low_pass", "delay", "stuck")  # drawn at a size a bench would see, not scaled
 WEAK = tuple(n for n in SINGLE if n not in (*FIXED, *OWN, "quantisation", "end_stop"))
-GROUPS = (  # a mixture takes one from each of two or three
+# A mixture takes one from each of two or three
+GROUPS = (
     ("creep", "log_creep", "thermal_lag", "drift"),
     ("stiffening", "softening", "bow"),
     ("hysteresis", "coulomb", "backlash", "quadratic_damping", "viscous"),
@@ -37,7 +38,8 @@ GROUPS = (  # a mixture takes one from each of two or three
     ("resonance",),
 )
 LOOP = ("coulomb", "stribeck", "viscous", "quadratic_damping", "cyclic", "lost_beams", "step", "backlash")
-COUNTS = {  # by class, in the order of CLASSES
+# By class, in the order of CLASSES
+COUNTS = {
     "ci": (2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 2),
     "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12),
     "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204),

@@ -14,7 +14,8 @@ from battery.plant_hexapod import AXES, COMPONENTS, Array, Faults, Hexapod, chan
 from plants.numbers import MEMS_HEXAPOD, read
 
 Rng = np.random.Generator
-SD = {  # shares, stated in the device file
+# Shares, stated in the device file
+SD = {
     "hexapod.platform_radius": 0.003, "hexapod.base_radius": 0.003, "hexapod.height": 0.003,
     "actuator.thermal_resistance": 0.02, "stage.half_stage_stiffness": 0.03,
 }  # fmt: skip

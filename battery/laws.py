@@ -17,7 +17,8 @@ STRANGE = tuple(laws_strange.DRAW)
 MAKE = {name: getattr(module, f"make_{name}", None) for module in MODULES for name in module.DRAW}
 MAKE |= {"temperature_sensitivity": laws_sensor.make_temperature, "softening": laws_stage.make_stiffening}
 MAKE |= laws_memory.MAKE
-PLACE = {  # where a law acts, if not at the stage
+# Where a law acts, if not at the stage
+PLACE = {
     **dict.fromkeys(("drive_gain", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag"), "actuator"),
     **dict.fromkeys(("vibration", "step"), "disturbance"),
     **dict.fromkeys(

@@ -22,7 +22,8 @@ LARGEST_TRAVEL = 0.15  # rms of a dominant cause over that of the motion
 LARGEST_SHARE = 0.4  # of a memory's amplitude: more is another device
 SPIKES, SPIKE_SIZE = 1e-3, (4.0, 6.0)  # share of the samples, size over the noise
 OFF = (1.2, 2.5)  # stated numbers, in stated standard deviations
-CAUSES = (  # groups of dominant causes; two come from different groups
+# Groups of dominant causes; two come from different groups
+CAUSES = (
     ("stiffening", "softening", "bow"),
     ("hysteresis", "coulomb", "stribeck", "backlash"),
     ("quadratic_damping", "viscous"),
@@ -35,7 +36,8 @@ KNOWN = (
     "drift", "thermal_lag", "delay", "low_pass", "vibration", "degradation", "resonance", "dead_zone",
 )  # fmt: skip
 FOREIGN = (*laws.STRANGE, "bouc_wen_motion", "preisach", "worn_play", "power_creep", "sinh_creep")
-ON_SERVO = (  # laws that need no inertia
+# Laws that need no inertia
+ON_SERVO = (
     ("bow", "cyclic", "drift", "thermal_lag", "degradation", "dead_zone", "creep", "backlash"),
     ("telegraph", "clock_jitter", "turning_points", "bouc_wen_motion", "preisach", "worn_play", "power_creep", "sinh_creep"),
 )  # fmt: skip

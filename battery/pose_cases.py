@@ -186,9 +186,8 @@ def draw_act(name: str, rng: Rng, bench: Bench, gauge: PoseGauge) -> Act:
         "wander": (sensor, "pose", lambda x, a, r: a * _wander(x.shape, c, seeds[r]) * width),
     }  # fmt: skip
     location, at, change = made[name]
-    if (
-        name == "drive_gain" and machine.unit == "um"
-    ):  # a command in displacement, too small or a lever too short, are one
+    # A command in displacement that is too small and a lever that is too short are one
+    if name == "drive_gain" and machine.unit == "um":
         return Act(name, f"{drive}|{stage}", at, 0.01, change, {}, also=("lever_ratio",))
     return Act(name, location, at, 0.01, change, {})
 

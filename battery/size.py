@@ -12,12 +12,13 @@ import numpy as np
 from battery.laws import simulate
 from battery.plant_axis import Array, Axis, Planted, Scene
 
+# Refitting takes these away altogether: they are a nominal number
 OWN = (
     "drive_gain",
     "sensor_gain",
     "stiffness",
     "home_offset",
-)  # refitting takes these away altogether: they are a nominal number
+)
 REFITTED = ("mass", "damping", "stiffness", "force_constant")
 
 

@@ -78,9 +78,8 @@ def main(arguments: list[str] | None = None) -> int:
             if outcome.what not in FOUND:
                 console.print(f"{outcome.what} ({outcome.tests} tests, {outcome.left} left out)", style="bold")
                 console.print(outcome.diff, markup=False, highlight=False, soft_wrap=True)
-            _write(
-                a.out / "mutants.json", a.sample, a.seed, outcomes
-            )  # so that a run that is stopped has said something
+            # A run that is stopped has said something
+            _write(a.out / "mutants.json", a.sample, a.seed, outcomes)
 
         _try(chosen, known, a.limit, a.jobs, tried)
     share = _share(outcomes)

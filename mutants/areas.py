@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from pathlib import Path
 
-AREAS: dict[str, tuple[str, ...]] = {  # globs below the root of the tree
-    "model": ("ctrlgen/model/*.py", "ctrlgen/numerics/*.py", "ctrlgen/physics/*.py"),
+# Globs below the root of the tree
+AREAS: dict[str, tuple[str, ...]] = {
+    "model": (
+        "ctrlgen/model/*.py",
+        "ctrlgen/controller/*.py",
+        "ctrlgen/numerics/*.py",
+        "ctrlgen/physics/*.py",
+    ),
     "effects": ("ctrlgen/effects/*.py",),
     "recordings": ("ctrlgen/recordings/*.py", "ctrlgen/core/units.py"),
-    "estimation": ("ctrlgen/estimation/*.py", "ctrlgen/estimation/settings.py"),
+    "estimation": ("ctrlgen/estimation/*.py",),
     "selection": (
         "ctrlgen/diagnosis/selection/*.py",
-        "ctrlgen/estimation/*.py",
         "ctrlgen/diagnosis/settings/selection.py",
     ),
-    "firmware": ("ctrlgen/firmware/*.py",),
+    "firmware": ("ctrlgen/firmware/**/*.py",),
     "accuracy": (
         "ctrlgen/budget/*.py",
         "ctrlgen/calibration/*.py",
         "ctrlgen/learning/*.py",
         "ctrlgen/path_timing/*.py",
     ),
-    "trajectory": ("ctrlgen/trajectory/*.py",),
-    "devices": ("ctrlgen/devices/*.py",),
+    "trajectory": ("ctrlgen/trajectory/**/*.py",),
+    "devices": ("ctrlgen/devices/**/*.py",),
 }
 
 

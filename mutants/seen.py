@@ -61,9 +61,8 @@ class Seen:
         if named and not self._assigned(file, first) & self._attributes(file):
             return named
         by_name = self._ranked(self._parametrised(file)) if self._assigned(file, first) & self._attributes(file) else []
-        return list(
-            dict.fromkeys([*by_name, *self._ranked(set().union(*lines.values())), *named])
-        )  # of a law its own tests first
+        # The tests of a law come first
+        return list(dict.fromkeys([*by_name, *self._ranked(set().union(*lines.values())), *named]))
 
     def _parametrised(self, file: str) -> set[str]:
         """The tests whose parameters name the file: they may read its class without executing a line of it."""

@@ -269,9 +269,8 @@ def _table_4(device: MesoHexapod, data: PaperRecordings) -> list[PrintedNumber]:
         return ((J_k @ inputs).T / SCALE).ravel()
 
     ours = poses(data.J_cube.ravel())
-    extra = propagated_rounding(
-        poses, data.J_cube.ravel(), np.repeat([0.5e-2, 0.5e-5], 18)
-    )  # rad/m and 1, of five decimals in mm
+    # rad/m and 1, of five decimals in mm
+    extra = propagated_rounding(poses, data.J_cube.ravel(), np.repeat([0.5e-2, 0.5e-5], 18))
     printed = (data.kinematic / SCALE).ravel()
     found = []
     for k, value in enumerate(printed):

@@ -20,7 +20,8 @@ TABLE_A1 = {
     "3338": ("25", "10.184", "0.0015", "0.03"),
     "fibre": ("25", "11.770", "0.0045", "0.08"),
 }
-RESOLUTIONS = {  # ADC, noise with filter, noise without [nm]; measuring range [um]
+# ADC, noise with filter, noise without [nm]; measuring range [um]
+RESOLUTIONS = {
     "3316": ("3.13", "18.5", "51", "102.6"),
     "3317": ("3.08", "10.1", "35", "101.0"),
     "3338": ("3.10", "15.3", "51", "101.8"),

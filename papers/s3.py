@@ -28,10 +28,11 @@ from .s3_tables import (
 )
 
 POINT = 0.1  # percentage points that Table 6 may be off, because it and the entries of Table 5 are rounded
+# The same with the input compliance that (B.83) leaves out
 COMPLETE = {
     "C_inFin": "input_compliance",
     "J": "complete_J",
-}  # the same with the input compliance that (B.83) leaves out
+}
 STRUCTURAL = "zero by the threefold symmetry; allowed: rounding of the model"
 
 

@@ -29,14 +29,16 @@ TABLE_4 = {
     },
 }
 
-TABLE_5 = {  # finite elements
+# Finite elements
+TABLE_5 = {
     "C_oFo": ("11.498 0 0", "0 11.476 0", "0 0 27966"),
     "C_oFin": ("0.879 0.257 -1.136", "0.803 -1.162 0.357", "-32.141 -32.245 -32.115"),
     "C_inFin": ("0.182 -0.024 -0.024", "-0.024 0.182 -0.024", "-0.024 -0.024 0.182"),
     "J": ("4.259 1.250 -5.499", "3.897 -5.645 1.734", "-240.768 -241.315 -240.481"),
 }
 
-TABLE_6 = {  # per cent of the finite elements; . where the print has a dash
+# Per cent of the finite elements; . where the print has a dash
+TABLE_6 = {
     1: {
         "C_oFo": ("-8.8 . .", ". -8.6 .", ". . -11.5"),
         "C_oFin": ("-7.9 10.9 -8.5", "-8.8 8.1 -6.0", "-3.8 4.1 -3.7"),

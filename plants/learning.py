@@ -27,9 +27,8 @@ except ModuleNotFoundError as missing:
         raise
     raise SystemExit(str(missing)) from None
 
-EVERY = (
-    5  # one pose in so many samples is solved for; those between are on the periodic cubic through them, to a few pm
-)
+# One pose in so many samples is solved for; those between are on the periodic cubic through them, to a few pm
+EVERY = 5
 PERIODS = 5  # of the circle in a recording
 MOST_RUNS = 3
 BENCHES = {

@@ -30,9 +30,8 @@ except ModuleNotFoundError as missing:
 
 PRINTED = sum(CIRCLE.values()) / len(CIRCLE)
 FIRST, SECOND = "first chip", "second chip"
-HEATERS = 1.04 * np.array(
-    [1.005, 0.997, 1.002, 0.996, 1.003, 0.999]
-)  # thermal resistances of the second chip over the first's
+# Thermal resistances of the second chip over the first's
+HEATERS = 1.04 * np.array([1.005, 0.997, 1.002, 0.996, 1.003, 0.999])
 RUN_TIME = '\n[run_time]\nconstants = ["actuator.thermal_resistance"]\n'
 SHORT = 12  # poses to fit in the recording that a chip is calibrated with
 RUNS = 2  # of learning

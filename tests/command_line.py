@@ -10,7 +10,8 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-WORK = (  # what the commands import when they do it
+# What the commands import when they do it
+WORK = (
     "ctrlgen.app.batch",
     "ctrlgen.app.check_files",
     "ctrlgen.app.scenario_pipeline",

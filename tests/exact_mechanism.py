@@ -12,9 +12,8 @@ from ctrlgen.physics.rigid_bodies import GROUND
 from plants.frame import Equilibrium, Frame, Node, Pose
 
 UM = 1e6
-WORLD = Rotation.from_rotvec(
-    [0.3, -0.4, 0.5]
-).as_matrix()  # the drawing is turned by it: a beam along an axis may be singular
+# The drawing is turned by it: a beam along an axis may be singular
+WORLD = Rotation.from_rotvec([0.3, -0.4, 0.5]).as_matrix()
 
 
 def rigidity(section, p, m) -> list[tuple[float, tuple[float, float, float, float]]]:

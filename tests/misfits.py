@@ -19,8 +19,16 @@ from ctrlgen.estimation.misfit import Misfit
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.recording import Record
 
 BLOCKS = 20
+
+
+def record(role: str, n: int, n_y: int = 1, observed=None, drive=None) -> Record:
+    """Readings of one record, zero unless `observed` is given, every millisecond."""
+    y = np.zeros((n, n_y)) if observed is None else observed
+    u = np.random.default_rng(9).standard_normal((n, 1)) if drive is None else drive
+    return Record(role, role, 1e-3 * np.arange(n), 1e-3, u, y, False, None, np.ones(y.shape, bool))
 
 
 def noise_of(n_y: int = 1, known: bool = True, count: float = np.inf) -> Noise:

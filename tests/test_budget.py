@@ -297,9 +297,8 @@ def test_a_draw_is_a_simulated_device(circle, budget):
     deviation = driven(circle, numbers, u)[budget.drawn.kept]
     off = np.abs(budget.drawn.pose[3] - deviation).max(axis=0)
     scatter = np.sqrt(sum(sd**2 for sd in budget.linear.scatter["pose"].values())).max(axis=0)
-    assert np.all(off < 5 * scatter) and np.all(
-        np.abs(deviation).max(axis=0) > 20 * scatter
-    )  # converter and jitter are drawn anew
+    # Converter and jitter are drawn anew
+    assert np.all(off < 5 * scatter) and np.all(np.abs(deviation).max(axis=0) > 20 * scatter)
 
 
 def test_the_ranking_is_by_what_is_left_without(circle, budget, tmp_path):
@@ -395,12 +394,10 @@ def test_a_limit_that_is_itself_uncertain(circle, tmp_path):
     slopes = slopes_of_limits(path, linear)
     found = margins(path, linear, slopes)
     hot = [i for i, (limit, _) in enumerate(path.channels) if limit.name == "temperature"]
-    np.testing.assert_allclose(
-        found.sd[1][:, hot], np.hypot(5, 2), rtol=1e-6
-    )  # T rises with the ambient, its limit does not
-    np.testing.assert_allclose(
-        found.sd[0][:, hot], 0, atol=1e-5
-    )  # T and its lower bound, the ambient, rise alike; e^-14 is left of 2 K
+    # T rises with the ambient, its limit does not
+    np.testing.assert_allclose(found.sd[1][:, hot], np.hypot(5, 2), rtol=1e-6)
+    # T and its lower bound, the ambient, rise alike; e^-14 is left of 2 K
+    np.testing.assert_allclose(found.sd[0][:, hot], 0, atol=1e-5)
     stress = [i for i, (limit, _) in enumerate(path.channels) if limit.name == "wire_stress"]
     step = changed(circle.model.device, {"actuator.ambient": number(circle, "actuator.ambient") + 2})
     trace = simulate(
@@ -729,9 +726,8 @@ def test_the_command_states_the_difference_to_a_finer_model(tmp_path):
     assert faults(record, "budget") == [] and "finer" in record["inputs"]
     entry = record["model_difference"]
     z = np.array(entry["deviation"]["delta_z [nm]"])
-    assert (
-        entry["kind"] == "model difference" and len(z) == record["samples"] and z.min() > 0
-    )  # hotter: it pushes farther
+    # Hotter: it pushes farther
+    assert entry["kind"] == "model difference" and len(z) == record["samples"] and z.min() > 0
     assert (
         entry["effects"][0]["peak"] >= z.max()
         and "stands beside the band" in (tmp_path / "b" / "budget.html").read_text()

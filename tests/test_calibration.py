@@ -101,9 +101,8 @@ def test_a_constant_on_which_the_recording_says_nothing_keeps_its_default(tmp_pa
     assert found["actuator.time_constant"].determined
 
 
-@pytest.mark.parametrize(
-    "spread", [0.3, 3.0]
-)  # of h beforehand: the readings tell it hardly, or better than its bounds
+# The spread of h beforehand: the readings tell it hardly, or better than its bounds
+@pytest.mark.parametrize("spread", [0.3, 3.0])
 def test_constants_fitted_beside_a_held_one_deviate_with_it_as_stated(rng, spread):
     """Readings X_c c + x_h h + e, c by least squares with h held at 0 while it is anything within its bounds: scores over 20,000 draws
     against the standard deviations, correlation and 95 % intervals that are stated. 3 %: three standard errors of these."""
@@ -179,9 +178,8 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
     assert after.combined**2 == pytest.approx(variance, rel=1e-6, abs=1e-9 * variance.max())
     wide = dict(zip([line.name for line in before.uncertainties.lines], before.uncertainties.sds, strict=True))
     assert wide["actuator.thermal_resistance"] == pytest.approx(27.5, rel=1e-9)  # 5 % of 550 K/W, as stated
-    assert wide["actuator.time_constant"] == pytest.approx(
-        1.01036e-3, rel=1e-4
-    )  # not stated: 3.5 ms of bounds over the root of 12
+    # Not stated: 3.5 ms of bounds over the root of 12
+    assert wide["actuator.time_constant"] == pytest.approx(1.01036e-3, rel=1e-4)
 
 
 def test_of_a_list_the_numbers_that_are_no_constants_stay_uncertain(tmp_path):

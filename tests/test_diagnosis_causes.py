@@ -62,9 +62,8 @@ def test_play_is_followed_through_reversals_between_samples():
     assert fit.theta[-1] == pytest.approx(6e-8, rel=0.05)
     assert fit.chi2 < 1.4 * fit.n  # the samples alone: 10 n
     n = sum(int(r.valid.sum()) for r in fitter.held_out_records)
-    assert (
-        held_out_deviance(fitter, fit) < 1.4 * n
-    )  # rests first: inside the gap the slopes by the start say nothing of it
+    # The record rests first: inside the gap the slopes by the start say nothing of it
+    assert held_out_deviance(fitter, fit) < 1.4 * n
 
 
 def test_time_constants_are_found_decades_away():
@@ -238,9 +237,8 @@ def test_fringes_that_bend_the_path_they_are_read_along_are_found_along_the_one_
 def test_the_harmonic_of_a_fringe_that_is_known_is_found_along_what_the_fringe_counts():
     """The fringe that is known already bends both the path read and the one foreseen with it."""
     pitch = 4e-7
-    size = (
-        2.405 * pitch / (4 * np.pi)
-    )  # a zero of J_0: of the harmonic nothing is left at its own way along such a path
+    # A zero of J_0: of the harmonic nothing is left at its own way along such a path
+    size = 2.405 * pitch / (4 * np.pi)
 
     def fringed(u):
         y = move(u)

@@ -155,9 +155,8 @@ def test_a_weak_actuator_and_a_wrong_reading_are_told_apart(meso):
         assert found.coordinates.located_in == kind
         alone = found.coordinates.explained_by_one[kind]
         assert max(alone, key=alone.get) == name and alone[name] > 0.9
-        assert not any(
-            "direction" in said for said in found.statements
-        )  # poses reached from below stand higher on the whole
+        # Poses reached from below stand higher on the whole
+        assert not any("direction" in said for said in found.statements)
         other = {"actuator": "reading", "reading": "actuator"}[kind]
         assert found.coordinates.participation_ratio[kind] < 1.2 < found.coordinates.participation_ratio[other]
 

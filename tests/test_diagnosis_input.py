@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.diagnosis_folder import diagnose_into
 from ctrlgen.diagnosis.report.narrative import next_steps, sentence
 from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, UNEXPLAINED
 
+# The answer is the same, and quick
 LAWS = (
     "creep",
     "drive_gain",
@@ -23,7 +24,7 @@ LAWS = (
     "stiffening",
     "stuck",
     "thermal_lag",
-)  # the answer is the same, and quick
+)
 
 
 @pytest.fixture

@@ -33,12 +33,13 @@ from ctrlgen.estimation.profile_likelihood import BOUNDED, Profile
 from ctrlgen.estimation.simulator import Simulator
 
 CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
+# Four effects instead of all: the report is the same, and quick
 LAWS = (
     "creep",
     "drive_gain",
     "home_offset",
     "stiffening",
-)  # four effects instead of all: the report is the same, and quick
+)
 
 
 MADE_FROM = Provenance({"flexure_axis.toml": "0" * 64}, 3)

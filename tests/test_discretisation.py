@@ -196,13 +196,14 @@ def test_a_linear_stage_with_inertia_moves_as_its_matrix_exponential(h, linear):
     assert np.abs(x[:, 0] - exact[:, 0]).max() < ROUNDING * np.abs(exact[:, 0]).max()
 
 
+# k3: a sixth stiffer at the end of the travel, so that no contact asks for steps
 MASS, DAMPING, STIFFNESS, MOTOR, K3 = (
     0.5,
     30.0,
     2e5,
     10.0,
     2e12,
-)  # k3: a sixth stiffer at the end of the travel, so that no contact asks for steps
+)
 AXIS = AXIS_FILE.read_text()
 PIECES, COARSE = 24, 4e-3
 

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import inspect
-import subprocess
-import tomllib
-from functools import cache
-from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,101 +10,16 @@ import casadi as ca
 import numpy as np
 import pint
 import pytest
-from conftest import AXIS_FILE, DEVICE
+from effect_cases import SAMPLE_TIME, Law, apply, device_of, every_effect, place_of, place_unit, shapes, size, written
 
 import ctrlgen.effects
-from ctrlgen import Controller, build_model, simulate
-from ctrlgen.core.files import validate
-from ctrlgen.core.units import from_si, same_dimension
-from ctrlgen.devices import Device
-from ctrlgen.effects import Channel, Effect, Param, Place
-from ctrlgen.estimation.priors import prior_of
-from ctrlgen.firmware.c.cprint import print_function
-from ctrlgen.firmware.c.elementary import elementary_text
-from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.toolchains import FLAGS
-from ctrlgen.model.effect_terms import available, channels, partner_channels
+from ctrlgen import build_model
+from ctrlgen.core.units import same_dimension
+from ctrlgen.effects import Channel, Effect, Place
 
-TESTED = {
-    "kind": "tested_axis", "name": "tested", "title": "an axis under test", "source": "round numbers",
-    "mechanics": {"mass": "1 kg", "damping": "30 N*s/m", "stiffness": "0.2 N/um", "stroke": "100 um", "speed": "5 mm/s", "force": "20 N"},
-}  # fmt: skip
-PAIR = {
-    **{key: TESTED[key] for key in ("title", "source")}, "kind": "tested_axes", "name": "pair",
-    "axis": [{"name": name, **TESTED["mechanics"]} for name in ("a", "b")],
-}  # fmt: skip
-SAMPLE_TIME = 1e-3
-MODEST = 0.5  # typical sizes: a tenth of the bounds where they are narrower than ten of these
-every_effect = pytest.mark.parametrize("effect", Effect.library.values(), ids=Effect.library)
-IN_THE_MODEL = {
-    kind: effect for kind, effect in Effect.library.items() if not effect.shifts_drive
-}  # test_law_values has the rest
+# The rest, which shifts the drive, is in test_law_delays
+IN_THE_MODEL = {kind: effect for kind, effect in Effect.library.items() if not effect.shifts_drive}
 every_law = pytest.mark.parametrize("effect", IN_THE_MODEL.values(), ids=IN_THE_MODEL)
-
-
-@cache
-def tables() -> tuple[dict, ...]:
-    """A device with heaters and no inertia, one with inertia, one whose motion is imposed, two of these."""
-    files = (DEVICE, AXIS_FILE)
-    return (*(tomllib.loads(path.read_text()) for path in files), TESTED, PAIR)
-
-
-def device_of(table: dict, *effects: dict) -> Device:
-    return validate(Device.library[table["kind"]], {**table, "effect": list(effects)}, "device with effects")
-
-
-@cache
-def place_of(effect: type[Effect]) -> tuple[dict, list[Channel]]:
-    """The first device on which the effect can act, and every channel (and partner) there."""
-    for table in tables():
-        device = device_of(table)
-        physics = device.physics(device.values())
-        places = channels(physics, effect.place)
-        if effect.pairs:
-            places = [w.paired_with(other) for w in places for other in partner_channels(physics, effect)]
-        places = [w for w in places if effect.applies_to(w)]
-        if places and effect.requires <= available(physics, SAMPLE_TIME):
-            return table, places
-    raise AssertionError(f"{effect.kind} acts on no device that is known here")
-
-
-SUGGESTED = {"moments": (0.3, 1.0, 3.0), "jump_positions": (-0.3, 0.1, 0.6)}
-
-
-def shapes(effect: type[Effect], where: Channel) -> list[dict[str, float]]:
-    """Every combination of the shape parameters' start values, SI; of what records suggest, a few."""
-    shaped = [p for p in effect.params if p.off is None]
-    return [
-        dict(zip((p.name for p in shaped), [where.si(v, p) for v, p in zip(values, shaped, strict=True)], strict=True))
-        for values in product(*(starts(effect, p) for p in shaped))
-    ]
-
-
-EMPIRICAL = {"low": -3.0, "width": 6.0, "speed": 10.0, "reach": 0.3} | {
-    f"c{j}": float(np.sin(2 * j)) for j in range(1, 18)
-}
-
-
-def starts(effect: type[Effect], p: Param) -> tuple[float, ...]:
-    if effect.kind.startswith("empirical_"):  # no fit begins with them
-        return (EMPIRICAL[p.name],)
-    prior = prior_of(effect).of(p)
-    return prior.start_values or SUGGESTED[prior.start_from_data]
-
-
-def size(effect: type[Effect], where: Channel, rng: np.random.Generator) -> float:
-    """A modest amplitude, SI."""
-    p = effect.amplitude()
-    return rng.uniform(0.2, 1.0) * where.si(min(0.1 * p.bounds[1], MODEST), p)
-
-
-def written(effect: type[Effect], where: Channel, values: dict[str, float]) -> dict:
-    """The [[effect]] table with `values` [SI]."""
-    units = {p.name: where.unit_of(p) for p in effect.params}
-    texts = {k: f"{from_si(v, units[k])!r} {'' if units[k] == '1' else units[k]}".strip() for k, v in values.items()}
-    if effect.pairs:
-        return {"kind": effect.kind, "at": where.name, "of": where.partner, **texts}
-    return {"kind": effect.kind, "at": "all" if effect.place is Place.POSE else where.name, **texts}
 
 
 class Everything:
@@ -164,94 +74,6 @@ def test_vanishes_exactly_when_off_and_only_then(effect, rng):
 
 
 MOTION = {"stiffness": "m", "damping": "m/s", "inertia": "m/s^2"}  # what a cross term counts per
-
-
-class Law:
-    """One effect's law alone, on channel `index` of six, walked along given signals; everything of typical size 1.
-
-    One sample: (memories, signals, parameters) -> (memories, term), stepped ones by `update`, rates by Runge-Kutta's steps
-    or, of bristles, exactly.
-    """
-
-    PER_CHANNEL, ALONE = 6, ("displacement", "velocity", "force", "state", "ambient", "time")
-    REST, INDEX, PARTNER = 0.3, 4, 1  # as of delta_y and theta_y
-    STEPS = 4  # a sample: lags of a fifth of it are followed
-
-    def __init__(self, effect: type[Effect], h: float, index: int = INDEX, still: bool = False) -> None:
-        self.effect, self.h = effect, h
-        self.where = Channel("1X", place_unit(effect), 1.0, "m", 1.0, "1Y", effect.partner_unit or "m", 1.0)
-        self.index = 1 if effect.channel_unit == "rad" else index
-        self.partner = 4 if effect.channel_unit == "rad" else self.PARTNER
-        memory = ca.SX.sym("memory", len(effect.states))
-        signals = ca.SX.sym("signals", self.PER_CHANNEL + len(self.ALONE))
-        p = ca.SX.sym("p", len(effect.params))
-        held = {k: signals[self.PER_CHANNEL + i] for i, k in enumerate(self.ALONE)}
-
-        def law(m: ca.SX) -> tuple[list[ca.SX], list[ca.SX], ca.SX]:
-            return apply(effect, self.seen(m, signals[: self.PER_CHANNEL], held), ca.vertsplit(p))
-
-        stepped, _, term = law(memory)
-        after = ca.vertcat(*stepped) if stepped else memory
-
-        def f(m: ca.SX) -> ca.SX:
-            return ca.vertcat(ca.SX(0, 1), *law(m)[1])
-
-        if effect.set_valued:  # bristles: linear in themselves, far faster than a sample
-            a = f(memory)
-            slope = h * ca.diag(ca.jacobian(a, memory))
-            after = after + h * a * ca.if_else(slope < -1e-6, (ca.exp(slope) - 1) / slope, 1.0)
-        elif "rates" in vars(effect):
-            part = h / self.STEPS
-            moving = memory
-            for _ in range(self.STEPS):
-                a = f(moving)
-                b = f(moving + part / 2 * a)
-                c = f(moving + part / 2 * b)
-                d = f(moving + part * c)
-                moving = moving + part / 6 * (a + 2 * b + 2 * c + d)
-            after = after + moving - memory
-        clocks = [i for i, s in enumerate(effect.states) if s.clock]
-        for i in clocks:
-            after[i] = held["time"] if still else memory[i] + h
-        self.one = ca.Function("one", [memory, signals, p], [after, term], ["m", "s", "p"], ["next", "term"])
-        self.whole = ca.Function("whole", [memory, signals, p], [ca.vertcat(after, term)], ["m", "s", "p"], ["result"])
-
-    def seen(self, memory, every, held: dict) -> SimpleNamespace:
-        return SimpleNamespace(
-            value=every[self.index], rate=None, second_rate=None, all=every,
-            index=self.index, partner=self.partner, ambient=held["ambient"],
-            sample_time=self.h, rest=self.REST, scale=1.0, travel=1.0, second_order_kinematics=lambda: every,
-            tangent_compliance=lambda: every, displacements=every, velocities=every, accelerations=every,
-            displacement=held["displacement"], velocity=held["velocity"], force=held["force"], state=held["state"],
-            **{s.name: memory[i] for i, s in enumerate(self.effect.states)},
-        )  # fmt: skip
-
-    def walk(self, signals: np.ndarray, start: np.ndarray | None = None) -> ca.Function:
-        """(parameters) -> the term at every row of `signals`."""
-        p = ca.MX.sym("p", len(self.effect.params))
-        start = np.zeros(len(self.effect.states)) if start is None else start
-        _, terms = self.one.mapaccum(len(signals))(start, signals.T, ca.repmat(p, 1, len(signals)))
-        return ca.Function("walk", [p], [terms.T])
-
-    def numbers(self, shape: dict[str, float], amplitude: float) -> list[float]:
-        values = {**shape, self.effect.amplitude().name: amplitude}
-        return [values[q.name] for q in self.effect.params]
-
-
-def apply(effect: type[Effect], s: SimpleNamespace, numbers: list) -> tuple[list, list, ca.SX]:
-    """Memories after the sample, their rates, and the term, as a model asks for them; the term sees the new ones."""
-    p = SimpleNamespace(**dict(zip((q.name for q in effect.params), numbers, strict=True)))
-    instance = effect("all", {})
-    before = {state.name: getattr(s, state.name) for state in effect.states}
-    s.__dict__.update(instance.update(s, p))
-    rates = {state.name: 0.0 for state in effect.states} | instance.rates(s, p)
-    return [getattr(s, name) for name in before], [rates[name] for name in before], instance.term(s, p)
-
-
-def place_unit(effect: type[Effect]) -> str:
-    if effect.channel_unit:
-        return effect.channel_unit if isinstance(effect.channel_unit, str) else effect.channel_unit[0]
-    return {Place.DRIVE: "V", Place.HEAT: "W", Place.FORCE: "N"}.get(effect.place, "m")
 
 
 def rich(count: int, h: float) -> np.ndarray:
@@ -363,130 +185,6 @@ def dimension_factor(unit: str, scale: dict[str, float]) -> float:
     return float(
         np.prod([scale[names[dimension]] ** power for dimension, power in powers.items() if dimension in names])
     )
-
-
-@pytest.fixture(scope="module")
-def compiled(compiler, tmp_path_factory):
-    """Every law, and every kernel of a controller with it, as one shared library of printed C; the functions by name."""
-    functions = {f"{kind}_law": Law(effect, 1e-2).whole for kind, effect in Effect.library.items()}
-    for effect in CONTROLLED:
-        for mode in ("static", "moving"):
-            inverse = getattr(controller_with(effect), mode)
-            for part in ("displacement", "state", "drive", "advance"):
-                functions[f"{effect.kind}_{mode}_{part}"] = getattr(inverse, part)
-    folder = tmp_path_factory.mktemp("laws")
-    kernels = {name: print_function(function, name, Real.DOUBLE) for name, function in functions.items()}
-    text = (
-        "#include <stdint.h>\n"
-        + elementary_text(frozenset().union(*(k.calls for k in kernels.values())), Real.DOUBLE)
-        + "".join(k.text.removeprefix("static ") for k in kernels.values())
-    )
-    (folder / "laws.c").write_text(text)
-    flags = [flag for flag in FLAGS if flag != "-Wmissing-prototypes" and not flag.startswith("-O")]
-    command = [
-        compiler,
-        *flags,
-        "-O0",
-        "-shared",
-        "-fPIC",
-        str(folder / "laws.c"),
-        "-o",
-        str(folder / "laws.so"),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[:3000]
-    library = ctypes.CDLL(str(folder / "laws.so"))
-    return {name: (functions[name], kernels[name], getattr(library, name)) for name in functions}
-
-
-def worst_difference(function: ca.Function, kernel, c, arguments: dict[str, np.ndarray]) -> float:
-    """C against CasADi, by the size of the largest result, beyond some roundings of the largest argument: a root is off by
-    one, and a law far from its limit is the difference of near numbers."""
-    result = np.zeros(function.size1_out(0))
-    given = [np.ascontiguousarray(arguments[name], dtype=float) for name in kernel.arguments]
-    pointer = ctypes.POINTER(ctypes.c_double)
-    c(*(ctypes.cast(a.ctypes.data, pointer) for a in (*given, result)))
-    expected = function(*(arguments[name] for name in function.name_in())).full().ravel()
-    assert np.all(np.isfinite(expected))
-    known = 16 * np.finfo(float).eps * max(np.max(np.abs(v), initial=0.0) for v in arguments.values())
-    off = np.maximum(np.abs(result - expected) - known, 0.0)
-    return float(np.max(off, initial=0) / np.max(np.abs(expected), initial=1e-30))
-
-
-@pytest.mark.long
-@every_effect
-def test_c_equals_python(effect, compiled, rng):
-    """Twenty random calls of the law, and of the controller's kernels where it has some, to double precision."""
-    function, kernel, c = compiled[f"{effect.kind}_law"]
-    law = Law(effect, 1e-2)
-    for _ in range(20):
-        shape = shapes(effect, law.where)
-        given = {
-            "m": rng.uniform(-1, 1, len(effect.states)), "s": rng.uniform(-1, 1, function.size1_in(1)),
-            "p": np.array(law.numbers(shape[rng.integers(len(shape))], size(effect, law.where, rng))),
-        }  # fmt: skip
-        assert worst_difference(function, kernel, c, given) < 1e-13
-    if effect not in CONTROLLED:
-        return
-    m = controller_with(effect).nominal
-    scale = {
-        "x": m.x_scale, "z": m.z_scale, "wanted": m.z_scale, "drive": 0.5 * m.u_scale, "state": m.x_scale[: m.n_states],
-        "target": np.array(m.signals["pose"].scale),
-    }  # fmt: skip
-    for mode, part in product(("static", "moving"), ("displacement", "state", "drive", "advance")):
-        function, kernel, c = compiled[f"{effect.kind}_{mode}_{part}"]
-        for _ in range(5):
-            z = rng.uniform(0.5, 2, m.z.numel()) * m.z_scale
-            given = {k: rng.uniform(0.2, 1, len(v)) * v for k, v in scale.items()}
-            given |= {"z": z, "wanted": z * rng.uniform(0.99, 1.01, len(z))}
-            given["x"] = given["x"] + m.rest
-            given["state"] = given["state"] + m.rest[: m.n_states]
-            # A root found by Newton's method amplifies rounding by what it is ill conditioned
-            assert worst_difference(function, kernel, c, given) < 1e-9, (mode, part)
-
-
-def controlled() -> list[type[Effect]]:
-    """Effects on the way to the pose of the device that a controller can be made for."""
-    return [e for e in Effect.library.values() if e.place is not Place.SENSOR and place_of(e)[0] is tables()[0]]
-
-
-CONTROLLED = controlled()
-every_controlled = pytest.mark.parametrize("effect", CONTROLLED, ids=lambda e: e.kind)
-
-
-@cache
-def controller_with(effect: type[Effect]) -> Controller:
-    """The controller of the hexapod with the effect, modest, in the middle of its grid."""
-    table, places = place_of(effect)
-    where = places[len(places) // 2]
-    shape = shapes(effect, where)
-    values = {**shape[len(shape) // 2], effect.amplitude().name: size(effect, where, np.random.default_rng(3))}
-    return Controller(
-        build_model(device_of(table, written(effect, where, values)), sample_time=SAMPLE_TIME), "pose", SAMPLE_TIME
-    )
-
-
-@every_controlled
-def test_the_inverse_follows_without_knowing_the_effect(effect):
-    """Controller with the effect -> model with the effect: the pose is the commanded one."""
-    controller = controller_with(effect)
-    angle = 2 * np.pi * np.arange(60) / 60
-    targets = np.column_stack(
-        [0 * angle, 0 * angle, 0 * angle, 4e-6 * np.cos(angle), 4e-6 * np.sin(angle), 25e-6 + 0 * angle]
-    )
-    step = controller.step(controller.rest(), targets[0], settle=True)
-    start, state, drives = step.state, step.state, []
-    for target in targets[1:]:
-        step = controller.step(state, target)
-        assert step.status == 0
-        state = step.state
-        drives.append(step.drive)
-    reached = simulate(controller.model, np.array(drives), SAMPLE_TIME, *start).signals["pose"]
-    error = np.abs(reached - targets)
-    # The issue's own limits. A drive that fades with time is held constant within a sample: a tenth of a nanometre.
-    fades = effect.place is Place.DRIVE and any(s.clock for s in effect.states)
-    assert error[:, 3:].max() < (1e-10 if fades else 1e-11)
-    assert error[:, :3].max() < (1e-8 if fades else 1e-12)
 
 
 @every_effect

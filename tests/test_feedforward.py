@@ -208,9 +208,8 @@ def test_a_lost_state_gets_the_safe_drive_until_one_starts_again_from_rest(contr
             assert again.status == ControllerStatus.LOST
     assert controller.step(controller.rest(), target, settle=True).status == 0
     edge = np.max(controller.nominal.x_bounds[1])
-    assert not controller.is_lost(
-        np.full(6, edge), controller.nominal.z_bounds[1]
-    )  # every state within its limits is one
+    # Every state within its limits is one
+    assert not controller.is_lost(np.full(6, edge), controller.nominal.z_bounds[1])
 
 
 def test_a_state_is_lost_beyond_four_times_its_range_in_the_root_mean_square(controller):

@@ -1,89 +1,18 @@
-"""The co-simulation units: valid FMI, run by FMPy, equal to controller and model; the plant's C by itself."""
+"""The co-simulation units: valid FMI, run by FMPy, and what they answer to calls of every kind."""
 
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
-from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import AXIS_FILE, SCENARIOS, effect_device
+from conftest import SCENARIOS
+from fmu_units import Unit, apart, fmpy, opened, run_plant
 
 from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
-from ctrlgen.firmware.c.deviations import permits
-from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.fmi.fmu import write_fmus
-from ctrlgen.firmware.fmi.plant import plant_of, write_plant
-
-fmpy = pytest.importorskip("fmpy", reason="FMPy is missing, the units were not run: pip install 'ctrlgen[fmi]'")
-from fmpy.fmi1 import FMICallException  # noqa: E402
-from fmpy.fmi2 import FMU2Slave  # noqa: E402
-from fmpy.fmi3 import FMU3Slave  # noqa: E402
-from fmpy.validation import validate_fmu  # noqa: E402
-
-CREEP = {"kind": "creep", "at": "all", "gain": "0.03", "tau": "20 ms", "slow": "0.3"}
-DELAY = {"kind": "delay", "at": "all", "delay": "2.5 ms"}
-
-
-class Unit:
-    """One instance of an FMU, stepped by its sample time; variables by name, or by the beginning of their names."""
-
-    def __init__(self, path: Path, folder: Path, **start: bool) -> None:
-        self.about = fmpy.read_model_description(str(path))
-        if not folder.exists():  # a loaded library must not be written over
-            fmpy.extract(str(path), str(folder))
-        self.three = self.about.fmiVersion == "3.0"
-        self.fmu = (FMU3Slave if self.three else FMU2Slave)(
-            guid=self.about.guid, unzipDirectory=str(folder), modelIdentifier=self.about.coSimulation.modelIdentifier
-        )
-        self.fmu.instantiate()
-        self.sample_time = float(self.about.defaultExperiment.stepSize)
-        self.start_settled = start.get("start_settled", False)
-
-    def references(self, what: str) -> list[int]:
-        """Value references of the variable `what`, or of `what_...`, in their order."""
-        found = [v.valueReference for v in self.about.modelVariables if v.name == what or v.name.startswith(f"{what}_")]
-        assert found, what
-        return found
-
-    def set(self, what: str, values: np.ndarray) -> None:
-        (self.fmu.setFloat64 if self.three else self.fmu.setReal)(self.references(what), list(map(float, values)))
-
-    def get(self, what: str) -> np.ndarray:
-        return np.array((self.fmu.getFloat64 if self.three else self.fmu.getReal)(self.references(what)))
-
-    @property
-    def status(self) -> int:
-        return (self.fmu.getInt32 if self.three else self.fmu.getInteger)(self.references("status"))[0]
-
-    def begin(self, what: str, values: np.ndarray, seen: str = "", at: float = 0.0) -> np.ndarray | None:
-        """Initialized with these inputs; the output `seen` as it is before initialization ends."""
-        if self.start_settled:
-            self.fmu.setBoolean(self.references("start_settled"), [True])
-        if self.three:
-            self.fmu.enterInitializationMode(startTime=at)
-        else:
-            self.fmu.setupExperiment(startTime=at)
-            self.fmu.enterInitializationMode()
-        self.set(what, values)
-        early = self.get(seen) if seen else None
-        self.fmu.exitInitializationMode()
-        self.time = at
-        return early
-
-    def step(self, samples: float = 1) -> None:
-        size = samples * self.sample_time
-        self.fmu.doStep(currentCommunicationPoint=self.time, communicationStepSize=size)
-        self.time += size
-
-    def close(self) -> None:
-        self.fmu.terminate()
-        self.fmu.freeInstance()
 
 
 @pytest.fixture(scope="module", params=[3, 2], ids=["FMI 3.0", "FMI 2.0"])
@@ -95,37 +24,9 @@ def units(request, tmp_path_factory, compiler):
     return made.paths
 
 
-@contextmanager
-def opened(path: Path, folder: Path, **start: bool):
-    """A unit, ended and freed afterwards."""
-    unit = Unit(path, folder, **start)
-    try:
-        yield unit
-    finally:
-        unit.close()
-
-
-def apart(ours: np.ndarray, expected: np.ndarray) -> float:
-    """The largest difference, per channel's largest size."""
-    size = np.maximum(np.max(np.abs(expected), axis=0), 1e-300)
-    return float(np.max(np.abs(ours - expected) / size))
-
-
-def run_plant(unit: Unit, drives: np.ndarray, roles: list[str]) -> dict[str, np.ndarray]:
-    """Outputs at the start and at the end of every sample."""
-    unit.begin("drive", drives[0])
-    rows = {role: [unit.get(role)] for role in roles}
-    for drive in drives:
-        unit.set("drive", drive)
-        unit.step()
-        for role in roles:
-            rows[role].append(unit.get(role))
-    return {role: np.array(values) for role, values in rows.items()}
-
-
 def test_the_units_are_valid_fmi(units):
     for path in units:
-        assert validate_fmu(str(path)) == []
+        assert fmpy.validation.validate_fmu(str(path)) == []
     about = fmpy.read_model_description(str(units[1]))
     drive = next(v for v in about.modelVariables if v.name == "drive_1X")
     heat = next(u for u in about.unitDefinitions if u.name == "W")
@@ -236,9 +137,9 @@ def test_a_communication_step_may_be_several_samples_and_nothing_else(units, cir
         assert np.array_equal(one.get("pose"), other.get("pose"))
         before = one.get("pose")
         for samples in (0.5, 1.3, 1.5, 0.0, -1.0, np.nan):
-            with pytest.raises(FMICallException):
+            with pytest.raises(fmpy.fmi1.FMICallException):
                 one.fmu.doStep(currentCommunicationPoint=one.time, communicationStepSize=samples * 1e-3)
-        with pytest.raises(FMICallException):
+        with pytest.raises(fmpy.fmi1.FMICallException):
             one.fmu.doStep(currentCommunicationPoint=one.time + 1e-3, communicationStepSize=1e-3)
         assert np.array_equal(one.get("pose"), before)
         one.step()
@@ -271,7 +172,7 @@ def test_a_state_can_be_kept_and_sent_and_foreign_ones_are_refused(units, circle
             other.step(5)
             assert np.array_equal(other.get("displacement"), later)
             for wrong in (bytes(len(sent)), sent[:-1]):
-                with pytest.raises(FMICallException):
+                with pytest.raises(fmpy.fmi1.FMICallException):
                     (other.fmu.deserializeFMUState if three else other.fmu.deSerializeFMUstate)(wrong)
 
 
@@ -311,7 +212,7 @@ def test_what_is_not_a_number_is_answered_safely(units, circle, tmp_path):
     with opened(units[1], tmp_path / "p") as plant:
         plant.begin("drive", circle.drive[0])
         plant.set("drive", np.full(6, np.nan))
-        with pytest.raises(FMICallException):
+        with pytest.raises(fmpy.fmi1.FMICallException):
             plant.step()
         plant.set("drive", circle.drive[0])
         plant.step()
@@ -321,145 +222,14 @@ def test_what_is_not_a_number_is_answered_safely(units, circle, tmp_path):
 def test_outputs_and_foreign_tokens_are_not_taken(units, circle, tmp_path):
     with opened(units[1], tmp_path / "p") as plant:
         plant.begin("drive", circle.drive[0])
-        with pytest.raises(FMICallException):
+        with pytest.raises(fmpy.fmi1.FMICallException):
             plant.set("pose", np.zeros(6))
-        with pytest.raises(FMICallException):
+        with pytest.raises(fmpy.fmi1.FMICallException):
             plant.fmu.setBoolean(plant.references("start_settled"), [True])
     unit = Unit(units[1], tmp_path / "q")
     unit.fmu.guid = "{another}"
     with pytest.raises(Exception, match="nstantiate"):
         unit.fmu.instantiate()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["meso_circle", "rrr_circle"])
-def test_plants_without_memory_or_with_coupled_stages_move_as_the_model(name, compiler, tmp_path, rng):
-    scenario = load_scenario(SCENARIOS / name)
-    model = build_model(scenario.device)
-    made = write_fmus(scenario, tmp_path / "out")
-    low, high = model.u_bounds
-    drives = low + rng.uniform(0.3, 0.6, size=(60, len(low))) * (high - low)
-    expected = simulate(model, drives, scenario.sample_time)
-    with opened(made.paths[1], tmp_path / "unit") as unit:
-        ours = run_plant(unit, drives, ["pose", "displacement"])
-    assert apart(ours["pose"], expected.signals["pose"]) < 1e-12
-    assert apart(ours["displacement"], expected.signals["displacement"]) < 1e-12
-
-
-@pytest.mark.parametrize("effect", [CREEP, DELAY], ids=["creep", "delay"])
-def test_memories_of_effects_are_in_the_plant(effect, circle, compiler, tmp_path):
-    scenario = replace(load_scenario(SCENARIOS / "circle20"), device=effect_device(effect))
-    plant = plant_of(scenario)
-    sources = tmp_path / "c"
-    name = write_plant(scenario, plant, Real.DOUBLE, sources)
-    drives = circle.drive[:100]
-    expected = simulate(plant.model, drives, 1e-3).signals
-    ours = run_c(compiler, sources, name, plant, drives, Real.DOUBLE)
-    assert apart(ours, expected["reading"]) < 1e-12
-    assert apart(simulate(circle.model, drives, 1e-3).signals["reading"], expected["reading"]) > 1e-3
-
-
-@pytest.mark.parametrize("real", list(Real))
-def test_the_plant_in_c_compiles_strictly_in_both_arithmetics(real, circle, compiler, tmp_path):
-    plant = plant_of(circle.scenario)
-    name = write_plant(circle.scenario, plant, real, tmp_path)
-    expected = simulate(plant.model, circle.drive, 1e-3).signals["reading"]
-    ours = run_c(compiler, tmp_path, name, plant, circle.drive, real)
-    if real is Real.DOUBLE:
-        assert apart(ours, expected) < 1e-12
-    else:  # as much as a float controller may miss its pose by
-        off = np.abs(ours - expected).max(axis=0)
-        assert np.all(off[:3] < 1e-8) and np.all(off[3:] < 1e-10), off
-        text = re.sub(r"/\*.*?\*/", "", (tmp_path / f"{name}.c").read_text(), flags=re.DOTALL)
-        assert "double" not in text and not re.search(r"\d\.\d+(e-?\d+)?[^\de.f]", text)
-
-
-def run_c(compiler: str, folder: Path, name: str, plant, drives: np.ndarray, real: Real) -> np.ndarray:
-    """The readings of the plant's C, at the start and at the end of every sample."""
-    m, channels = plant.model, len(plant.model.signals["reading"].channels)
-    rows = ",\n".join("{" + ", ".join(real.literal(v) for v in row) + "}" for row in drives)
-    show = f'for (i = 0; i < {channels}; i++) {{ (void)printf("%.17g ", (double)out.reading[i]); }}'
-    (folder / "main.c").write_text(f"""#include "{name}.h"
-#include <stdio.h>
-static const {real.value} drives[{len(drives)}][{m.u.numel()}] = {{ {rows} }};
-int main(void)
-{{
-    {name}_state state;
-    {name}_output out;
-    uint32_t status = {name}_init(&state, drives[0]);
-    int k;
-    int i;
-    status |= {name}_signals(&state, drives[0], &out);
-    {show}
-    for (k = 0; k < {len(drives)}; k++) {{
-        status |= {name}_step(&state, drives[k], &out);
-        {show}
-    }}
-    return (int)status;
-}}
-""")
-    sources = [str(folder / "main.c"), str(folder / f"{name}.c")]
-    built = subprocess.run([compiler, *FLAGS, *sources, "-o", str(folder / "main")], capture_output=True, text=True)
-    assert built.returncode == 0, built.stderr
-    done = subprocess.run([folder / "main"], capture_output=True, text=True)
-    assert done.returncode == 0, done
-    return np.array(done.stdout.split(), dtype=float).reshape(-1, channels)
-
-
-def axis_scenario(folder: Path, more: str = ""):
-    """A scenario on the axis with inertia, with `more` in its device file."""
-    (folder / "device.toml").write_text(AXIS_FILE.read_text() + more)
-    (folder / "scenario.toml").write_text(
-        'title = "a line"\ndevice = "device.toml"\nsample_rate = "2 kHz"\n'
-        'duration = "0.1 s"\n[path]\nkind = "line"\nstart = {}\nend = { axis = "10 um" }\n'
-    )
-    return load_scenario(folder)
-
-
-HYSTERETIC = """
-[[effect]]
-kind = "bouc_wen"
-at = "axis"
-stiffness = "0.01 N/um"
-reach = "2 um"
-loop = "0.7"
-"""
-STICKING = """
-[[effect]]
-kind = "coulomb"
-at = "axis"
-force = "0.5 N"
-reach = "0.1 um"
-smoothing = "0.1 mm/s"
-"""
-CONTROLLED = """
-[loop]
-position_gain = "100 1/s"
-velocity_gain = "10 V/(m/s)"
-integral_gain = "1e4 V/(m*s)"
-"""
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "more", ["", HYSTERETIC, STICKING, CONTROLLED], ids=["bare", "hysteresis", "dry friction", "in closed loop"]
-)
-def test_a_plant_with_inertia_moves_as_the_model_and_has_a_controller_where_its_motion_says_all(
-    more, compiler, tmp_path, rng
-):
-    (tmp_path / "axis").mkdir()
-    scenario = axis_scenario(tmp_path / "axis", more)
-    made = write_fmus(scenario, tmp_path / "out")
-    controller = [] if more else ["axis_controller.fmu"]
-    assert [path.name for path in made.paths] == [*controller, "axis_plant.fmu"]
-    assert ("no controller" in made.remark) == bool(more)
-    assert all(validate_fmu(str(path)) == [] for path in made.paths)
-    model = build_model(scenario.device)
-    drives = 0.3 * rng.normal(size=(200, 1)) * model.u_scale
-    expected = simulate(model, drives, scenario.sample_time).signals["pose"]
-    with opened(made.paths[-1], tmp_path / "unit") as unit:
-        ours = run_plant(unit, drives, ["pose"])["pose"]
-    assert np.ptp(expected) > 1e-7 and apart(ours, expected) < 1e-12
 
 
 def test_settling_finds_the_equilibrium(units, circle, tmp_path):
@@ -485,7 +255,7 @@ def test_without_a_compiler_there_are_sources_only_and_it_is_said(tmp_path, monk
     made = write_fmus(load_scenario(SCENARIOS / "circle20"), tmp_path / "out")
     assert made.binary is None and "no C compiler" in made.remark
     for path in made.paths:
-        assert validate_fmu(str(path)) == []
+        assert fmpy.validation.validate_fmu(str(path)) == []
         assert fmpy.supported_platforms(str(path)) in ([], ["c-code"])
 
 
@@ -506,35 +276,16 @@ def test_the_calls_are_declared_as_in_the_standards_own_headers(fmi, compiler, t
     assert done.returncode == 0, done.stderr[:2000]
     official = set(re.findall(rf"\b(fmi{fmi}\w+)TYPE\b", (headers / f"fmi{fmi}FunctionTypes.h").read_text()))
     ours = set(re.findall(rf"FMI{fmi}\((fmi{fmi}\w+)\)\(", text))
-    exchange = {"fmi2EnterEventMode", "fmi2NewDiscreteStates", "fmi2EnterContinuousTimeMode", "fmi2CompletedIntegratorStep",
-                "fmi2SetTime", "fmi2SetContinuousStates", "fmi2GetDerivatives", "fmi2GetEventIndicators",
-                "fmi2GetContinuousStates", "fmi2GetNominalsOfContinuousStates"}  # fmt: skip
+    exchange = {
+        "fmi2EnterEventMode",
+        "fmi2NewDiscreteStates",
+        "fmi2EnterContinuousTimeMode",
+        "fmi2CompletedIntegratorStep",
+        "fmi2SetTime",
+        "fmi2SetContinuousStates",
+        "fmi2GetDerivatives",
+        "fmi2GetEventIndicators",
+        "fmi2GetContinuousStates",
+        "fmi2GetNominalsOfContinuousStates",
+    }
     assert ours == official - exchange
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["circle", "rrr_circle", "axis"])
-def test_nothing_required_by_misra_is_reported_for_a_plant(kind, circle, tmp_path):
-    if not shutil.which("cppcheck"):
-        pytest.skip("cppcheck is missing, MISRA was not checked: apt-get install cppcheck")
-    made = {"circle": lambda: circle.scenario, "axis": lambda: axis_scenario(tmp_path)}
-    scenario = made[kind]() if kind in made else load_scenario(SCENARIOS / kind)
-    name = write_plant(scenario, plant_of(scenario), Real.DOUBLE, tmp_path)
-    path = str(tmp_path / f"{name}.c")
-    command = ["cppcheck", "--addon=misra", "--std=c99", "--quiet", "--template={id} {line}", path]
-    done = subprocess.run(command, capture_output=True, text=True)
-    found = {line.split()[0] for line in done.stderr.splitlines()}
-    assert "misra-c2012-8.9" in found  # an advisory that the tables earn: the rules were read
-    found = {rule for rule in found if not permits(rule.removeprefix("misra-c2012-"), f"{name}.c")}
-    assert found <= ADVISORY, (found - ADVISORY, done.stderr[:2000])
-
-
-# Advisory, not required: one return, objects in blocks, unused names of headers, external linkage, one break a loop.
-ADVISORY = {
-    "misra-c2012-15.5",
-    "misra-c2012-8.7",
-    "misra-c2012-2.5",
-    "misra-c2012-15.4",
-    "misra-c2012-8.9",
-    "misra-c2012-2.3",
-}

@@ -92,9 +92,8 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
 @pytest.mark.parametrize("effects", [("creep", "bouc_wen", "resonance", "coulomb"), ("creep", "bouc_wen", "resonance")])
 def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, effects, text, size, steps, linear, worth):
     monkeypatch.setattr(integrators, "substeps", lambda *_: steps)
-    monkeypatch.setattr(
-        integrators, "VELOCITY_NEWTON_STEPS", 14
-    )  # to the end: where N is solved for, slopes of steps on the way are others
+    # To the end: where N is solved for, slopes of steps on the way are others
+    monkeypatch.setattr(integrators, "VELOCITY_NEWTON_STEPS", 14)
     monkeypatch.setattr(sample_equations, "SIMULATION", replace(SIMULATION, parametric_operations=worth))
     r, p = simulator(text, effects, linear, tmp_path)
     assert isinstance(r.equations.integrator, integrators.ImplicitRadau) == ("coulomb" in effects)

@@ -17,6 +17,7 @@ from ctrlgen.physics import hexapod, screw, thermal_actuator, xy_stage
 
 MICRO = 1e-6
 
+# PHYSICS.md, rad/mm and mm/mm
 KINEMATIC_J = """
     -0.094587 -0.054610  0.000000  0.109219  0.094587 -0.054610
     -0.054610  0.094587  0.109219  0.000000 -0.054610 -0.094587
@@ -24,8 +25,9 @@ KINEMATIC_J = """
      0.207749  0.217518  0.084501  0.288675 -0.292251 -0.506193
      0.217518  0.458917 -0.288675 -0.417835  0.071157 -0.041083
      0.134062  0.232202  0.134062  0.232202  0.134062  0.232202
-"""  # PHYSICS.md, rad/mm and mm/mm
+"""
 
+# S1 Table 3, T_A: rad and um
 TABLE_3 = (
     (0, 0, 0, 0, 0, 30),
     (0, 0, 0, -10, 0, 30),
@@ -33,7 +35,7 @@ TABLE_3 = (
     (-4e-3, 0, 0, 0, 0, 30),
     (0, -4e-3, 0, 0, 0, 30),
     (0, 0, -4e-3, 0, 0, 30),
-)  # S1 Table 3, T_A: rad and um
+)
 
 
 def block_error(J: np.ndarray, reference: np.ndarray) -> float:

@@ -262,12 +262,12 @@ def test_between_the_samples_a_held_drive_misses_the_path_by_what_is_reported(tm
     solution = solved(tmp_path, stage(), PATHS["circle"])
     w, h = 2 * np.pi * 4 / 0.1, 1 / 5000
     slope = (STIFFNESS / MASS - w**2) * w * 30e-6
-    assert solution.between_samples == pytest.approx(
-        slope * h**3 / (72 * np.sqrt(3)), rel=0.05
-    )  # the cubic above, its maximum
+    # The cubic above, its maximum
+    assert solution.between_samples == pytest.approx(slope * h**3 / (72 * np.sqrt(3)), rel=0.05)
 
 
-EFFECTS = {  # laws with no inverse in closed form, with memories, with dry friction
+# Laws with no inverse in closed form, with memories, with dry friction
+EFFECTS = {
     "stiffening": 'k3 = "2e13 N/m^3"',
     "quadratic_damping": 'damping = "300 N*s^2/m^2"',
     "saturation": 'share = "1"\nlevel = "1.5 V"',
@@ -305,7 +305,8 @@ def two_masses(pose):
     )  # fmt: skip
 
 
-MODES = {  # pose, relative degree, share of the travel that may be missed
+# Pose, relative degree, share of the travel that may be missed
+MODES = {
     # zero at -q/e: inside the unit circle once sampled, forgotten at once
     "tip": (lambda d, p: d.tip, 3, GOAL),
     # zeros of the tip held by its spring: its vibration outlasts the path, and is weighed against the path's last samples
@@ -386,7 +387,8 @@ def test_check_says_whether_the_path_can_be_followed(tmp_path):
     assert "no drive was found" in run("check", tmp_path).stdout
 
 
-TOO_FAST = {  # path of the two axes, what is said
+# Path of the two axes, what is said
+TOO_FAST = {
     "circle": (PATHS["circle"].replace("turns = 4", "turns = 80"), "the path is too fast"),
     "circle from rest": (PATHS["circle from rest"] + "\nturns = 50", "the path is too fast"),
     "circle too large": (PATHS["circle"].replace("60 um", "5 mm"), "its stroke ends there"),

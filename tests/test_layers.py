@@ -20,7 +20,8 @@ TRAJECTORY = f"{MODEL} controller trajectory.inverse trajectory"
 ESTIMATION = f"{MODEL} recordings estimation"
 DIAGNOSIS = f"{ESTIMATION} diagnosis.settings"
 C = f"{TRAJECTORY} firmware.c firmware.player firmware.online firmware"
-MAY_IMPORT = {  # folder -> folders below it; every module may import its own folder and the program's version
+# Folder -> folders below it; every module may import its own folder and the program's version
+MAY_IMPORT = {
     "core": "",
     "numerics": "core",
     "reporting": "core",
@@ -95,9 +96,8 @@ def test_a_folder_imports_only_what_it_may(path):
 
 def test_no_modules_import_each_other_in_a_circle():
     graph = {name: {m for m in our_imports(path) if m != name} for name, path in NAMES.items() if name}
-    graph = {
-        name: {m for m in found if m and m != "effects"} for name, found in graph.items()
-    }  # that package finds its laws
+    # That package finds its laws
+    graph = {name: {m for m in found if m and m != "effects"} for name, found in graph.items()}
     TopologicalSorter(graph).prepare()  # raises CycleError
 
 
@@ -126,9 +126,8 @@ WORDS = {"raster", "spiral", "unreachable"}  # names of scenarios that are words
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_no_module_knows_a_scenario_or_a_recording_by_name(path):
     tree = ast.parse(path.read_text())
-    told = {
-        ast.get_docstring(n, clean=False) for n in ast.walk(tree) if isinstance(n, DOCUMENTED)
-    }  # examples of a command
+    # Examples of a command
+    told = {ast.get_docstring(n, clean=False) for n in ast.walk(tree) if isinstance(n, DOCUMENTED)}
     texts = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)} - told
     folders = {
         p.parent.name for kind in ("scenario", "recording", "device", "run_a") for p in SCENARIOS.glob(f"*/{kind}.toml")

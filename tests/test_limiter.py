@@ -166,10 +166,11 @@ def controller_of(device: Device) -> Scripted:
         composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
     )  # fmt: skip
     assert device.rated == (controller.rate is not None)
+    # Worked out before the kernels are recorded
     assert controller.examined_first == (
         device.memory,
         device.memory or device.moving,
-    )  # worked out before the kernels are recorded
+    )
     return controller
 
 
@@ -271,9 +272,8 @@ def last_drive(rng: np.random.Generator, controller: Scripted, case: tuple) -> l
         return []
     mode, x, z, target = case
     unrated = Scripted(controller.model, controller.follow, controller.sample_time, controller.slack)
-    known = {
-        name: value for name, value in controller.__dict__.items() if name != "plausible"
-    }  # it judges the last drive too
+    # It judges the last drive too
+    known = {name: value for name, value in controller.__dict__.items() if name != "plausible"}
     unrated.__dict__.update(known | {"rate": None})
     wanted = unrated.step((x, z), target, settle=mode == "settle").drive
     fall, rise = np.maximum(FALL, -1.0), np.minimum(RISE, 1.0)

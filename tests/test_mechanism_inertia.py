@@ -53,10 +53,11 @@ def test_a_line_with_inertia_is_solved_on_its_samples(tmp_path):
     solution = solve(load_scenario(tmp_path), model)
     assert np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 40e-6
     assert solution.drive[-1, 0] == pytest.approx(K_BLADES * 40e-6 / 2, rel=1e-6)
+    # From the first sample to the last, three derivatives at rest
     T, path = (
         0.0199,
         Polynomial([0, 0, 0, 0, 35, -84, 70, -20]),
-    )  # from the first sample to the last, three derivatives at rest
+    )
     tau = (np.arange(199) + 0.5) / 199  # a drive is held, and fits the middle of its sample
     force = (
         MASS * path.deriv(2)(tau) / T**2
@@ -167,9 +168,8 @@ def test_check_says_how_far_the_condensed_modes_are(tmp_path):
     said = run_command("check", DEVICE.parent / "parallelogram.toml").stdout
     assert "42.35 Hz (+0.0091 % of 42.34 Hz); first mode left out: 380.4 Hz" in said
     mirror = loaded(tmp_path, (DEVICE.parent / "tip_tilt_mirror.toml").read_text() + DYNAMICS)
-    assert any(
-        "do not move as at rest" in remark for remark in mirror.remarks()
-    )  # its wires are softer than its stacks
+    # Its wires are softer than its stacks
+    assert any("do not move as at rest" in remark for remark in mirror.remarks())
     assert not loaded(tmp_path, moving()).remarks()
 
 

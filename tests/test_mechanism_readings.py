@@ -16,9 +16,8 @@ from ctrlgen.model.simulation import simulate
 TILT = '[[reading]]\nname = "tilt"\nbody = "stage"\nabout = [0, 0, 1]\n'
 EDGE = '[[reading]]\nname = "edge"\nbody = "stage"\nat = ["0 mm", "15 mm", "0 mm"]\nalong = [2, 0, 0]\n'
 
-TURNING = PARALLELOGRAM.replace(
-    'at = ["0 mm", "-10 mm", "0 mm"]', 'at = ["0 mm", "0 mm", "0 mm"]'
-)  # pushed 10 mm too high
+# Pushed 10 mm too high
+TURNING = PARALLELOGRAM.replace('at = ["0 mm", "-10 mm", "0 mm"]', 'at = ["0 mm", "0 mm", "0 mm"]')
 
 
 def read(model, drive: float) -> dict[str, float]:

@@ -1,9 +1,8 @@
 """How far the linear flexures of mechanisms hold: a blade against the elastica, a notch against plane-stress finite elements, and how
-long a mechanism of many parts takes."""
+many operations a mechanism of many parts takes."""
 
 from __future__ import annotations
 
-import time
 from decimal import Decimal, localcontext
 
 import casadi as ca
@@ -138,18 +137,19 @@ def test_a_long_chain_of_bodies_loses_no_digits(tmp_path):
     assert np.abs(dm(c.stiffness) - stiffness).max() < 1e-11 * np.abs(stiffness).max()
 
 
-def test_a_mechanism_of_sixty_elements_is_read_and_its_jacobian_made_in_five_seconds(tmp_path):
+def test_twice_the_elements_of_a_mechanism_are_twice_the_operations_of_its_jacobian(tmp_path):
     """With all diameters as symbols, so that nothing of the assembly is folded away, and with its derivatives by them along one direction:
-    what a diagnosis evaluates. Of processor time, so that other work on the machine does not count."""
-    start = time.process_time()
-    device = loaded(tmp_path, many(60))
-    assert len(device.placed_elements) == 60 and build_model(device).axes == ("a0", "a1")
-    paths = [path for path, _ in device.quantities() if path.startswith("element") and path.endswith("diameter")]
-    symbols = {path: ca.SX.sym(path) for path in paths}
-    J, p = Condensed(device, device.values(symbols)).jacobian, ca.vertcat(*symbols.values())
-    f = ca.Function("J", [p], [J, ca.jtimes(J, p, ca.DM.ones(len(paths)))], {"cse": True})
-    found, slope = f([0.3e-3] * len(paths))
-    took = time.process_time() - start
-    assert found.full() == pytest.approx(dm(Condensed(*with_values(device)).jacobian), rel=1e-9)
-    assert np.all(np.isfinite(slope.full()))
-    assert took < 5.0
+    what a diagnosis evaluates. A chain is eliminated body by body; a dense matrix would take eight times as many."""
+    operations = {}
+    for count in (30, 60):
+        device = loaded(tmp_path, many(count))
+        assert len(device.placed_elements) == count and build_model(device).axes == ("a0", "a1")
+        paths = [path for path, _ in device.quantities() if path.startswith("element") and path.endswith("diameter")]
+        symbols = {path: ca.SX.sym(path) for path in paths}
+        J, p = Condensed(device, device.values(symbols)).jacobian, ca.vertcat(*symbols.values())
+        f = ca.Function("J", [p], [J, ca.jtimes(J, p, ca.DM.ones(len(paths)))], {"cse": True})
+        operations[count] = f.n_instructions()
+        found, slope = f([0.3e-3] * len(paths))
+        assert found.full() == pytest.approx(dm(Condensed(*with_values(device)).jacobian), rel=1e-9)
+        assert np.all(np.isfinite(slope.full()))
+    assert operations[60] < 2.2 * operations[30]

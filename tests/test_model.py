@@ -147,9 +147,8 @@ def test_free_parameters_give_the_derivative_that_differences_give(device):
         h = np.zeros(len(paths))
         h[k] = 1e-4 * nominal
         difference = (value(x, z, model.p_nominal + h) - value(x, z, model.p_nominal - h)).full().ravel() / (2 * h[k])
-        assert exact[:, k] == pytest.approx(
-            difference, rel=1e-5, abs=1e-6 * np.abs(difference).max()
-        )  # h^2, and 1e-11/h
+        # h^2, and 1e-11/h
+        assert exact[:, k] == pytest.approx(difference, rel=1e-5, abs=1e-6 * np.abs(difference).max())
 
 
 def test_a_free_parameter_at_its_nominal_value_changes_nothing(device, model):

@@ -126,7 +126,8 @@ def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):
     S, step = np.kron(np.eye(n), B * RANGE), np.eye(n) - np.roll(np.eye(n), -1, axis=1)
     D = np.kron(step, np.eye(3))[::3] * RANGE[0]
     box = list(zip(np.tile(LOW / RANGE, n), np.tile(HIGH / RANGE, n), strict=True))
-    slowest = linprog(  # the lowest rate with which the path can be followed at all
+    # The lowest rate with which the path can be followed at all
+    slowest = linprog(
         np.append(np.zeros(3 * n), 1.0), A_eq=np.hstack([S, np.zeros((2 * n, 1))]), b_eq=wanted.ravel(),
         A_ub=np.block([[D, -np.ones((n, 1))], [-D, -np.ones((n, 1))]]), b_ub=np.zeros(2 * n), bounds=[*box, (0, None)],
     ).fun / h  # fmt: skip
@@ -247,9 +248,8 @@ def test_with_inertia_the_held_drives_have_the_least_effort_within_the_limits(tm
     path = 'kind = "line"\nstart = { x = "-12 um", y = "5 um" }\nend = { x = "14 um", y = "-3 um" }\n'
     solution = solve(*loaded(tmp_path, heavy(), path, timing))
     assert np.all(solution.drive >= LOW) and np.all(solution.drive <= HIGH)
-    assert (
-        np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 50e-6
-    )  # the goal for devices with inertia
+    # The goal for devices with inertia
+    assert np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 50e-6
     pushed = solution.drive @ B.T
     square = np.linalg.pinv(B @ np.diag(RANGE))
     assert np.any(pushed @ square.T * RANGE < LOW - 1)  # b would go below zero

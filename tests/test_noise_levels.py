@@ -53,9 +53,8 @@ def test_a_record_at_rest_tells_colour_and_level_of_every_sensor(ar, h, rng):
     for sd, coefficients, floor in zip(sds, found.ar, found.floor, strict=True):
         assert len(coefficients) == len(ar)  # BIC adds one to white noise once in 600
         assert coefficients == pytest.approx(np.array(ar), abs=SIGMAS / np.sqrt(n))  # no coefficient is known worse
-        longer = (1 + np.sum(np.abs(ar))) / (
-            1 - min(np.sum(np.abs(ar)), 0.9)
-        )  # correlated samples tell less of the level
+        # Correlated samples tell less of the level
+        longer = (1 + np.sum(np.abs(ar))) / (1 - min(np.sum(np.abs(ar)), 0.9))
         assert floor == pytest.approx(stationary_deviation(sd, np.array(ar)), rel=SIGMAS * np.sqrt(longer / (2 * n)))
     assert found.known.all() and not found.guessed.any() and found.count == pytest.approx(n)
 

@@ -69,9 +69,8 @@ def test_a_drive_that_is_linear_between_samples_is_no_mismatch():
     linear = tuple(replace(r, linear=True) for r in given.records)
     found = diagnose_recording(AXIS, replace(given, records=linear), laws=LAWS)
     assert (found.verdict, found.findings) == (CONSISTENT, ())
-    assert (
-        diagnose_recording(AXIS, given, laws=("stiffening",)).verdict != CONSISTENT
-    )  # taken as held it is half a sample late
+    # Taken as held it is half a sample late
+    assert diagnose_recording(AXIS, given, laws=("stiffening",)).verdict != CONSISTENT
 
 
 # --- a noise that is stated wrongly

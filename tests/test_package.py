@@ -190,7 +190,8 @@ def test_the_same_input_gives_the_same_bytes_of_everything(packages, circle, tmp
     [
         ("online", r"5\.5e-05f", "5.6e-05f"),  # the stroke, wherever it stands
         ("online", r"uint32_t status = 0U;", "uint32_t status = 64U;"),
-        (  # NaN is neither above nor below a limit
+        # NaN is neither above nor below a limit
+        (
             "online",
             r"!\(\(target\[i\] <= TARGET_LIMIT\[i\]\) && \(target\[i\] >= -TARGET_LIMIT\[i\]\)\)",
             "(target[i] > TARGET_LIMIT[i]) || (target[i] < -TARGET_LIMIT[i])",

@@ -17,6 +17,7 @@ from ctrlgen.physics import flexure, hexapod, screw, thermal_actuator, xy_stage
 
 MICRO = 1e-6
 
+# S1 eq. (5) in N, um, rad; its entry (6, 5) is printed -0.22
 PRINTED_K_TB = """
     0     0        0         8.70e-2  0         0
     0     0       -2.16e-2   0        4.32e-5   0
@@ -24,8 +25,9 @@ PRINTED_K_TB = """
     3.06  0        0         0        0         0
     0     26.1     0         0        0         3.91e-2
     0     0        14.4      0       -0.0216    0
-"""  # S1 eq. (5) in N, um, rad; its entry (6, 5) is printed -0.22
+"""
 
+# PHYSICS.md: d [um], F_l [N], F [N]
 FORCE_TABLE = """
     5  .009478 .009542
     10 .018955 .019471
@@ -38,7 +40,7 @@ FORCE_TABLE = """
     45 .085299 .132274
     50 .094777 .159207
     55 .104254 .190000
-"""  # PHYSICS.md: d [um], F_l [N], F [N]
+"""
 
 
 def half_units(text: str) -> np.ndarray:
@@ -211,9 +213,8 @@ def test_thermal_force_equals_equation_4_worked_by_hand(p: SimpleNamespace) -> N
     # sin 0.068 = 0.068 - 0.068^3/6 + 0.068^5/120 = 0.068 - 5.240533e-5 + 1.212e-8 = 0.06794760679.
     # F = 2 * 15 * 0.07435935 N * 0.06794760679 = 2.2307805 N * 0.06794760679 = 0.15157620 N.
     by_hand = 0.15157620
-    assert isclose(
-        thermal_actuator.force(250 + 273.15, p.actuator), by_hand, rel_tol=5e-8
-    )  # half a unit of the eighth digit
+    # Half a unit of the eighth digit
+    assert isclose(thermal_actuator.force(250 + 273.15, p.actuator), by_hand, rel_tol=5e-8)
 
 
 def test_temperature_for_a_force_solves_equation_4_backwards(p: SimpleNamespace) -> None:

@@ -14,13 +14,13 @@ from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import generate
+from ctrlgen.firmware.player import spline
 from ctrlgen.firmware.player.compression import (
     INSTRUCTION_BUDGET,
     TOLERANCE_SHARE,
     compress,
     instructions,
 )
-from ctrlgen.firmware.player.player_context import spline
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 

@@ -32,9 +32,8 @@ def test_the_printed_output_is_the_programs(tmp_path, compiler):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     shown, printed = same(block("text", FIRMWARE)), same(done.stdout.replace(str(out), "out"))
-    tools = re.compile(
-        r"built strictly with [\w, ]+;|(not installed: not run)|\d+ of \d+ comparisons"
-    )  # which compilers there are
+    # Which compilers there are
+    tools = re.compile(r"built strictly with [\w, ]+;|(not installed: not run)|\d+ of \d+ comparisons")
     assert [tools.sub("", line) for line in shown] == [tools.sub("", line) for line in printed if "not run" not in line]
 
 
@@ -67,7 +66,8 @@ def test_every_package_stands_in_the_architecture():
 
 def test_what_contributing_tells_of_a_law_is_there():
     text, effects = (ROOT / "CONTRIBUTING.md").read_text(), (ROOT / "ctrlgen" / "effects" / "_effect.py").read_text()
-    recovery = (ROOT / "tests" / "test_recovery.py").read_text()
+    files = ("planted_axis", "planted_poses", "recovery", "test_recovery")
+    recovery = "".join((ROOT / "tests" / f"{name}.py").read_text() for name in files)
     (shown,) = re.findall(r"```python\n(def .*?)\n *y = ", text, re.DOTALL)
     assert shown.partition("(")[0] in recovery
     for word in ("ON_AXIS", "ON_HEXAPOD", "within", "def test_no_law_is_left_out"):

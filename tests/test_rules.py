@@ -91,10 +91,11 @@ def test_the_generated_c_breaks_no_rule(checks, tool):
 def test_the_list_of_deviations_is_what_is_reported_no_more_no_less(folder, checks):
     check = ran(checks[STATIC[0]])
     assert listed(folder) == reported(check)
+    # Required: stdio of the test
     assert {f.severity for f in check.findings if f.permitted} == {
         "advisory",
         "required",
-    }  # required: stdio of the test
+    }
 
 
 @pytest.mark.long

@@ -269,9 +269,8 @@ def test_the_loader_reads_what_calibrate_writes_and_refuses_every_flipped_bit(li
     )  # fmt: skip
     data = binary(calibration)
     status, read = library.load(data)
-    assert status == 0 and np.allclose(
-        read, [row.value for row in ends], rtol=2e-7, atol=0
-    )  # a float's rounding, or two
+    # A float's rounding, or two
+    assert status == 0 and np.allclose(read, [row.value for row in ends], rtol=2e-7, atol=0)
     assert zlib.crc32(data[:-4]) == int.from_bytes(data[-4:], "little")
     for k in range(8 * len(data)):
         flipped = bytearray(data)

@@ -92,9 +92,8 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
     found = slopes.sums(white, J, fit.initial_states[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
     S = noise.whiten(brute(slopes, fit.initial_states[0]), np.ones((N, 6), bool)) * usable[:, :, None]
-    S *= np.minimum(1.0, 3.0 / np.maximum(np.abs(white), 1e-300))[
-        :, :, None
-    ]  # Huber's weight, as the fit's own derivatives
+    # Huber's weight, as the fit's own derivatives
+    S *= np.minimum(1.0, 3.0 / np.maximum(np.abs(white), 1e-300))[:, :, None]
     assert np.abs(white).max() > 3.0
     for name, value in (
         ("US", np.einsum("nik,nij->kj", J, S)),

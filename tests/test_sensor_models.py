@@ -8,29 +8,29 @@ import numpy as np
 import pytest
 
 from ctrlgen.physics import sensor_models as chain
-from ctrlgen.physics.sensor_models import (
-    SENSORS,
-    Adc,
+from ctrlgen.physics.sensor_models import SENSORS, Adc, Interferometer
+from papers.sensor_calibration import (
     CalibrationRun,
-    Interferometer,
+    SensitivityStatistics,
+    Slope,
     calibrate_sensor,
     find_fringes,
     move,
     record,
+    sensitivity_statistics,
 )
 
 LASER = Interferometer()
 NM, UM, CELSIUS = 1e-9, 1e-6, 273.15
 
 
-def slopes(sensor: chain.Sensor, distance: float, speed: float, seeds: range) -> list[chain.Slope]:
+def slopes(sensor: chain.Sensor, distance: float, speed: float, seeds: range) -> list[Slope]:
     runs = (record(sensor, LASER, distance, speed, np.random.default_rng(seed)) for seed in seeds)
     return [calibrate_sensor(run, LASER.wavelength) for run in runs]
 
 
-@pytest.mark.parametrize(
-    ("name", "nm"), [("3316", 3.13), ("3317", 3.08), ("3338", 3.11), ("fibre", 3.59)]
-)  # S2 prints 3.10 for 3338
+# S2 prints 3.10 for 3338
+@pytest.mark.parametrize(("name", "nm"), [("3316", 3.13), ("3317", 3.08), ("3338", 3.11), ("fibre", 3.59)])
 def test_adc_resolution(name, nm):
     assert SENSORS[name].resolution_adc() / NM == pytest.approx(nm, abs=0.005)
 
@@ -146,14 +146,14 @@ def test_the_planted_sensitivity_is_recovered_within_the_stated_uncertainty(name
     z = np.array([(s.sensitivity - sensor.sensitivity) / s.sd for s in found])
     assert np.abs(z).max() < 4.5  # 25 draws of Student's t with 8 degrees of freedom: 1 in 20 000 each
     assert 0.6 < np.sqrt(np.mean(z**2)) < 1.7  # the uncertainty is neither boastful nor timid; expected 1.15
-    calibration = chain.SensitivityStatistics(tuple(found))
+    calibration = SensitivityStatistics(tuple(found))
     assert abs(calibration.mean - sensor.sensitivity) < 3.5 * calibration.sd_of_mean
     assert all(s.sd < 1e-4 * s.sensitivity for s in found)
 
 
 def test_the_fibre_sensor_is_recovered_over_its_one_volt():
     sensor = SENSORS["fibre"]
-    found = chain.SensitivityStatistics(tuple(slopes(sensor, 11.5 * UM, 1 * UM, range(25))))
+    found = SensitivityStatistics(tuple(slopes(sensor, 11.5 * UM, 1 * UM, range(25))))
     assert abs(found.mean - sensor.sensitivity) < 3.5 * found.sd_of_mean
     assert found.sd_of_mean < 1e-4 * sensor.sensitivity
 
@@ -179,10 +179,10 @@ def test_a_constant_thermal_offset_leaves_the_sensitivity_alone():
 
 
 def test_statistics_of_repeated_recordings():
-    three = chain.SensitivityStatistics(tuple(chain.Slope(s, 0.0, 0.0) for s in (9.0, 10.0, 11.0)))
+    three = SensitivityStatistics(tuple(Slope(s, 0.0, 0.0) for s in (9.0, 10.0, 11.0)))
     assert three.mean == 10 and three.sd == 1
     assert three.max_deviation == pytest.approx(0.2) and three.sd_of_mean == pytest.approx(3**-0.5)
     with pytest.raises(ValueError, match="at least two"):
-        chain.sensitivity_statistics(
+        sensitivity_statistics(
             [record(SENSORS["fibre"], LASER, 5 * UM, 5 * UM, np.random.default_rng(0))], LASER.wavelength
         )

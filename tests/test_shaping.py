@@ -76,9 +76,8 @@ def test_a_shaped_line_leaves_no_vibration_without_inertia_feedforward(tmp_path,
     plain = vibration(solved(tmp_path), 0.0)
     assert plain > 0.3 * TRAVEL  # 4 ms are less than half a period
     shaped = solved(tmp_path, f'shaping = {{ kind = "{kind}" }}')
-    assert (
-        vibration(shaped, 0.0) < 1e-7 * plain
-    )  # what sampling the set-point at 20 kHz leaves of the smooth path's own
+    # What sampling the set-point at 20 kHz leaves of the smooth path's own
+    assert vibration(shaped, 0.0) < 1e-7 * plain
     last = impulses(kind, MODE, RATIO)[0][-1]
     assert len(shaped.drive) == 80 + np.ceil(last / H)
     assert shaped.command[-1, 0] == pytest.approx(TRAVEL, abs=1e-18)
@@ -101,9 +100,8 @@ def test_the_trace_is_what_scipy_says_of_the_drives(tmp_path):
     y = driven(solution.drive[:, 0])
     assert np.abs(solution.trace.z[:, 0] - y[: len(solution.drive), 0]).max() < 1e-15
     middle = (solution.command[1:, 0] + solution.command[:-1, 0]) / 2  # each drive fits the middle of its sample
-    assert np.allclose(
-        solution.drive[:-1, 0], STIFFNESS / FORCE * middle, rtol=0, atol=2e-4
-    )  # V, of 1: the path's bend within a sample
+    # V, of 1: the path's bend within a sample
+    assert np.allclose(solution.drive[:-1, 0], STIFFNESS / FORCE * middle, rtol=0, atol=2e-4)
 
 
 def test_a_periodic_motion_without_inertia_feedforward_is_that_of_the_transfer_function(tmp_path):
@@ -140,9 +138,8 @@ def tilting(model):
 
 def test_with_inertia_feedforward_a_shaped_path_is_followed_exactly(tmp_path):
     solution = solved(tmp_path, 'shaping = { kind = "ZVD" }', "inertia")
-    assert (
-        np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 100e-6
-    )  # the goal for devices with inertia
+    # The goal for devices with inertia
+    assert np.abs(solution.trace.signals["pose"] - solution.command).max() < 1e-9 * 100e-6
     assert vibration(solution, 0.0) < 1e-6 * TRAVEL
 
 

@@ -188,9 +188,8 @@ def test_a_prediction_reaches_the_share_that_it_has_on_the_same_blocks(signals, 
     size = (y @ law) / (law @ law)
     reached = predict_share([size * law], [y], blocks)
     assert reached.share == pytest.approx(PART, abs=0.03) and reached.ci95[0] < reached.share < reached.ci95[1]
-    assert predict_share([size * law + 1.0], [y], blocks).share == pytest.approx(
-        reached.share, abs=1e-3
-    )  # the mean is free
+    # The mean is free
+    assert predict_share([size * law + 1.0], [y], blocks).share == pytest.approx(reached.share, abs=1e-3)
     assert predict_share([-size * law], [y], blocks).share < -1
 
 
@@ -203,9 +202,8 @@ def test_a_drive_that_is_the_position_has_no_row(signals, rng):
 
 def test_every_kind_speaks_and_every_effect_of_the_library_belongs_to_a_family():
     assert set(SPEAKS_FOR) == set(Kind) and all(reason for _, reason in SPEAKS_FOR.values())
-    assert set(FAMILY_OF) == {
-        kind for kind in Effect.library if not kind.startswith("empirical_")
-    }  # these name no cause
+    # These name no cause
+    assert set(FAMILY_OF) == {kind for kind in Effect.library if not kind.startswith("empirical_")}
     assert set(FAMILY_OF.values()) == set(Family)
     assert {family for families, _ in SPEAKS_FOR.values() for family in families} == set(Family)
 

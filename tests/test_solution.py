@@ -70,9 +70,8 @@ def test_the_nearest_pose_of_an_unreachable_one_is_reachable(scenario):
     with pytest.raises(Unreachable) as caught:
         solve(s, build_model(s.device))
     message, short = str(caught.value), caught.value.infeasibility
-    assert (
-        "actuator 2X: needs -5 um" in message and "3Y: needs -8.66 um" in message
-    )  # rigid translation: d = R(psi)' (10, 0)
+    # Rigid translation: d = R(psi)' (10, 0)
+    assert "actuator 2X: needs -5 um" in message and "3Y: needs -8.66 um" in message
     assert "1X" not in message.split("nearest")[0]
     p = short.nearest * 0.999  # reachable poses form a cone, so shrinking stays inside
     theta = ", ".join(f'theta_{a} = "{v!r} rad"' for a, v in zip("xyz", p[:3].tolist(), strict=True))

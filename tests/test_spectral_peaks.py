@@ -32,9 +32,8 @@ def test_a_line_does_not_raise_the_level_around_it(rng):
     power = rng.exponential(size=400)
     line = power.copy()
     line[200] = 1e6
-    assert np.all(
-        np.abs(local_floor(line, 31) - local_floor(power, 31)) < 0.5
-    )  # one rank of 31, not a millionth of the line
+    # One rank of 31, not a millionth of the line
+    assert np.all(np.abs(local_floor(line, 31) - local_floor(power, 31)) < 0.5)
 
 
 def test_the_highest_peaks_come_first_and_apart():

@@ -22,7 +22,8 @@ ABOVE, RRR = 'centre = { delta_z = "20 um" }', 'centre = { theta_z = "-2 mrad" }
 CIRCLE, SPIRAL = 'kind = "circle"\ndiameter = "{}"\n', 'kind = "spiral"\ndiameter = "{}"\nturns = 5\n'
 RASTER = 'kind = "raster"\nlength = "{}"\nspacing = "1 um"\nlines = 11\n'
 
-CASES = {  # device, effects, rate, duration, path, what is said
+# Device, effects, rate, duration, path, what is said
+CASES = {
     "circle without height": ("mems_hexapod", "", 1000, 1.0, CIRCLE.format("20 um"), "only pushes"),
     "spiral without height": ("mems_hexapod", "", 1000, 1.5, SPIRAL.format("16 um"), "only pushes"),
     "raster without height": ("mems_hexapod", "", 500, 2.64, RASTER.format("10 um"), "only pushes"),
@@ -136,7 +137,8 @@ def moved(path, h, mass, damping, stiffness, force, limit):
 
 
 AXIS = (0.5, 30.0, 0.2e6, 10.0, 4.0)  # of flexure_axis.toml: kg, N*s/m, N/m, N/V, V
-OTHERS = {  # device, what of its file is written anew, rate, duration, path, what is said, whether an alternative can be followed
+# Device, what of its file is written anew, rate, duration, path, what is said, whether an alternative can be followed
+OTHERS = {
     "lever stage, 150 V do not reach": (
         "xy_lever_stage", (), 2000, 0.1, CIRCLE.format("90 um") + 'centre = { delta_x = "-40 um", delta_y = "-40 um" }', "drive of", None,
     ),
@@ -234,9 +236,8 @@ def test_what_a_path_needs_is_what_ipopt_finds(circle):
     inverse = PathInverse(circle.model, "pose", circle.scenario.sample_time)
     needed = inverse.trajectory(circle.command, True)
     assert needed.exact and not violations(circle.model, needed.x, needed.z, needed.u)
-    assert (
-        np.abs(needed.u - circle.drive).max() < 1e-7
-    )  # W, of 0.3: IPOPT's tolerance is 1e-10 of a sample's typical step
+    # W, of 0.3: IPOPT's tolerance is 1e-10 of a sample's typical step
+    assert np.abs(needed.u - circle.drive).max() < 1e-7
 
 
 @pytest.mark.parametrize(("effects", "settles"), [(BACKLASH, True), (CREEP, False)])

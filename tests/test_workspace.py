@@ -58,9 +58,8 @@ def test_the_largest_ball_is_inside_and_touches_on_all_sides(workspace, model, c
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     assert workspace.excess(ball.centre + 0.999 * ball.radius * directions * scale).max() <= 0
     reached = workspace.reach(ball.centre, directions[:2000] * scale)
-    assert reached.min() == pytest.approx(
-        ball.radius, rel=0.02 if len(channels) == 3 else 0.3
-    )  # random directions seldom hit
+    # Random directions seldom hit
+    assert reached.min() == pytest.approx(ball.radius, rel=0.02 if len(channels) == 3 else 0.3)
     for shift in np.vstack([np.eye(6), -np.eye(6)])[:, list(channels)]:  # no centre nearby is better
         moved = ball.centre.copy()
         moved[list(channels)] += 0.05 * ball.radius * shift * scale[list(channels)]

@@ -3,7 +3,7 @@
 1. Channels that read one constant value are taken out (`selection.dead_channels`).
 2. The noise of every channel is estimated (`estimation.noise`), and isolated outliers are marked (`isolated_outliers`).
 3. The device as described is refitted within its stated uncertainty (`estimation.fit`).
-4. Hypotheses are listed: every effect at every location, every parameter of the device (`hypotheses`).
+4. Hypotheses are listed: every effect at every location, every parameter of the device (`estimation.hypothesis`).
 5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
 6. Every accepted cause gets its share of the mismatch (`selection.attribution`), and beside it stands of what the residual is a
    function before and after, whatever the law (`shares`).

@@ -5,11 +5,12 @@ To add a law:
 1. Add one file here with a subclass of `Effect`: equation and validity in the docstring, place, parameters, source, `term`,
    and `rates` or `update` if it has states. Simulation, inversion, trajectory optimisation, generated C and diagnosis read it
    from there; this package finds the file by itself.
-2. Plant it in `tests/test_recovery.py`: a recording made by the law's definition, written independently of its expression,
-   from which the diagnosis must recover the parameters. That test file fails while a law has none.
+2. Plant it in `tests/planted_axis.py`: a recording made by the law's definition, written independently of its expression,
+   from which the diagnosis must recover the parameters. `tests/test_recovery.py` fails while a law has none.
 
-The theorems of `tests/test_effects.py` then hold the law to its claims: off means off, energy, units, C equal to Python. What
-the diagnosis believes of it beforehand has defaults; `ctrlgen/estimation/priors.py` takes a row where they are wrong.
+The theorems of `tests/test_effects.py` and `tests/test_effects_in_c.py` then hold the law to its claims: off means off, energy,
+units, C equal to Python. What the diagnosis believes of it beforehand has defaults; `ctrlgen/estimation/priors.py` takes a row
+where they are wrong.
 
 A law's file imports `Effect, Param, Place` (and `State`) from here. Files that begin with an underscore are no laws: the law's
 interface, the reader of [[effect]] tables, and expressions that several laws share.

@@ -9,8 +9,9 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
+from ctrlgen.core.to_json import plain
 from ctrlgen.version import __version__, commit
 
 SCHEMAS = Path(__file__).parent / "schemas"
@@ -18,12 +19,23 @@ SCHEMA_VERSION = 1  # raised when a key changes its name or meaning; one version
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Number = float | None  # None where it is not finite
+FiniteOrNull = Annotated[float, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "null"}]})]
+"""A float that may be infinite or not a number, which the file states as null."""
 
 
 class Keys(BaseModel):
     """An object of a result file: it has these keys and no others."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def as_json(self) -> dict[str, Any]:
+        """Its keys in the types of JSON, without those that have a default and were not given; null for what is not finite."""
+        return plain(self.model_dump(exclude_unset=True))
+
+
+def json_text(record: Keys) -> str:
+    """The text of a result file."""
+    return json.dumps(record.as_json(), indent=1, allow_nan=False) + "\n"
 
 
 class Program(Keys):

@@ -330,17 +330,23 @@ def results_page() -> str:
 
 
 def settings_page() -> str:
-    """The thresholds of the diagnosis, each with its reason, from the files of `ctrlgen/diagnosis/settings/`."""
+    """The thresholds of the diagnosis, each with its reason, from `ctrlgen/estimation/settings.py` and `ctrlgen/diagnosis/settings/`."""
+    from ctrlgen import estimation
     from ctrlgen.diagnosis import settings
 
     lines = [
-        GENERATED, "# Settings of the diagnosis", "",
-        "Every threshold, size and count of the diagnosis, from `ctrlgen/diagnosis/settings/`. *Judgement* marks a value that no "
-        "derivation fixes: it was chosen on simulated recordings with known causes, and another of the same order would serve.", "",
-    ]  # fmt: skip
+        GENERATED,
+        "# Settings of the diagnosis",
+        "",
+        "Every threshold, size and count of the diagnosis, from `ctrlgen/estimation/settings.py` and "
+        "`ctrlgen/diagnosis/settings/`. *Judgement* marks a value that no derivation fixes: it was chosen on simulated "
+        "recordings with known causes, and another of the same order would serve.",
+        "",
+    ]
     files = sorted(path for path in Path(inspect.getfile(settings)).parent.glob("*.py") if path.stem != "__init__")
+    files = [Path(inspect.getfile(estimation)).with_name("settings.py"), *files]
     for path in files:
-        lines += [f"## {path.stem}", ""]
+        lines += [f"## {'estimation' if path.stem == 'settings' else path.stem}", ""]
         for record in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(record, ast.ClassDef):
                 lines += [f"### {record.name}", "", ast.get_docstring(record) or "", "", *settings_table(record), ""]

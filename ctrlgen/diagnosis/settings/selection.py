@@ -1,4 +1,4 @@
-"""Settings of `ctrlgen.diagnosis.selection` and `hypotheses`: screen, search, model selection, verdict."""
+"""Settings of `ctrlgen.diagnosis.selection`: screen, search, model selection, verdict."""
 
 from __future__ import annotations
 

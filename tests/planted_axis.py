@@ -1,0 +1,156 @@
+"""Simulators of laws of an axis, which know a law by its definition and not by its expression, and the numbers they plant.
+
+Ramps, plays by the hundred, forces in steps of a tenth of a sample; each is drive [V] and time [s] -> reading [m].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from axis_records import AXIS, H, move
+from recovery import Planted
+from scipy.stats import norm
+
+
+def given(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A drive to fit and one to hold out [V]."""
+    t = H * np.arange(n)
+    fit = 1.5 * np.sin(2 * np.pi * 2.3 * t) + 0.3 * np.sin(2 * np.pi * 13.1 * t + 1) + 0.2 * np.sin(2 * np.pi * 41 * t)
+    return fit, 1.3 * np.sin(2 * np.pi * 1.7 * t)
+
+
+def asymmetric_gain(u, t):
+    return move(np.where(u > 0, 1.03 * u, 0.97 * u))
+
+
+def reversed(u, t):
+    return move(-u)
+
+
+def drive_offset(u, t):
+    return move(u + 0.05)
+
+
+def cubic_sensor(u, t):
+    y = move(u)
+    return y + 2e6 * y**3
+
+
+def stitching_error(u, t):
+    """With the slope of 0.4 um on 2 um in its middle."""
+    y = move(u)
+    return y + 4e-7 * norm.cdf(np.sqrt(2 * np.pi) * (y - 2e-5) / 2e-6)
+
+
+def sensor_step(u, t):
+    return move(u) + 2e-7 * np.clip((t - 1.1) / 0.02 + 0.5, 0, 1)
+
+
+def drive_hysteresis(u, t):
+    """Two hundred plays, all alike in weight, where the law has eight: its numbers count in eighths."""
+    radii = 0.4 * (np.arange(200) + 0.5) / 200
+    play, out = np.zeros(200), []
+    for volts in u:
+        play = np.clip(play, volts - radii, volts + radii)
+        out.append(volts + 0.1 * (play.mean() - volts))
+    return move(np.array(out))
+
+
+def asymmetric_hysteresis(u, t):
+    """Dahl's friction of 2e4 N/m and 10 um, in the displacement warped by 0.5, in steps of a tenth of a sample."""
+    L, r, a, k = AXIS.mechanics.stroke.si, 1e-5, 0.5, 2e4
+
+    def force(time, q, v, memory):
+        z, before = memory or (0.0, 0.0)
+        slope = 1 + a * q / np.hypot(q, L)
+        dw = slope * (q - before)
+        z += dw * (1 - np.sign(dw) * z / r)
+        return -k * z * slope, (z, q)
+
+    return move(u, force)
+
+
+def one_sided_stiffening(u, t):
+    """2e8 N/m^2 beside a stiffness of 2e5 N/m: 10 % more of it at 100 um on the one side, less on the other."""
+    return move(u, lambda time, q, v, memory: (-2e8 * (q + v * H / 20) ** 2, memory))  # in the middle of a step
+
+
+def butterfly(u, t):
+    """All of it, beside a tenth less of the drive, by the square of the polarisation of two hundred plays."""
+    radii, limit = 0.4 * (np.arange(200) + 0.5) / 200, AXIS.actuator.drive_limit.si
+    play, out = np.zeros(200), []
+    for volts in u:
+        play = np.clip(play, volts - radii, volts + radii)
+        out.append(0.9 * volts + play.mean() ** 2 / limit)
+    return move(np.array(out))
+
+
+def directional_friction(u, t):
+    """0.9 N forward and 0.5 N backward, built up over 3 um, in steps of a tenth of a sample."""
+
+    def force(time, q, v, memory):
+        z, way = memory or (0.0, 0.0)
+        step = v * H / 10
+        z, way = z + (step - abs(step) * z) / 3e-6, way + abs(step)
+        return -0.7 * z - 0.2 * (1 - np.exp(-way / 3e-6)), (z, way)
+
+    return move(u, force)
+
+
+def bouc_wen(u, t):
+    """F = -k z, dz = dd (1 - (beta sgn(dd z) + gamma)|z|), beta = 8e4/m, gamma = 2e4/m, in steps of a tenth of a sample."""
+
+    def force(time, q, v, memory):
+        z, before = memory or (0.0, 0.0)
+        step = q - before
+        z += step * (1 - (8e4 * np.sign(step * z) + 2e4) * abs(z))
+        return -2e4 * z, (z, q)
+
+    return move(u, force)
+
+
+def slack_friction(u, t):
+    """Eight sliders that yield at 1/36 ... 8/36 of 0.8 N after 1 ... 8 um, each behind a slack of 20 um, in steps of a tenth of a
+    sample: a slider is dragged while its spring would carry more than it holds."""
+    yields, half = 1e-6 * np.arange(1, 9), 1e-5
+    slider = np.zeros(8)
+
+    def force(time, q, v, memory):
+        gap = q - slider
+        bent = np.sign(gap) * np.maximum(np.abs(gap) - half, 0)
+        dragged = np.abs(bent) > yields
+        slider[dragged] += (bent - np.sign(bent) * yields)[dragged]
+        bent = np.clip(bent, -yields, yields)
+        return -0.8 * bent.sum() / yields.sum(), memory
+
+    return move(u, force)
+
+
+ON_AXIS = {
+    asymmetric_gain: Planted("actuator:axis", {"gain": 0.03}),
+    reversed: Planted("actuator:axis", {}),
+    drive_offset: Planted("actuator:axis", {"offset": 0.05}),
+    cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
+    stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
+    sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
+    butterfly: Planted(
+        "actuator:axis", {"share": 1.0, "linear": 0.1, "reach": 0.4}, within={"share": 0.1, "linear": 0.2, "reach": 0.1}
+    ),
+    directional_friction: Planted(
+        "stage:axis", {"force": 0.7, "skew": 2 / 7, "reach": 3e-6}, within={"force": 0.02, "skew": 0.05, "reach": 0.05}
+    ),
+    one_sided_stiffening: Planted("stage:axis", {"k2": 2e8}, within={"k2": 0.02}),
+    slack_friction: Planted(
+        "stage:axis", {"force": 0.8, "slack": 2e-5, "reach": 8e-6}, within={"force": 0.02, "slack": 0.02, "reach": 0.05}
+    ),
+    drive_hysteresis: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
+    bouc_wen: Planted(
+        "stage:axis",
+        {"stiffness": 2e4, "reach": 1e-5, "loop": 0.8},
+        within={"stiffness": 0.03, "reach": 0.03, "loop": 0.05},
+    ),
+    asymmetric_hysteresis: Planted(
+        "stage:axis",
+        {"stiffness": 2e4, "reach": 1e-5, "skew": 0.5},
+        within={"stiffness": 0.03, "reach": 0.03, "skew": 0.1},
+    ),
+}

@@ -1,0 +1,239 @@
+"""Every law's term and rates, written out in numpy from the equation of its record."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+from numpy import abs, cos, cross, exp, sign, sin, sqrt, tanh
+from scipy.interpolate import BSpline
+
+import ctrlgen.effects  # noqa: F401  fills the library
+from ctrlgen.effects import Effect
+
+ROUNDING = 1e-12
+H = 0.01
+TWO_PI = 2 * np.pi
+EVENT = {"moment": 0.7, "rise": 0.4}
+
+
+def event(s, p):
+    """From 0 to 1, half at the moment; a logistic curve of scale T/(2 pi)."""
+    return 1 / (1 + exp(-(s.t - p.moment) * TWO_PI / p.rise))
+
+
+def turned(a: int, b: int):
+    """What a rotation by p.angle from axis a toward b adds to component s.index."""
+
+    def change(s, p):
+        R = np.eye(3)
+        R[[a, b], [a, b]], R[a, b], R[b, a] = cos(p.angle), -sin(p.angle), sin(p.angle)
+        return np.concatenate([R @ s.all[:3], R @ s.all[3:]])[s.index] - s.value
+
+    return change
+
+
+def dead(s, p):
+    e = np.hypot(p.rounding * p.width, 1e-6 * s.scale)
+    return -(np.hypot(s.value + p.width, e) - np.hypot(s.value - p.width, e)) / 2
+
+
+def clipped(s, p):
+    e = p.level / 200
+    return p.share * ((np.hypot(s.value + p.level, e) - np.hypot(s.value - p.level, e)) / 2 - s.value)
+
+
+def gripping(s, p):
+    """Springs that slip at r_j, each behind half the slack to either side."""
+    r = p.reach * np.arange(1, 9) / 8
+    plays = np.array([getattr(s, f"play{j}") for j in range(1, 9)]) + np.clip(s.start, -1, 1) * (r + p.slack / 2)
+    e = s.displacement - plays
+    return -p.force * np.sum(sign(e) * np.maximum(abs(e) - p.slack / 2, 0)) / r.sum()
+
+
+WEIGHTS = {f"c{j}": float(np.cos(3 * j)) for j in range(1, 18)}
+
+
+def bends(share):
+    """Cubic B-splines on knots a fourteenth apart, held beyond 0 and 1."""
+    knots = (np.arange(21) - 3) / 14
+    return float(BSpline(knots, list(WEIGHTS.values()), 3)(np.clip(share, 0, 1)))
+
+
+def remembered(s, p):
+    j = np.arange(1, 9)
+    lag = s.displacements[s.partner] - np.array([getattr(s, f"play{k}") for k in j])
+    return p.size * float(np.array([WEIGHTS[f"c{k}"] for k in j]) @ (lag / (0.3 * j / 8)))
+
+
+def stop(s, p):
+    side, e = sign(p.gap), 1e-3 * s.travel
+    x = max(side * (s.displacement - p.gap), 0.0)
+    return -side * p.stiffness * x**2 / (x + e) * (1 + x / e) ** (p.power - 1)
+
+
+def logarithmic(s, p):
+    return p.gain / 2 * sum(min(max(2 * p.decades - j, 0), 1) * getattr(s, f"z{j}") for j in range(9))
+
+
+def weighted(s, p, here):
+    """sum_j w_j (here - play_j); each play is counted from where it began, at a share of its radius."""
+    j = np.arange(1, 9)
+    w, began = j**-p.taper, np.clip(s.start, -1, 1) * p.reach * j / 8
+    return float(w @ (here - began - [getattr(s, f"play{k}") for k in j])) / w.sum()
+
+
+def risen(drive):
+    """What plays of reach 0.3 and taper 0.5 come to together once a drive has risen to `drive`."""
+    j = np.arange(1, 9)
+    return drive - float(j**-0.5 @ np.minimum(0.3 * j / 8, drive)) / (j**-0.5).sum()
+
+
+def dahl_rate(s, p):
+    v = s.velocity / p.smoothing
+    return s.velocity * (1 - s.z / tanh(v)) / p.reach
+
+
+def lugre_rate(s, p):
+    g = 1 + (p.breakaway - 1) * exp(-((s.velocity / p.speed) ** 2))
+    return (s.velocity - abs(s.velocity) * s.z / g) / p.reach
+
+
+def second_mass(s, p):
+    w, m = TWO_PI * p.frequency, p.stiffness / (TWO_PI * p.frequency) ** 2
+    return p.stiffness * (s.q - s.displacement) + 2 * p.damping * w * m * (w * s.p - s.velocity)
+
+
+def second_mass_rates(s, p):
+    w = TWO_PI * p.frequency
+    return {
+        "q": w * s.p,
+        "p": (w**2 * (s.displacement - s.q) + 2 * p.damping * w * (s.velocity - w * s.p)) / w,
+    }
+
+
+# kind: shape parameters, term, rates where it has some
+LAWS = {
+    "abbe_arm": ({}, lambda s, p: p.arm * s.all[s.partner]),
+    "asymmetric_gain": ({}, lambda s, p: p.gain * abs(s.value)),
+    "asymmetric_hysteresis": (
+        {"reach": 0.3, "skew": 0.6},
+        lambda s, p: -p.stiffness * s.z * (1 + p.skew * s.displacement / np.hypot(s.displacement, s.travel)),
+    ),
+    "asymmetric_viscous": ({}, lambda s, p: -abs(p.damping) * max(s.velocity * sign(p.damping), 0) * sign(p.damping)),
+    "backlash": ({}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
+    "bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.stiffness * s.z),
+    "bow": ({}, lambda s, p: p.curvature * s.value**2),
+    "clock_offset": None,  # below: it shifts the recorded drive
+    "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
+    "butterfly": (
+        {"linear": 0.6, "reach": 0.3, "taper": 0.5},
+        lambda s, p: p.share * (((s.value - weighted(s, p, s.value)) / risen(s.scale)) ** 2 * s.scale - 0.6 * s.value),
+    ),
+    "coupling": ({}, lambda s, p: p.gain * s.all[s.partner]),
+    "damping_coupling": ({}, lambda s, p: -p.damping * s.velocities[s.partner]),
+    "inertia_coupling": ({}, lambda s, p: -p.inertia * s.accelerations[s.partner]),
+    "one_sided_stiffening": ({}, lambda s, p: -p.k2 * s.displacement**2),
+    "stiffness_coupling": ({}, lambda s, p: -p.stiffness * s.displacements[s.partner]),
+    "creep": (
+        {"tau": 0.3, "slow": 0.2},
+        lambda s, p: p.gain * (0.8 * s.z + 0.2 * s.w),
+        lambda s, p: {"z": (s.value - s.z) / 0.3, "w": (s.value - s.w) / 1.2},
+    ),
+    "cubic_sensor": ({}, lambda s, p: p.curvature * s.value**3),
+    "cyclic": ({"period": 0.4, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * s.value / 0.4 + 0.9)),
+    "dead_zone": ({"rounding": 0.3}, dead),
+    "degradation": ({"levels_off": 3.0}, lambda s, p: -p.rate * 3.0 * (1 - exp(-s.t / 3.0)) * s.value),
+    "delay": None,  # below: exact for the polynomials that it interpolates by
+    "drift": ({}, lambda s, p: p.rate * s.t),
+    "drive_gain": ({}, lambda s, p: p.gain * s.value),
+    "drive_hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.share * weighted(s, p, s.value)),
+    "directional_friction": (
+        {"skew": -0.4, "reach": 0.02},
+        lambda s, p: -p.force * (s.z - 0.4 * s.w),
+        lambda s, p: {"z": (s.velocity - abs(s.velocity) * s.z) / 0.02, "w": abs(s.velocity) * (1 - s.w) / 0.02},
+    ),
+    "displacement_bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.share * s.z),
+    "displacement_hysteresis": (
+        {"reach": 0.3, "taper": 0.5, "reversible": 0.7},
+        lambda s, p: -p.share * (weighted(s, p, s.value) - 0.7 * s.value),
+    ),
+    "drive_offset": ({}, lambda s, p: p.offset),
+    "empirical_history": ({"reach": 0.3, **WEIGHTS}, remembered),
+    "empirical_position": (
+        {"low": -0.4, "width": 0.9, **WEIGHTS},
+        lambda s, p: p.size * bends((s.displacements[s.partner] + 0.4) / 0.9),
+    ),
+    "empirical_speed": (
+        {"speed": 0.3, **WEIGHTS},
+        lambda s, p: p.size * bends((1 + s.velocities[s.partner] / np.hypot(s.velocities[s.partner], 0.3)) / 2),
+    ),
+    "end_stop": ({"gap": -0.4, "power": 1.5}, stop),
+    "expansion": ({}, lambda s, p: p.slope * (s.state - s.rest) * s.value),
+    "finite_rotation": ({}, lambda s, p: p.share * s.second_order_kinematics()[s.index]),
+    "force_step": (EVENT, lambda s, p: p.force * event(s, p)),
+    "frame_rotation_x": ({}, turned(1, 2)),
+    "frame_rotation_y": ({}, turned(2, 0)),
+    "frame_rotation_z": ({}, turned(0, 1)),
+    "heat_crosstalk": ({}, lambda s, p: p.share * (s.all.sum() - s.value)),
+    "heater_resistance": ({}, lambda s, p: s.value / (1 + p.slope * (s.state - s.rest)) - s.value),
+    "home_offset": ({}, lambda s, p: p.offset),
+    "hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.stiffness * weighted(s, p, s.displacement)),
+    "lever_ratio": ({}, lambda s, p: p.gain * s.value),
+    "link_compliance": ({}, lambda s, p: p.tilt * s.all[s.partner]),
+    "link_load": ({}, lambda s, p: p.share * s.tangent_compliance()[s.index]),
+    "log_creep": (
+        {"tau": 0.1, "decades": 3.25},
+        logarithmic,
+        lambda s, p: {f"z{j}": (s.value - getattr(s, f"z{j}")) / (0.1 * sqrt(10.0) ** j) for j in range(9)},
+    ),
+    "lost_beams": (EVENT, lambda s, p: -p.share * s.value * event(s, p)),
+    "lost_motion": ({}, lambda s, p: -p.compliance * s.force),
+    "low_pass": (
+        {"tau": 0.06, "damping": 0.7},
+        lambda s, p: p.share * (s.w - s.value),
+        lambda s, p: {"w": s.v / 0.06, "v": (s.value - s.w - 1.4 * s.v) / 0.06},
+    ),
+    "payload": ({"lean": 0.4}, lambda s, p: p.share * (sin(s.value + 0.4) - sin(0.4))),
+    "quadratic_damping": ({}, lambda s, p: -p.damping * s.velocity**2 * sign(s.velocity)),
+    "quantisation": ({"quantum": 0.03}, lambda s, p: p.share * (0.03 * round(s.value / 0.03) - s.value)),
+    "raised_point": (
+        {},
+        lambda s, p: cross(s.all[:3], cross(s.all[:3], [0, 0, p.height]))[s.index - 3] / 2,
+    ),
+    "resonance": ({"frequency": 8.0, "damping": 0.2}, second_mass, second_mass_rates),
+    "reversed": ({}, lambda s, p: -2 * p.share * s.value),
+    "saturation": ({"level": 0.4}, clipped),
+    "screw_motion": ({}, lambda s, p: p.share * cross(s.all[:3], s.all[3:])[s.index - 3] / 2),
+    "second_pole": ({"tau": 0.3}, lambda s, p: p.share * (s.w - s.value), lambda s, p: {"w": (s.value - s.w) / 0.3}),
+    "sensor_gain": ({}, lambda s, p: p.gain * s.value),
+    "sensor_step": (EVENT, lambda s, p: p.offset * event(s, p)),
+    "stiffening": ({}, lambda s, p: -p.k3 * s.displacement**3),
+    "stiffness": ({}, lambda s, p: -p.stiffness * s.displacement),
+    "stitching_error": (
+        {"position": 0.2, "width": 0.3},
+        lambda s, p: p.offset / (1 + exp(-4 * (s.value - 0.2) / 0.3)),
+    ),
+    "stribeck": (
+        {"breakaway": 1.8, "speed": 0.5, "reach": 0.02},
+        lambda s, p: -p.force * s.z,
+        lambda s, p: {"z": lugre_rate(s, p)},
+    ),
+    "slack_friction": ({"slack": 0.2, "reach": 0.3}, gripping),
+    "stuck": ({"level": 0.2}, lambda s, p: -p.share * (s.value - 0.2)),
+    "swapped": ({}, lambda s, p: p.share * (s.all[s.partner] - s.value)),
+    "temperature_sensitivity": ({"reference": 0.2}, lambda s, p: p.slope * (s.ambient - 0.2)),
+    "thermal_lag": (
+        {"tau": 0.3, "second": 0.2},
+        lambda s, p: p.share * (s.x - s.value),
+        lambda s, p: {"v": (s.value - s.v) / 0.3, "w": (s.v - s.w) / 0.06, "x": (s.w - s.x) / 0.0216},
+    ),
+    "zero_per_record": ({}, lambda s, p: p.share * s.zero),
+    "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
+}
+AMPLITUDES = {"heater_resistance": 0.01, "expansion": 0.01}  # of a share, an angle, a gain: 0.3
+
+
+def parameters(kind: str, amplitude: float | None = None) -> SimpleNamespace:
+    size = AMPLITUDES.get(kind, 0.3) if amplitude is None else amplitude
+    return SimpleNamespace(**LAWS[kind][0], **{Effect.library[kind].amplitude().name: size})
