@@ -14,7 +14,7 @@ from ctrlgen.budget.contributors import BudgetLine
 from ctrlgen.budget.error_budget import COVERAGE, TOLERANCE, ErrorBudget
 from ctrlgen.budget.limits import Safety
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import difference, from_si
+from ctrlgen.core.units import difference, from_si, shown_difference_unit
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import origin
@@ -116,16 +116,12 @@ def _safety(budget: ErrorBudget, s: Safety) -> dict[str, Any]:
     return {
         "limit": s.limit.name, "label": s.limit.label, "channel": s.channel, "side": s.side, "sample": s.sample,
         "time_s": float(solution.trace.time[s.sample]) if solution.scenario.sample_time else None,
-        "unit": unit, "bound": float(from_si(s.bound, unit)), "margin_unit": _margin_unit(unit),
+        "unit": unit, "bound": float(from_si(s.bound, unit)), "margin_unit": shown_difference_unit(unit),
         "margin": float(difference(s.margin, unit)), "sd": float(difference(s.sd, unit)),
         "margin_at_probability": float(difference(s.kept, unit)),
         "margin_drawn": None if s.drawn is None else float(difference(s.drawn, unit)),
         "probability": s.probability, "kept": s.kept >= 0,
     }  # fmt: skip
-
-
-def _margin_unit(unit: str) -> str:
-    return {"degC": "K", "degF": "delta_degF"}.get(unit, unit)
 
 
 def percent(probability: float) -> str:
@@ -137,7 +133,7 @@ def safety_sentence(s: Safety, probability: float) -> str:
     """Such as 'actuator temperature keeps 550 degC with 99.9 %: margin 3.1 K'."""
     unit = s.limit.unit
     bound = f"{from_si(s.bound, unit):.5g} {unit}"
-    left = f"{abs(difference(s.kept, unit)):.3g} {_margin_unit(unit)}"
+    left = f"{abs(difference(s.kept, unit)):.3g} {shown_difference_unit(unit)}"
     if s.kept >= 0:
         return f"{s.limit.label} keeps {bound} with {percent(probability)}: margin {left}"
     likely = f"it does with {100 * s.probability:.3g} %"

@@ -27,7 +27,8 @@ from ctrlgen.budget.linear import Propagated, propagate
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, Infeasibility, InputError, SolverError, Unreachable
-from ctrlgen.core.units import difference, show
+from ctrlgen.core.units import difference, show, show_difference
+from ctrlgen.model.allocation import drive_ranges
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory import solution as described
@@ -219,15 +220,15 @@ class _RobustPath:
         for limit, own in judged.path.places:
             for side, away in enumerate(("above", "below")):
                 k, i = np.unravel_index(int(np.argmax(short[side, :, own])), short[side, :, own].shape)
-                at, unit = (side, int(k), own.start + int(i)), "K" if limit.unit == "degC" else limit.unit
+                at = side, int(k), own.start + int(i)
                 if not short[at]:
                     continue
                 bound, margin = float(found.bounds[side, at[2]]), float(found.margin[at])
                 value = show(bound + (margin if side == 0 else -margin), limit.unit)
+                left, taken, lacking = (show_difference(v, limit.unit) for v in (margin, reserve[at], short[at]))
                 text = (
-                    f"  {limit.label} at {limit.channels[i]}: {value} at sample {k}{self._moment(at[1])} is {show(margin, unit)} {away} "
-                    f"{show(bound, limit.unit)}, but what is uncertain takes {show(reserve[at], unit)} there: short by "
-                    f"{show(short[at], unit)}"
+                    f"  {limit.label} at {limit.channels[i]}: {value} at sample {k}{self._moment(at[1])} is {left} {away} "
+                    f"{show(bound, limit.unit)}, but what is uncertain takes {taken} there: short by {lacking}"
                 )
                 yield float(short[at] / found.sd[at]), text, at[1]
 
@@ -322,8 +323,8 @@ def _reserved(judged: _Judged, reserve: np.ndarray, model: Model) -> dict[str, t
     for limit, own in judged.path.places:
         values = np.concatenate([y[:, own].ravel(), rest[limit.name]])
         below, above = largest[limit.name]
-        room_below = np.inf if limit.lower is None else max(float(values.min()) - limit.lower, 0.0)
-        room_above = np.inf if limit.upper is None else max(limit.upper - float(values.max()), 0.0)
+        low, high = limit.bounds
+        room_below, room_above = max(float(values.min()) - low, 0.0), max(high - float(values.max()), 0.0)
         found[limit.name] = (min(below, room_below), min(above, room_above))
     return found
 
@@ -364,9 +365,7 @@ def _of_least_error(model: Model, stated: Uncertainties, scenario: Scenario) -> 
                 own = C @ by_number[:, :, free.index(path)] if path in free else np.zeros((1, n_u))
                 size = np.sum(own**2, axis=0) * sd**2
                 variance += size if np.count_nonzero(size) == 1 else 0.0
-    low, high = model.u_bounds
-    span = np.where(np.isfinite(high - low), high - low, 2 * model.u_scale)
-    weights = variance * span**2
+    weights = variance * drive_ranges(model) ** 2
     if not weights.any():
         return model
     return replace(model, drive_weights=np.maximum(weights / weights.max(), LEAST_WEIGHT))

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError
 
 from ctrlgen.core.units import Quantity, base_unit, parse, show, to_si, written_unit
+from ctrlgen.devices.numbers import member_at
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Effect
 
@@ -129,9 +130,7 @@ def _parsed(key: str, text: str, unit: str) -> float:
 def _refused(device: Any, path: str, text: str) -> str:
     """What the section of a number says against another value; empty where it says nothing."""
     match = re.fullmatch(r"(.*)\.(\w+)", path)
-    node: Any = device
-    for key in re.findall(r"\w+", match[1]) if match else ():
-        node = node[int(key)] if key.isdigit() else getattr(node, key)
+    node = member_at(device, match[1]) if match else None
     if not match or not isinstance(node, Section):
         return ""
     try:

@@ -106,8 +106,8 @@ def _composite_bounds(lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
     low, high = list[float](), list[float]()
     for limit in lifted.composite:
         count = limit.expr.numel()
-        low += [-np.inf if limit.lower is None else limit.lower] * count
-        high += [np.inf if limit.upper is None else limit.upper] * count
+        low += [limit.bounds[0]] * count
+        high += [limit.bounds[1]] * count
     return np.array(low), np.array(high)
 
 

@@ -193,10 +193,7 @@ class Model:
         low, high = np.full(symbol.numel(), -np.inf), np.full(symbol.numel(), np.inf)
         for limit in self.limits:
             for _, i in _positions(limit, symbol):
-                if limit.lower is not None:
-                    low[i] = max(low[i], limit.lower)
-                if limit.upper is not None:
-                    high[i] = min(high[i], limit.upper)
+                low[i], high[i] = max(low[i], limit.bounds[0]), min(high[i], limit.bounds[1])
         return low, high
 
     def bounds_formula(self, symbol: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -233,7 +230,7 @@ class Model:
         """Lower and upper bounds (n_u,) of the drives' rates; infinite where there is none."""
         low, high = np.full(self.u.numel(), -np.inf), np.full(self.u.numel(), np.inf)
         for i, limit in zip(self.rate_places, self.rate_limits, strict=True):
-            low[i], high[i] = limit.lower, limit.upper
+            low[i], high[i] = limit.bounds
         return low, high
 
     def tightened(self, reserves: Mapping[str, tuple[float, float]], probability: float | None) -> Model:

@@ -48,8 +48,7 @@ def sides_of(limits: tuple[Limit, ...], model: Model) -> list[Side]:
     """Both sides of all limits, as far as they are bounded."""
     found = []
     for limit in limits:
-        given = [bound for bound in (limit.lower, limit.upper) if bound is not None]
-        unit = (max(given) - min(given) if len(given) == 2 else abs(given[0])) or model.force_scale
+        unit = limit.span or model.force_scale
         for i in range(len(limit.channels)):
             found += [
                 Side(limit, i, upper, bound, unit)

@@ -28,6 +28,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import SolverError
+from ctrlgen.devices.limit import ranges
 from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
 from ctrlgen.path_timing.drive_law import Law
 from ctrlgen.path_timing.timing_law import TimingLaw
@@ -94,7 +95,7 @@ class SpeedProgramme:
                 row(W[k - 1, 1:] - W[k - 1, :-1] - moved, 0.0, 0.0)
         distances, u = self.distances.map(n + 1)(self.places(share).T, W * unit[:, None])
         row(distances, 0.0, np.inf)
-        span = self._spans()
+        span = ranges(self.law.model.u_bounds, self.law.model.u_scale)
         for i in range(u.size1()):
             for bound, is_high in ((self.rates.low[i], False), (self.rates.high[i], True)):
                 if np.isfinite(bound):
@@ -124,11 +125,6 @@ class SpeedProgramme:
         w = values[: m * (n + 1)].reshape(m, n + 1, order="F")
         time = np.concatenate([[0.0], np.cumsum(values[-n:]) * step])
         return TimingLaw(time, share, (w * unit[:, None]).T)
-
-    def _spans(self) -> np.ndarray:
-        """(n_u,) sizes of the drives."""
-        low, high = self.law.model.u_bounds
-        return np.where(np.isfinite(high - low), high - low, self.law.model.u_scale)
 
     def _start(
         self, begin: TimingLaw, share: np.ndarray, unit: np.ndarray, T: float, size: float, n: int

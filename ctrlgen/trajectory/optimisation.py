@@ -94,15 +94,14 @@ class TrajectoryProgramme:
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
         for i, limit in zip(m.rate_places, m.rate_limits, strict=True):
             if h is not None and limit.lower is not None and limit.upper is not None:
-                span = limit.upper - limit.lower
-                rows.append((u[i] - v[i]) * m.u_scale[i] / (h * span))
-                low.append(np.array([limit.lower / span]))
-                high.append(np.array([limit.upper / span]))
+                rows.append((u[i] - v[i]) * m.u_scale[i] / (h * limit.span))
+                low.append(np.array([limit.lower / limit.span]))
+                high.append(np.array([limit.upper / limit.span]))
         for limit in limits:
             unit = limit.upper or m.force_scale
             rows.append(at(limit.expr, v) / unit)
-            low.append(np.full(limit.expr.numel(), -np.inf if limit.lower is None else limit.lower / unit))
-            high.append(np.full(limit.expr.numel(), np.inf if limit.upper is None else limit.upper / unit))
+            low.append(np.full(limit.expr.numel(), limit.bounds[0] / unit))
+            high.append(np.full(limit.expr.numel(), limit.bounds[1] / unit))
         function = ca.Function("sample", [x, z, v, u, s, x_1, commanded], [ca.vertcat(*rows)], {"cse": True})
         return function, np.concatenate(low), np.concatenate(high)
 

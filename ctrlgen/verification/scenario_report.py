@@ -13,7 +13,7 @@ import numpy as np
 
 from ctrlgen.budget.budget_section import BudgetSection
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import difference, from_si, show
+from ctrlgen.core.units import difference, from_si, show, shown_difference_unit
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.reporting.html import render
@@ -132,7 +132,7 @@ def _margin(m: Margin, solution: Solution) -> dict[str, Any]:
         "limit": m.limit.name, "label": m.limit.label, "unit": unit, "channel": m.channel, "sample": m.sample,
         "time_s": float(solution.trace.time[m.sample]) if solution.scenario.sample_time else None, 
         "value": float(from_si(m.value, unit)), "bound": float(from_si(m.limit.described(m.bound), unit)),
-        "reserve": reserve, "margin": distance, "margin_unit": "K" if unit == "degC" else unit, "share_left": m.share,
+        "reserve": reserve, "margin": distance, "margin_unit": shown_difference_unit(unit), "share_left": m.share,
     }  # fmt: skip
 
 

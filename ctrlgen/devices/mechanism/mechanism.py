@@ -15,7 +15,8 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
-from ctrlgen.devices.base import Device, DevicePhysics
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed
 from ctrlgen.devices.mechanism.copies import Copied, Placed

@@ -21,7 +21,8 @@ from pydantic import create_model
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics, InertialPhysics
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.user.arguments import PLACEHOLDER, SECTIONS, ArgumentReader
 from ctrlgen.devices.user.ports import Law, Ports

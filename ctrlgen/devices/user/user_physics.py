@@ -12,16 +12,15 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import (
+from ctrlgen.devices.device_physics import (
     BalancedPhysics,
     DevicePhysics,
     ImposedPhysics,
     InertialPhysics,
-    Limit,
-    Signal,
     imposed_motion,
-    rate_limit,
 )
+from ctrlgen.devices.limit import Limit, rate_limit
+from ctrlgen.devices.signal import Signal
 from ctrlgen.devices.user.ports import Law, Ports, evaluate_law
 
 ARGUMENTS = {  # of each law

@@ -13,6 +13,7 @@ import scipy  # its optimize takes a while to import, and comes when it is used
 import scipy.sparse as sp
 
 from ctrlgen.core.errors import SolverError
+from ctrlgen.devices.limit import ranges
 from ctrlgen.model.allocation import INDEPENDENT
 from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
 
@@ -90,7 +91,7 @@ def limited_rows(
     limited = Rows(sp.eye(n * len(span), format="csr"), low, high, np.ones(n * len(span)))
     if rates is None:
         return limited
-    allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
+    allowed = ranges(rates, span)
     step = (sp.eye(n, k=1) - sp.eye(n) + sp.eye(n, k=1 - n)).tocsr()[: len(gaps)]
     change = sp.kron(sp.diags_array(1 / gaps) @ step, sp.diags_array(span / allowed), format="csr")
     slowest, fastest = (np.tile(rate / allowed, len(gaps)) for rate in rates)
